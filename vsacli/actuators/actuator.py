@@ -122,7 +122,7 @@ class Actuator(ABC):
     @classmethod
     @abstractmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """An actuator of which nothing else is known.
+        """Return an actuator of which nothing else is known.
 
         Raises:
             InvalidRecordError: a constant is not positive.
@@ -228,7 +228,7 @@ class Actuator(ABC):
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of several actuators of one `spring_group`, at any state of their joints and motors."""
+        """Return the springs of actuators of one `spring_group`, at any state of their joints and motors."""
         raise NotImplementedError(f"{cls.__name__} has no springs")
 
     # Of kinds that take a stiffness

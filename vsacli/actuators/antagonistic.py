@@ -181,7 +181,7 @@ class Antagonistic(Actuator):
         return rates + np.stack((rate, -rate))
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
-        """Each spring by itself, and one between the motors."""
+        """Return each spring by itself, and one between the motors."""
         phi = of_joint["phi"]
         sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
         springs = [(f"spring {side}", *spring) for side, spring in sides]
@@ -208,7 +208,7 @@ class Antagonistic(Actuator):
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of joints whose couplings are equal."""
+        """Return the springs of joints whose couplings are equal."""
         from vsacli.actuators.pairs.joints import CoupledPairs, PairElasticity
 
         pairs, coupling = [actuator.laws for actuator in actuators], actuators[0].coupling
@@ -239,7 +239,7 @@ class Antagonistic(Actuator):
 
 
 def _coupled(moved: Transmission, coupling: SpringLaw) -> Transmission:
-    """The same with a spring between the motors, which changes what they feel, and stores energy."""
+    """Return the same with a spring between the motors, which changes what they feel, and stores energy."""
     return moved._replace(
         tau_spring=moved.tau_spring + _between(coupling, moved.phi),
         elastic_energy=moved.elastic_energy + coupling.energy(moved.phi[0] - moved.phi[1]),

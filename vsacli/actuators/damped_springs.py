@@ -198,7 +198,7 @@ class DampedSprings:
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
-        """The corridor at the torque of the springs, and what is wrong with the step."""
+        """Return the corridor at the torque of the springs, and what is wrong with the step."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
         never = np.zeros_like(lost)
         if not self._settable:

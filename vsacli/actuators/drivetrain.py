@@ -148,7 +148,7 @@ class Drivetrain:
         return self.of_joints(self.of_all(rigid, sprung))
 
     def direct(self, values: FloatArray) -> FloatArray:
-        """The value of the motor that moves a joint directly, (..., joints) from (..., motors), else 0."""
+        """Return the values of motors that move joints directly, (..., joints), else 0."""
         result = np.zeros_like(values, shape=(*values.shape[:-1], len(self.rigid)))
         if self._direct.size:
             result[..., self._direct] = values[..., ~self.sprung]
@@ -192,13 +192,13 @@ class Drivetrain:
         return np.where(self.rigid, np.nan, found)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
-        """The springs with their derivatives, at positions and velocities of joints and motors."""
+        """Return the springs with their derivatives, at positions and velocities of joints and motors."""
         parts = [elasticity.state(at) for elasticity, at in self.at(q, theta)]
         rates = [rates for _, rates in self.at(dq, dtheta)]
         return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
-        """The part of each group of actuators, (..., joints), of (..., joints)."""
+        """Return the part of each group of actuators, (..., joints), of (..., joints)."""
         return [values if self._alone else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
@@ -220,13 +220,13 @@ class Drivetrain:
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
-        """The springs of each group with their coordinates, (..., joints, coordinates), or rates of these."""
+        """Return the springs of each group with their coordinates (..., joints, coordinates), or rates."""
         return [(each, each.coordinates(*positions)) for each, positions in self._positions(q, theta)]
 
     def _positions(
         self, q: FloatArray, theta: FloatArray
     ) -> Iterator[tuple[Elasticity, tuple[FloatArray, FloatArray]]]:
-        """The springs of each group with the positions of joints and motors, (..., joints, motors)."""
+        """Yield the springs of each group with the positions of joints and motors, (..., joints, motors)."""
         for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
             if self._alone:
                 of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)

@@ -65,7 +65,7 @@ class Elastic(Actuator):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A motor and a linear spring."""
+        """Return a motor and a linear spring."""
         return {"motor": Motor.example(joint_type), "stiffness": EXAMPLE_STIFFNESS[joint_type]}
 
     @classmethod
@@ -117,7 +117,7 @@ class Elastic(Actuator):
     def transmit(
         self, command: Command, _near_singular: float, _integrated: FloatArray | None
     ) -> Transmission:
-        """The deflection at which the spring carries tau_e, and its derivatives."""
+        """Return the deflection at which the spring carries tau_e, and its derivatives."""
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> Transmission:
@@ -136,7 +136,7 @@ class Elastic(Actuator):
         )
 
     def _nonlinear(self, command: Command) -> Transmission:
-        """The root of tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
+        """Return the root of tau(phi) = tau_e, with tau_e' = sigma phi', tau_e'' = zeta phi'^2 + sigma phi''.
 
         NaN where tau_e cannot be carried; what needs 1/sigma also where that is zero.
         """
@@ -167,7 +167,10 @@ class Elastic(Actuator):
         )
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """The deflection at which the spring carries the torque, which leaves no choice of the stiffness."""
+        """Return the deflection at which the spring carries the torque.
+
+        It leaves no choice of the stiffness.
+        """
         never = np.zeros_like(tau_e, dtype=bool)
         deflection = self.law.deflection(tau_e)
         return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
@@ -185,7 +188,7 @@ class Elastic(Actuator):
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of several joints."""
+        """Return the springs of several joints."""
         from vsacli.actuators.single_springs import LinearRows, SingleSprings
 
         linear = [actuator.stiffness for actuator in actuators if actuator.stiffness is not None]

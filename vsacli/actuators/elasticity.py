@@ -42,7 +42,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def torques(self, coordinates: FloatArray) -> Torques:
-        """The torques of the springs."""
+        """Return the torques of the springs."""
 
     @abstractmethod
     def energy(self, coordinates: FloatArray) -> FloatArray:
@@ -50,7 +50,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def state(self, coordinates: FloatArray) -> ElasticState:
-        """The springs with their derivatives."""
+        """Return the springs with their derivatives."""
 
 
 class ElasticState(ABC):

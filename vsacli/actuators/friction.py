@@ -95,7 +95,7 @@ class FrictionLaws(NamedTuple):
         return cls(*map(np.stack, zip(*rows, strict=True)))
 
     def with_axis_behind(self) -> FrictionLaws:
-        """The same with a further axis, for samples, behind those there are."""
+        """Return the same with a further axis, for samples, behind those there are."""
         return FrictionLaws(*(values[..., None] for values in self))
 
     @property
@@ -133,7 +133,7 @@ class FrictionLaws(NamedTuple):
         return torque * velocity, (torque + size * (1 - smooth * smooth) / width * velocity) * acceleration
 
     def _size(self, velocity: FloatArray, sign: FloatArray) -> FloatArray:
-        """The size that counts: by the direction where the shape is the sign, else by the velocity."""
+        """Return the size that counts: by the direction where the shape is the sign, else by the velocity."""
         return np.where(np.where(self.width > 0, velocity, sign) < 0, self.backward, self.forward)
 
 

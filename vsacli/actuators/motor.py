@@ -186,11 +186,11 @@ class Windings(NamedTuple):
         return cls(*map(np.stack, zip(*known, strict=True)))
 
     def with_axis_behind(self) -> Windings:
-        """The same with a further axis, for samples, behind those there are."""
+        """Return the same with a further axis, for samples, behind those there are."""
         return Windings(*(values[..., None] for values in self))
 
     def variables(self, torque: FloatArray, velocity: FloatArray) -> dict[str, FloatArray]:
-        """The variables `ELECTRICAL` by name, A, V, W.
+        """Return the variables `ELECTRICAL` by name, A, V, W.
 
         Args:
             torque: of the motors, N m (N), joint side of the gear.

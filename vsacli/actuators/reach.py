@@ -68,7 +68,10 @@ class LimitCheck(NamedTuple):
         return rows if self.motor is None else rows[self.motor - 1]
 
     def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
-        """The bit where the range is left by more than rounding and an allowance; NaN does not leave it."""
+        """Return the bit where the range is left by more than rounding and an allowance.
+
+        NaN does not leave it.
+        """
         allowed = LIMIT_ROUNDING * self._largest + allowance
         return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
 
@@ -98,7 +101,7 @@ class LimitCheck(NamedTuple):
         return clearance
 
     def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
-        """The worst of the steps that have the bit among these flags, (samples,); None if there is none."""
+        """Return the worst of the steps with the bit among these flags, (samples,); None without any."""
         values = self.values(of_joint)
         outside = np.nan_to_num(self._outside(values), nan=-np.inf)
         hit = has(flags, self.flag) & (outside > 0)
@@ -119,7 +122,7 @@ class LimitCheck(NamedTuple):
 
 
 def within(bound: float) -> tuple[float, float]:
-    """The range of a quantity whose size is bounded."""
+    """Return the range of a quantity whose size is bounded."""
     return -bound, bound
 
 
@@ -131,7 +134,7 @@ def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> Float
 
 
 def nearer_end(stiffness: float, lower: float, upper: float) -> float:
-    """The end of the corridor that a stiffness is nearer to; NaN if there is none."""
+    """Return the end of the corridor that a stiffness is nearer to; NaN if there is none."""
     return lower if stiffness - lower <= upper - stiffness or math.isnan(lower) else upper
 
 

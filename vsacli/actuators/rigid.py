@@ -30,7 +30,7 @@ class Rigid(Actuator):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A motor."""
+        """Return a motor."""
         return {"motor": Motor.example(joint_type)}
 
     @classmethod

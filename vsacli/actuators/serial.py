@@ -79,7 +79,7 @@ class Serial(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """A linear spring, from a quarter to four times as stiff as an elastic transmission."""
+        """Return a linear spring, from a quarter to four times as stiff as an elastic transmission."""
         from vsacli.actuators.laws.polynomial import Polynomial
         from vsacli.actuators.mechanisms.ratios.scales import Power
         from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
@@ -89,7 +89,7 @@ class Serial(Actuator):
         return cls(motor=(motor, motor), mechanism=spring)
 
     def unfit_for(self, joint_type: str) -> FieldProblem | None:
-        """A mechanism that turns."""
+        """Return a mechanism that turns."""
         if joint_type in self.mechanism.joint_types:
             return None
         others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
@@ -190,7 +190,7 @@ class Serial(Actuator):
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of joints whose mechanisms are equal."""
+        """Return the springs of joints whose mechanisms are equal."""
         return _Springs(actuators[0].mechanism)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
@@ -247,9 +247,9 @@ class _Springs(Elasticity):
         return Torques(state.tau_e, state.tau_spring)
 
     def energy(self, coordinates: FloatArray) -> FloatArray:
-        """The potential."""
+        """Return the potential."""
         return self._mechanism.state(coordinates).energy
 
     def state(self, coordinates: FloatArray) -> ElasticState:
-        """The potential with its derivatives."""
+        """Return the potential with its derivatives."""
         return self._mechanism.state(coordinates)

@@ -40,7 +40,7 @@ class SingleSprings(Elasticity):
         self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
-        """The spring pulls link and motor alike."""
+        """Return the spring pulls link and motor alike."""
         tau = self._rows.torque(phi)
         return Torques(tau[..., 0], tau)
 
@@ -49,7 +49,7 @@ class SingleSprings(Elasticity):
         return self._rows.energy(phi)[..., 0]
 
     def state(self, phi: FloatArray) -> ElasticState:
-        """The spring with its derivatives."""
+        """Return the spring with its derivatives."""
         return _State(self._rows.state(phi))
 
 

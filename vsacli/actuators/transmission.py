@@ -48,7 +48,7 @@ class Command(NamedTuple):
         return cls(q, still, still, tau_e, still, still, {})
 
     def arrays(self) -> dict[str, FloatArray]:
-        """All arrays by their names."""
+        """Return all arrays by their names."""
         return {**dict(zip(self._fields[:-1], self[:-1], strict=True)), **self.commanded}
 
 
@@ -84,7 +84,10 @@ def single_motor(
     elastic_energy: FloatArray,
     flags: FlagArray,
 ) -> Transmission:
-    """The transmission of an actuator with one motor, whose stiffness is not commanded; arrays (samples,)."""
+    """Return the transmission of an actuator with one motor, whose stiffness is not commanded.
+
+    Arrays (samples,).
+    """
     none = np.full_like(phi, np.nan)
     return Transmission(
         stiffness=stiffness,

@@ -39,7 +39,7 @@ Residual = tuple[FloatArray, FloatArray]
 
 
 def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular: BoolArray) -> FloatArray:
-    """The largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
+    """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
         joint: the joint.
@@ -78,7 +78,7 @@ def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
 
 
 def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_spring: FloatArray) -> Residual:
-    """The balance of a shaft. What rounding of positions changes in the springs' torque is no residual."""
+    """Return the residual of a shaft, without the effect of rounded positions on the springs."""
     motor, dtheta = joint.actuator.motors[index], of_joint["dtheta"][index]
     terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_spring]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
@@ -109,7 +109,7 @@ def _winding_residuals(
     voltage: FloatArray | None = None,
     copper_loss: FloatArray | None = None,
 ) -> Iterator[Residual]:
-    """The current makes the torque, heat is R i^2, and u i is that heat and the power of the shaft."""
+    """Yield the current makes the torque, heat is R i^2, and u i is that heat and the power of the shaft."""
     assert motor.torque_constant is not None, "windings without a torque constant have no current"
     yield _residual(tau_motor, motor.torque_constant * current)
     if motor.resistance is None or voltage is None or copper_loss is None:
@@ -219,7 +219,7 @@ class BalancedDynamics(InverseDynamics):
         }
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """The rows of each result by name, from the kernel's arguments and the variables of the joints."""
+        """Return the rows of each result by name, from kernel arguments and variables of the joints."""
         joints = self.robot.joints
         passed = [
             call(rows[0], behind_link(passed_power, joint), of_joint)
@@ -236,7 +236,7 @@ def damped_joints(joints: Sequence[Joint]) -> list[int]:
 
 
 def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
-    """The balances of (14) by the springs' laws at phi, and of the shafts, by name.
+    """Return the balances of (14) by the springs' laws at phi, and of the shafts, by name.
 
     Zero at steps that are not regular. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k| and
     |sum sigma_k - sigma| / sum |sigma_k|. An elastic joint has one

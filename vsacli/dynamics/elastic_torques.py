@@ -198,7 +198,7 @@ def link_torques(
 
 
 def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
-    """The arrays there are, checked: of one shape, and none left out before the last."""
+    """Return the arrays there are, checked: of one shape, and none left out before the last."""
     given = [
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
     ]
@@ -218,7 +218,7 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
 def _damping_rows(
     robot: Robot, shape: tuple[int, ...], given: Sequence[ArrayLike | None]
 ) -> Iterator[FloatArray]:
-    """The damping and its derivatives, if there are dampers between the links."""
+    """Yield the damping and its derivatives, if there are dampers between the links."""
     if not link_damped(robot):
         return
     least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
@@ -230,7 +230,7 @@ def _damping_rows(
 
 
 def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
-    """The components, and each of their derivatives; `samples` is the shape before the last axis."""
+    """Yield the components, and each of their derivatives; `samples` is the shape before the last axis."""
     if wrench is None:
         return
     for name in WRENCH_NAMES:
@@ -270,5 +270,5 @@ def joint_state(
 
 
 def link_damped(robot: Robot) -> bool:
-    """Whether a joint has a damper between its links."""
+    """Return whether a joint has a damper between its links."""
     return any(joint.damper_at("link") for joint in robot.joints)

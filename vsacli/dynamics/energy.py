@@ -255,7 +255,7 @@ def _joint_flow(
 
 
 def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:
-    """The rows of the motors of each joint."""
+    """Return the rows of the motors of each joint."""
     return [rows[first : first + SIDES] for first in range(0, len(rows), SIDES)]
 
 

@@ -39,7 +39,7 @@ FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
 
 
 def integrable(joint: Joint) -> bool:
-    """Whether deflections of a joint can be integrated by (19); with a damper beside they are already."""
+    """Return whether deflections of a joint can be integrated by (19); behind a damper they already are."""
     return joint.actuator.integrable and joint.damper_at("transmission") is None
 
 
@@ -167,7 +167,7 @@ class Integration:
             self._run(pieces.ends[pieces.ends > start].tolist(), phi.ravel())
 
     def solution(self) -> OdeSolution:
-        """The deflections as a function of time, (2 joints, samples)."""
+        """Return the deflections as a function of time, (2 joints, samples)."""
         from scipy.integrate import OdeSolution
 
         return OdeSolution(self.times, self._steps)
@@ -206,7 +206,7 @@ class Integration:
                 self.times.append(self._end_of(step, self.times[-1], float(integrator.t)))
 
     def _end_of(self, step: DenseOutput, left: float, right: float) -> float:
-        """The end of a step, or the first time in it, to rounding, at which a joint cannot be integrated."""
+        """Return the end of a step, or the first time in it at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
             nodes = np.linspace(left, right, CHECKS + 1)
             hindrances = self._task.hindrances(self.joints, nodes[1:], by_joint(step(nodes[1:])))
@@ -219,14 +219,14 @@ class Integration:
         return right
 
     def _fastest(self, integrator: DOP853[np.float64]) -> int:
-        """The joint whose deflections change fastest for their size: the one that makes the steps short."""
+        """Return the joint with the fastest relative change of deflections, which makes the steps short."""
         phi = integrator.y
         speed = np.abs(self._rates(float(integrator.t), phi)) / np.abs(phi)
         return self.joints[int(np.nan_to_num(speed, nan=np.inf).argmax()) // 2]
 
 
 def by_joint(state: FloatArray) -> FloatArray:
-    """The integrator's state (2 joints, samples) as (joints, 2, samples)."""
+    """Return the integrator's state (2 joints, samples) as (joints, 2, samples)."""
     return state.reshape(-1, 2, state.shape[1])
 
 

@@ -63,7 +63,7 @@ class Collocation:
         self._rule = _rule(stages)
 
     def times(self, start: float, end: float) -> FloatArray:
-        """The nodes of a cell, (stages,), s."""
+        """Return the nodes of a cell, (stages,), s."""
         return start + (end - start) / 2 * (1 + self._rule.nodes)
 
     def slopes(self, start: float, end: float) -> FloatArray:
@@ -216,7 +216,7 @@ class March:
         self._springs, self._demand, self._rule = springs, demand, Collocation()
 
     def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
-        """The whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
+        """Return the whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
         ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
         peaks = _Peaks(self._springs, self._demand(ends), phi)
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
@@ -358,7 +358,7 @@ class InternalMotions:
         return np.unique(np.concatenate([np.zeros(0), *ends]))
 
     def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
-        """The motion of each joint at times from the first step on; NaN from a stop on."""
+        """Return the motion of each joint at times from the first step on; NaN from a stop on."""
         return {joint: self._at(joint, elapsed) for joint in self.joints}
 
     def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
@@ -398,7 +398,7 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
-    """The joints with a damper parallel to their springs that is not at zero all the time."""
+    """Return the joints with a damper parallel to their springs that is not at zero all the time."""
     chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
     if not chosen:
         return ()

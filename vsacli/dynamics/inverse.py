@@ -127,7 +127,7 @@ class InverseDynamics(RowKernel):
         return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
 
     def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
-        """The variables of each joint by name, None for what it does not have."""
+        """Return the variables of each joint by name, None for what it does not have."""
         links, given = self.links, self.arguments.unpack(rows)
         demanded = links(rows[: links.inputs])
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
@@ -147,7 +147,7 @@ class InverseDynamics(RowKernel):
         return found
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """The rows of each result by name, from the kernel's arguments and the variables of the joints."""
+        """Return the rows of each result by name, from kernel arguments and variables of the joints."""
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
         return {
             name: rows_of_joints(
@@ -173,7 +173,7 @@ class InverseDynamics(RowKernel):
 
 
 def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:
-    """A function of a joint to be called with arrays, where neither its name, its row nor its link counts.
+    """Wrap `function(joint, ...)` so that name, DH row and link do not count when joints are compared.
 
     Args:
         function: takes the joint first.
@@ -266,7 +266,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
 
 
 def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """The rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
+    """Yield the rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
     for array in of_joints:
         yield from array if array.ndim > 1 else [array]
 
@@ -282,7 +282,7 @@ def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
 
 
 def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
-    """A trajectory for a robot: the same, with what its devices do that are not commanded.
+    """Return a trajectory for a robot: the same, with what its devices do that are not commanded.
 
     Raises:
         InputError: it has another number of joints than the robot, or lacks a stiffness that one takes.
@@ -310,6 +310,6 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
 
 
 def command_of(index: int, commanded: Mapping[str, FloatArray]) -> Command:
-    """The part of one joint in variables by name, each (samples, joints)."""
+    """Return the part of one joint in variables by name, each (samples, joints)."""
     names = (name for name in Command.names(COMMANDED) if name in commanded)
     return Command.of({name: commanded[name][:, index] for name in names})

@@ -12,7 +12,7 @@ from vsacli.robot.joint import Joint
 
 
 def limit_checks(joint: Joint) -> list[LimitCheck]:
-    """The limits that a joint has."""
+    """Return the limits that a joint has."""
     limits = joint.limits
     checks = [
         LimitCheck(Flag.POSITION_LIMIT, "q", None, limits.position),
@@ -26,7 +26,7 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
 
 
 def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
-    """The flags, (samples,), and those of all limits of a joint on variables that are given.
+    """Return the flags, (samples,), and those of all limits of a joint on variables that are given.
 
     Of variables whose standard deviations are given, too, limits count beyond what these allow.
     """
@@ -37,7 +37,7 @@ def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
 
 
 def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
-    """The steps at which it depends on standard deviations whether limits count as exceeded, (samples,).
+    """Return the samples at which standard deviations decide whether limits are exceeded, (samples,).
 
     Something is beyond a limit there, but nothing by more than is allowed at most.
     """

@@ -32,7 +32,7 @@ def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> F
 def integral(
     interval: FloatArray, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """The same of single intervals, from value and rate before and after each."""
+    """Return the same of single intervals, from value and rate before and after each."""
     (value, rate), (next_value, next_rate) = before, after
     return ((rate - next_rate) * (interval / 6) + next_value + value) * (interval / 2)
 
@@ -77,7 +77,7 @@ def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) ->
 def positive_work(
     interval: FloatArray, before: FloatArray, after: FloatArray, work: FloatArray
 ) -> FloatArray:
-    """The same of single intervals, from the power before and after each; arrays of one shape."""
+    """Return the same of single intervals, from the power before and after each; arrays of one shape."""
     positive = np.maximum(work, 0.0)
     (found,) = where_needed(before * after < 0, _linear, (interval, before, after, positive), (positive,))
     return found
@@ -142,7 +142,7 @@ class Lost(NamedTuple):
     copper: FloatArray | None
 
     def taken(self, intervals: slice) -> Lost:
-        """The same of some of the intervals."""
+        """Return the same of some of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
         return Lost(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
 

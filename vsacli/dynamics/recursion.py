@@ -243,7 +243,7 @@ def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vec
 def _backward(
     link: LinkConstants, state: JointState, body: Body, beyond: _Reaction, of_base: bool
 ) -> tuple[TorqueDerivatives, _Reaction]:
-    """The torque of a joint, and what its link demands of the one before, if that is not the base."""
+    """Return the torque of a joint, and what its link demands of the one before, if that is not the base."""
     reaction = _reaction(body, beyond)
     torque = _project(link, state, body, reaction)
     return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)

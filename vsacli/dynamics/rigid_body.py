@@ -127,7 +127,7 @@ class Chain:
 
 
 def _derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
-    """The wrench and its derivatives up to an order."""
+    """Return the wrench and its derivatives up to an order."""
     return [] if wrench is None else [getattr(wrench, name) for name in WRENCH_NAMES[: order + 1]]
 
 
@@ -176,7 +176,7 @@ def _last_pivot(matrices: FloatArray) -> float:
 
 
 def chain_of(robot: Robot, frame: str | None = None) -> Chain:
-    """The programs of a robot's links and joints; recorded once for equal chains.
+    """Return the programs of a robot's links and joints; recorded once for equal chains.
 
     Args:
         robot: whose base and tool count, but neither its actuators nor its dampers.
@@ -215,7 +215,7 @@ def _inertia_program(robot: Robot) -> StateFunction:
 
 
 def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> StateFunction:
-    """An output of the recursion; derivatives of q beyond `orders` are zero."""
+    """Return an output of the recursion; derivatives of q beyond `orders` are zero."""
     tape = Tape()
     joints = len(robot.joints)
     q = tape.inputs(joints)
@@ -226,7 +226,7 @@ def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -
 
 
 def _load(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:
-    """The wrench and its derivatives up to an order as inputs, the others zero."""
+    """Return the wrench and its derivatives up to an order as inputs, the others zero."""
     axes = len(WRENCH_AXES)
     wrench = [tape.inputs(axes) if derivative <= order else [0] * axes for derivative in range(3)]
     return tip_load(robot, frame, wrench)

@@ -167,7 +167,7 @@ def deviations(
 
 
 def _ignored(robot: Robot, signal: Signal) -> list[int]:
-    """The joints that do not take a signal, although there may be a column of it for them."""
+    """Return the joints that do not take a signal, although there may be a column of it for them."""
     commanded = signal.key in COMMANDED
     return [
         index for index, joint in enumerate(robot.joints) if commanded and signal.key not in joint.commanded
@@ -204,7 +204,7 @@ def _values_and_gradients(
 
 
 def _without_inner_damper(joint: Joint) -> Joint:
-    """The joint without a damper parallel to its springs.
+    """Return the joint without a damper parallel to its springs.
 
     With one, motors follow what the links demand later and less: what is found without is more than that.
     """
@@ -212,7 +212,7 @@ def _without_inner_damper(joint: Joint) -> Joint:
 
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
-    """The motion, then for each shift the motion with it added, and with it subtracted, in a row."""
+    """Return the motion, then for each shift the motion with it added, and with it subtracted, in a row."""
     given = motion.variables()
     times = given.pop("time")
     copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in given.items()}

@@ -25,7 +25,7 @@ VANISHING = 1e-12
 
 
 def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
-    """The trajectory of a robot whose dampers, if none is commanded, stand at their least; a note says so.
+    """Return the trajectory with uncommanded dampers at their minimum, and a note on them.
 
     Raises:
         InputError: the damping parallel to the springs of a joint falls to zero, or below, somewhere but not

@@ -124,7 +124,7 @@ class TrajectoryFile:
 
 @cache
 def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
-    """The record that says what a trajectory must have.
+    """Return the record that says what a trajectory must have.
 
     Args:
         taken: keys of the signals that some joint takes, which must be there unless they are of a device;
@@ -188,7 +188,7 @@ def declared_trajectory(
     changes: Changes = MappingProxyType({}),
     progress: Progress = unseen,
 ) -> Trajectory:
-    """A trajectory as its file has it: what devices do by themselves depends on numbers of the robot.
+    """Return a trajectory as its file has it: what devices do by themselves depends on numbers of the robot.
 
     But for its warnings, it is the same for all robots with the same `CommandedJoints`.
 
@@ -232,7 +232,7 @@ def declared_trajectory(
 
 
 def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | None:
-    """The samples per second that changes give to a table, in which nothing else can be set.
+    """Return the samples per second that changes give to a table, in which nothing else can be set.
 
     Raises:
         ChangeError: something else is set, or the rate is none.
@@ -262,7 +262,7 @@ def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
 def _read_recordings(
     document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
 ) -> list[Recording]:
-    """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
+    """Return each CSV file once, for the signals that are wanted from it; all with the times of the first."""
     if not document.recorded:
         return []
     from vsacli.documents.column_mapping import ColumnMapping
@@ -302,7 +302,7 @@ def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recor
 
 
 def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
-    """All of it passed more slowly."""
+    """Return all of it passed more slowly."""
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}

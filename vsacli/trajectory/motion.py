@@ -44,14 +44,14 @@ class Motion:
         return {**{name: getattr(self, name) for name in POSITION.names}, **self.commanded}
 
     def variables(self) -> dict[str, FloatArray]:
-        """All arrays by the names of result variables."""
+        """Return all arrays by the names of result variables."""
         arrays = {"time": self.time, **self.of_joints}
         if self.wrench is not None:
             arrays |= {name: getattr(self.wrench, name) for name in WRENCH_NAMES}
         return arrays
 
     def mapped(self, time: FloatArray, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
-        """The motion at other times, with a function applied to each array and its order of derivation."""
+        """Return the motion at other times: a function applied to each array and its order of derivation."""
         orders = orders_of_derivation()
         arrays = {name: function(array, orders[name]) for name, array in self.of_joints.items()}
         return Motion.of(time, arrays, self.wrench and self.wrench.mapped(function))

@@ -114,7 +114,7 @@ class Facts:
         return last - first
 
     def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
-        """The numbers that measure this, each with its joint and with its magnitude as size."""
+        """Yield the numbers that measure this, each with its joint and with its magnitude as size."""
         for path, measured, value, _ in self.numbers:
             if measured == quantity and isinstance(path[-1], Entry):
                 joint = path[-1].number
@@ -122,7 +122,7 @@ class Facts:
                 yield Measured(path, value, unit, abs(value)), joint
 
     def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
-        """The number that the pace follows from, if it is a time or a frequency, with the largest size."""
+        """Yield the time or frequency that the timing follows from, with the largest size."""
         of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
         given = [each for each in of_motion if each.path[-1] == "frequency"]
         given = given or [each for each in of_motion if each.quantity == units.TIME]
@@ -152,21 +152,21 @@ def _slowness(facts: Facts) -> Iterator[Measured]:
 
 
 def _velocities(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
-    """The largest of joints of a type."""
+    """Yield the largest of joints of a type."""
     if facts.moved is not None:
         sizes = np.where(facts.revolute == revolute, np.abs(facts.moved[1]).max(axis=1), 0.0)
         yield from facts.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")
 
 
 def _accelerations(facts: Facts, quantity: Quantity) -> Iterator[Measured]:
-    """The largest of what is farthest from a joint, m/s^2."""
+    """Yield the largest of what is farthest from a joint, m/s^2."""
     if facts.moved is not None and not facts.robot.placeholder:
         levers = np.where(facts.revolute, facts.sizes.levers, 1.0)
         yield from facts.paced(quantity, np.abs(facts.moved[2]).max(axis=1) * levers)
 
 
 def _rate(facts: Facts, periods: float) -> Iterator[Measured]:
-    """The samples in a number of seconds."""
+    """Yield the samples in a number of seconds."""
     for path, quantity, value, _ in facts.numbers:
         if quantity == units.RATE and path == ("rate",):
             yield Measured(path, value, PER_SECOND, value * periods)
@@ -183,7 +183,7 @@ def _wrenches(facts: Facts, *, forces: bool) -> Iterator[Measured]:
 
 
 def _commanded(facts: Facts) -> Iterator[tuple[Measured, Joint, Corridor]]:
-    """Every stiffness but amplitudes, with its joint, and with what the springs give at rest."""
+    """Yield every stiffness but amplitudes, with its joint, and with what the springs give at rest."""
     for measured, number in facts.of_joints(units.STIFFNESS) if not facts.robot.placeholder else ():
         found = facts.corridors[number]
         if found is not None and AMPLITUDES.isdisjoint(measured.path):

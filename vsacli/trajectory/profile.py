@@ -40,10 +40,10 @@ class Profile(Protocol):
         """Value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """The same at the steps start..stop-1, whose times are `time`; given columns pass through."""
+        """Return the same at the steps start..stop-1, whose times are `time`; given columns pass through."""
 
     def stretched(self, factor: float) -> Profile:
-        """The same profile, slower by a factor, from the same first time on."""
+        """Return the same profile, slower by a factor, from the same first time on."""
 
     @property
     def estimate(self) -> SampledProfile | None:
@@ -86,11 +86,11 @@ class Continued:
         return self.profile.at(time)
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """The same at steps, whose times are `time`."""
+        """Return the same at steps, whose times are `time`."""
         return self.profile.at(time)
 
     def stretched(self, factor: float) -> Continued:
-        """The same profile, slower by a factor, from the same first time on."""
+        """Return the same profile, slower by a factor, from the same first time on."""
         return Continued(self.profile.stretched(factor))
 
     @property

@@ -36,10 +36,10 @@ class Times(Protocol):
         """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
 
     def from_zero(self) -> Times:
-        """The same times, counted from the first."""
+        """Return the same times, counted from the first."""
 
     def stretched(self, factor: float) -> Times:
-        """The times of the same motion made slower by a factor, from the same first time on."""
+        """Return the times of the same motion made slower by a factor, from the same first time on."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class UniformTimes:
         return self
 
     def stretched(self, factor: float) -> UniformTimes:
-        """A longer duration at the same rate."""
+        """Return a longer duration at the same rate."""
         return UniformTimes(stretch(self.duration, 0.0, factor), self.rate)
 
 
@@ -133,7 +133,7 @@ class RecordedTimes:
         return self.time[start:stop]
 
     def from_zero(self) -> RecordedTimes:
-        """The same times, counted from the first."""
+        """Return the same times, counted from the first."""
         return RecordedTimes(self.time - self.time[0], self.notes)
 
     def stretched(self, factor: float) -> RecordedTimes:
@@ -188,11 +188,11 @@ class ResampledTimes:
         return time
 
     def from_zero(self) -> UniformTimes:
-        """The same times, counted from the first."""
+        """Return the same times, counted from the first."""
         return self._elapsed
 
     def stretched(self, factor: float) -> ResampledTimes:
-        """A longer span at the same rate."""
+        """Return a longer span at the same rate."""
         return ResampledTimes(self.first, stretch(self.last, self.first, factor), self.rate)
 
 

@@ -114,7 +114,7 @@ class Trajectory:
                 )
 
     def _nothing(self, signal: Signal) -> Constant:
-        """The profile of a signal that is chosen for no joint."""
+        """Return the profile of a signal that is chosen for no joint."""
         return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
@@ -136,7 +136,7 @@ class Trajectory:
         name: str = "samples",
         **commanded: ArrayLike | None,
     ) -> Trajectory:
-        """A trajectory through samples; derivatives that are given are used at the samples as they are.
+        """Return a trajectory through samples, with given derivatives as they are.
 
         Those that are not come from splines: degree 7 (C6) for q, degree 5 (C4) for the stiffness and the
         wrench. Between the samples `at` evaluates these splines; where all derivatives are given and follow
@@ -185,14 +185,14 @@ class Trajectory:
         return self.position.components
 
     def chosen(self, key: str) -> BoolArray:
-        """The joints for which a signal is chosen, by its key; (joints,)."""
+        """Return the joints for which a signal is chosen, by its key; (joints,)."""
         if key not in self.commanded:
             return np.zeros(self.joints, dtype=bool)
         chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
         return chosen
 
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
-        """The same with a constant as a further signal, NaN for joints that do not take it."""
+        """Return the same with a constant as a further signal, NaN for joints that do not take it."""
         same = copy(self)
         constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
         same.commanded = {**self.commanded, signal.key: constant}
@@ -216,12 +216,12 @@ class Trajectory:
         return last - first
 
     def block(self, start: int, stop: int) -> Motion:
-        """The steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the steps start..stop-1; like a slice, it ends where the steps end."""
         time = self.times.block(start, stop)
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
-        """The smooth functions at any times of the span, (samples,) or ().
+        """Return the smooth functions at any times of the span, (samples,) or ().
 
         Given derivatives count where all are given and follow from one another.
         """
@@ -264,7 +264,7 @@ class Trajectory:
         return tuple(name for name in UNCERTAIN if estimated and (name in estimated or name not in given))
 
     def stretched(self, factor: float) -> Trajectory:
-        """All profiles slower by a factor; steps at a uniform rate keep their rate."""
+        """Return all profiles slower by a factor; steps at a uniform rate keep their rate."""
         return self.changed(lambda _, profile: profile.stretched(factor), self.times.stretched(factor))
 
     def changed(self, change: Callable[[Signal, Profile], Profile], times: Times) -> Trajectory:
@@ -284,7 +284,7 @@ class Trajectory:
         )
 
     def sampled(self, times: Times) -> Trajectory:
-        """The same functions at other steps, from its first time on and not beyond its last."""
+        """Return the same functions at other steps, from its first time on and not beyond its last."""
         same = copy(self)
         same.times = times
         same.position = Continued(self.position)
@@ -293,7 +293,7 @@ class Trajectory:
         return same
 
     def from_zero(self) -> Trajectory:
-        """The same from time zero on, for what needs times between the steps as exact as can be."""
+        """Return the same from time zero on, for what needs times between the steps as exact as can be."""
         same = copy(self)
         same.times = self.times.from_zero()
         return same

@@ -25,7 +25,7 @@ class Cubic(SpringLaw):
         return (self.k, 0.0, self.k_c)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """The closed pair of twins, on the branch of equations (28)-(31)."""
+        """Return the closed pair of twins, on the branch of equations (28)-(31)."""
         return CubicTwins(self) if other == self else None
 
     def torque(self, phi: FloatArray) -> FloatArray:
@@ -50,7 +50,7 @@ class Cubic(SpringLaw):
         return squared * (self.k / 2 + self.k_c / 4 * squared)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """The real root of the cubic, by its hyperbolic form (no cancellation at any size of torque)."""
+        """Return the real root of the cubic, by its hyperbolic form, which has no cancellation."""
         scale = np.sqrt(self.k / (3 * self.k_c))
         deflection: FloatArray = 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
         return deflection

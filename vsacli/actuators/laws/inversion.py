@@ -12,7 +12,7 @@ from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 def hermite(
     x: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray, end: FloatArray
 ) -> FloatArray:
-    """The cubic over x from 0 to 1 with values and slopes at both ends; arrays of one shape."""
+    """Return the cubic over x from 0 to 1 with values and slopes at both ends; arrays of one shape."""
     rise = high - low
     return low + x * (start + x * (3 * rise - 2 * start - end + x * (start + end - 2 * rise)))
 
@@ -67,7 +67,7 @@ def inverse(
 def _halley_step(
     law: SpringLaw, torque: FloatArray, phi: FloatArray
 ) -> tuple[FloatArray, FloatArray, SpringState]:
-    """The deflection after a step, and the error of the torque and the state of the spring before it.
+    """Return the deflection after a step, and the error of the torque and the state of the spring before it.
 
     Halley's correction of the Newton step is kept between one half and two.
     """
@@ -79,7 +79,7 @@ def _halley_step(
 
 
 def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
-    """Whether a step from such an error of the torque leaves rounding only."""
+    """Return whether a step from such an error of the torque leaves rounding only."""
     converges: BoolArray = np.abs(error) <= HALLEY_RTOL * np.abs(torque)
     return converges
 
@@ -132,7 +132,7 @@ class FirstGuess:
         self._nodes = torque, nodes, in_single(compliance)
 
     def __call__(self, torque: FloatArray) -> FloatArray:
-        """The deflection under torques within those of the nodes."""
+        """Return the deflection under torques within those of the nodes."""
         cell = np.searchsorted(self._nodes[0][1:-1], torque, side="right")
         low, start, first = look_up(self._nodes, cell)
         high, end, last = look_up(self._nodes, cell + 1)

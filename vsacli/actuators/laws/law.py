@@ -37,11 +37,11 @@ class SpringState(NamedTuple):
     eta: FloatArray
 
     def take(self, members: IndexArray) -> SpringState:
-        """The state of some of the springs, which are on the last axis."""
+        """Return the state of some of the springs, which are on the last axis."""
         return SpringState(*(values[..., members] for values in self))
 
     def after(self, step: FloatArray) -> SpringState:
-        """The state after a short step of the deflection, by Taylor's formula with the derivatives known."""
+        """Return the state after a short step of the deflection, by Taylor's formula."""
         return SpringState(
             self.tau + step * self.sigma + self.linearization_error(step),
             self.sigma + step * (self.zeta + step / 2 * self.eta),
@@ -79,7 +79,10 @@ class PairSolution(NamedTuple):
     def unbounded(
         cls, lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray, *, lower_critical: bool
     ) -> PairSolution:
-        """A solution without upper end; the lower end is a critical point, or where a tendon goes slack."""
+        """Return a solution without upper end.
+
+        The lower end is a critical point, or where a tendon goes slack.
+        """
         return cls(
             lower=lower,
             upper=np.full_like(lower, np.inf),
@@ -96,7 +99,7 @@ class PairSolution(NamedTuple):
         return np.stack((self.phi_1, self.phi_2))
 
     def exchanged(self) -> PairSolution:
-        """The same with the two sides exchanged."""
+        """Return the same with the two sides exchanged."""
         return self._replace(phi_1=self.phi_2, phi_2=self.phi_1)
 
 
@@ -127,7 +130,7 @@ def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> 
 
 
 def alike(number: float, other: float) -> bool:
-    """Whether two numbers of springs are one, also where it is a symbol, known when a program runs."""
+    """Return whether two numbers of springs are one, also where it is a symbol, known when a program runs."""
     return number is other or number == other
 
 
@@ -186,11 +189,11 @@ class SpringLaw(ABC):
         return None
 
     def as_second(self) -> SpringLaw:
-        """The law as it acts on side 2, where a tendon pulls the other way."""
+        """Return the law as it acts on side 2, where a tendon pulls the other way."""
         return self
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:  # noqa: ARG002
-        """The pair of this law (side 1) with another (side 2), if (14) has a closed solution for them."""
+        """Return the pair of this law (side 1) with another (side 2) if (14) has a closed solution."""
         return None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
@@ -279,7 +282,7 @@ class SpringRows:
 
 
 def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
-    """Each distinct law, with the springs that obey it."""
+    """Yield each distinct law, with the springs that obey it."""
     distinct: list[SpringLaw] = []
     for law in laws:
         if law not in distinct:

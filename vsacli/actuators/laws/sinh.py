@@ -20,7 +20,7 @@ class Sinh(SpringLaw):
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """The closed pair of two springs of the same a."""
+        """Return the closed pair of two springs of the same a."""
         return SinhPair(self, other) if isinstance(other, Sinh) and alike(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:

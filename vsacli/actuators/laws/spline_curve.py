@@ -49,7 +49,10 @@ class SplineCurve:
         return tuple(side * size if order % 2 else size for order, size in enumerate(sizes, first))
 
     def _piece(self, phi: FloatArray) -> IndexArray:
-        """The polynomial that holds; at an edge rounding may choose its neighbour, which is as good there."""
+        """Return the polynomial of the interval.
+
+        At an edge rounding may choose its neighbour, which is as good there.
+        """
         (low, high), (below, above) = self.domain, self.pieces
         position = phi * (above / high)
         if below:
@@ -70,7 +73,7 @@ class SplineCurve:
 
 
 def _with_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
-    """A polynomial and its derivatives up to an order, by Horner's scheme repeated on the quotients."""
+    """Return a polynomial and its derivatives up to an order, by repeated Horner schemes."""
     *lower, highest = coefficients
     values = [highest]
     for coefficient in reversed(lower):
@@ -92,7 +95,7 @@ def spline_knots(low: float, high: float, pieces: int, degree: int) -> FloatArra
 
 
 def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate) -> SplineCurve:
-    """The curve of a spline with such knots, weights and degree."""
+    """Return the curve of a spline with such knots, weights and degree."""
     origins, coefficients = _half(knots, weights, degree, integrate)
     above = origins.size
     if knots[0] < 0:
@@ -116,7 +119,7 @@ def _half(
 
 
 def _above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
-    """The spline from its knot at zero to the last; the other knots there enclose nothing."""
+    """Return the spline from its knot at zero to the last; the other knots there enclose nothing."""
     from scipy.interpolate import PPoly
 
     whole = PPoly.from_spline((knots, weights, degree))
@@ -125,7 +128,7 @@ def _above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
 
 
 def times_deflection(curve: PPoly) -> PPoly:
-    """The product phi curve(phi); each piece has its own origin."""
+    """Return the product phi curve(phi); each piece has its own origin."""
     from scipy.interpolate import PPoly
 
     coefficients = np.zeros((curve.c.shape[0] + 1, curve.c.shape[1]))

@@ -50,7 +50,7 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
 
 
 def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:
-    """The energy of a spring with the slope phi g(phi)."""
+    """Return the energy of a spring with the slope phi g(phi)."""
 
     def energy(spline: PPoly) -> PPoly:
         stiffness = times_deflection(spline).antiderivative()
@@ -193,7 +193,7 @@ def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
 
 
 def worst_misfit(table: Table, misfit: FloatArray) -> tuple[int, float]:
-    """The row that a curve misses most, and by which share of the range."""
+    """Return the row that a curve misses most, and by which share of the range."""
     row = int(np.abs(misfit).argmax())
     return row, float(abs(misfit[row]) / np.ptp(table.values[:, 1]))
 

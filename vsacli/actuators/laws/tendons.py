@@ -33,7 +33,7 @@ class Tendon(SpringLaw):
         return True
 
     def as_second(self) -> SpringLaw:
-        """The tendon pulling downward."""
+        """Return the tendon pulling downward."""
         return Mirrored(law=self)
 
 
@@ -65,11 +65,11 @@ class Mirrored(SpringLaw):
         return terms and tuple(term if power % 2 else -term for power, term in enumerate(terms, 1))
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """The hardening is odd in the deflection."""
+        """Return the hardening, odd in the deflection."""
         return -self.law.hardening(-phi)
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """The torque is odd in the deflection, its derivatives are even and odd in turn."""
+        """Return the torque, odd in the deflection, and its derivatives, even and odd in turn."""
         values = self.law.derivatives(-phi, order)
         return tuple(value if each % 2 else -value for each, value in enumerate(values))
 
@@ -79,32 +79,32 @@ class Mirrored(SpringLaw):
         return -phi, _mirrored_state(state)
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """The energy is even in the deflection."""
+        """Return the energy, even in the deflection."""
         energy, state = self.law.energy_and_state(-phi)
         return energy, _mirrored_state(state)
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """The torque is odd in the deflection."""
+        """Return the torque, odd in the deflection."""
         return -self.law.torque(-phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """The stiffness is even in the deflection."""
+        """Return the stiffness, even in the deflection."""
         return self.law.stiffness(-phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """The slope is odd in the deflection."""
+        """Return the slope, odd in the deflection."""
         return -self.law.slope(-phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """The curvature is even in the deflection."""
+        """Return the curvature, even in the deflection."""
         return self.law.curvature(-phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """The energy is even in the deflection."""
+        """Return the energy, even in the deflection."""
         return self.law.energy(-phi)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """The deflection is odd in the torque."""
+        """Return the deflection, odd in the torque."""
         return -self.law.deflection(-torque)
 
 
@@ -130,7 +130,7 @@ class Quadratic(Tendon):
         return (0.0, self.k)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """The closed pair of twins."""
+        """Return the closed pair of twins."""
         return QuadraticTwins(self) if other == self.as_second() else None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
@@ -185,7 +185,7 @@ class Exponential(Tendon):
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """The closed pair with a tendon of the same a on side 2."""
+        """Return the closed pair with a tendon of the same a on side 2."""
         second = other.law if isinstance(other, Mirrored) else None
         if isinstance(second, Exponential) and alike(second.a, self.a):
             return ExponentialPair(self, second)

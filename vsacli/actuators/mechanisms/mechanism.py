@@ -227,7 +227,7 @@ class Mechanism(ABC):
 
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """The corridor of the stiffness at an elastic torque, and where the demanded one is reached.
+        """Return the corridor of the stiffness at an elastic torque, and where the demanded one is reached.
 
         Args:
             tau_e: elastic torque, (samples,), N m (N).
@@ -249,9 +249,9 @@ class Mechanism(ABC):
         return np.zeros(tau_e.shape, dtype=bool)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """The potential and its derivatives at deflections and settings, arrays of one shape."""
+        """Return the potential and its derivatives at deflections and settings, arrays of one shape."""
         raise NotImplementedError(f"{type(self).__name__} depends on more than phi and the setting")
 
     def state(self, coordinates: FloatArray) -> MechanismState:
-        """The springs at coordinates (..., 3): phi, theta_2 and q."""
+        """Return the springs at coordinates (..., 3): phi, theta_2 and q."""
         return DeflectionState(self.partials(coordinates[..., 0], coordinates[..., 1]))

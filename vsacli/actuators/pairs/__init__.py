@@ -10,7 +10,7 @@ __all__ = ["make_pair"]
 
 
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
-    """The solver of (14) for two laws, side 1 preloaded upward: closed where one exists, else iterated."""
+    """Return the solver of (14) for two laws, side 1 preloaded upward: closed if possible, else iterated."""
     return first.closed_pair(second) or _iterated(first, second)
 
 

@@ -24,7 +24,7 @@ class PairState(NamedTuple):
 
     @classmethod
     def of(cls, values: Values) -> PairState:
-        """The state whose `values` these are."""
+        """Return the state whose `values` these are."""
         phi_1, phi_2, *springs = values
         count = len(SpringState._fields)
         return cls(phi_1, phi_2, SpringState(*springs[:count]), SpringState(*springs[count:]))
@@ -50,7 +50,7 @@ class PairState(NamedTuple):
         return self.one.zeta / self.one.sigma, self.two.zeta / self.two.sigma
 
     def regularized(self) -> PairState:
-        """The same with a stiffness of one where both springs are slack, so that it can be divided by."""
+        """Return the balance with a stiffness of one where both springs are slack, to divide by it."""
         slack = self.stiffness == 0
         one, two = (
             spring._replace(sigma=np.where(slack, 1.0, spring.sigma)) for spring in (self.one, self.two)
@@ -62,7 +62,7 @@ class PairState(NamedTuple):
         return self.one.linearization_error(step_1) + self.two.linearization_error(step_2)
 
     def after(self, step_1: FloatArray, step_2: FloatArray) -> PairState:
-        """The state after short steps of the deflections, see `SpringState.after`."""
+        """Return the state after short steps of the deflections, see `SpringState.after`."""
         return PairState(
             self.phi_1 + step_1, self.phi_2 + step_2, self.one.after(step_1), self.two.after(step_2)
         )
@@ -133,7 +133,7 @@ class Balance:
         return self.first.hardening(phi_1) - self.second.hardening(phi_2)
 
     def is_slack(self, tau_e: FloatArray, t: FloatArray) -> BoolArray:
-        """Whether a side that only pulls carries no torque."""
+        """Return whether a side that only pulls carries no torque."""
         if not (self.first.pulls_only or self.second.pulls_only):
             return np.zeros_like(tau_e, dtype=bool)
         slack: BoolArray = (self.first.pulls_only & (tau_e / 2 + t == 0)) | (
@@ -178,7 +178,7 @@ class StiffnessParabola(NamedTuple):
 
     @classmethod
     def of(cls, state: PairState) -> StiffnessParabola:
-        """The parabola that touches the stiffness at deflections."""
+        """Return the parabola that touches the stiffness at deflections."""
         one, two = state.one, state.two
         stiffness = state.stiffness
         share_1, share_2 = two.sigma / stiffness, one.sigma / stiffness
@@ -222,7 +222,7 @@ def first_guess(inner: PairState, inner_stiffness: FloatArray, demand: FloatArra
 
 
 def _quadratic_part(excess: FloatArray) -> FloatArray:
-    """The part of an excess of stiffness, relative to the inner end, that the curvature there makes.
+    """Return the part of an excess of stiffness, relative to the inner end, that the curvature there makes.
 
     If the stiffness grows as cosh it is acosh(1 + excess)^2/2; many springs stiffen still faster.
     """
@@ -256,6 +256,6 @@ def third_order_step(
 def _correction(
     state: PairState, step_1: FloatArray, step_2: FloatArray, spread: FloatArray, stiffness: FloatArray
 ) -> FloatArray:
-    """A further step of both sides alike, from the tangent to the curve of equal tau_e."""
+    """Return a further step of both sides alike, from the tangent to the curve of equal tau_e."""
     most = MAX_CORRECTION_SHARE * np.abs(spread)
     return np.minimum(np.maximum(-state.linearization_error(step_1, step_2) / stiffness, -most), most)

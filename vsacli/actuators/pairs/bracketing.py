@@ -26,7 +26,7 @@ ROOT_ATOL = 1e-300
 def bracketed_root(
     function: Function, low: FloatArray, high: FloatArray, constants: Values = ()
 ) -> FloatArray:
-    """A root between `low` and `high`, where the function has opposite signs, to rounding.
+    """Return a root between `low` and `high`, where the function has opposite signs, to rounding.
 
     If they have one sign, the end at which the function is nearer to zero.
 

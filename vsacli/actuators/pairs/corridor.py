@@ -55,7 +55,7 @@ class Corridor(NamedTuple):
 
 
 def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
-    """The piece of the joint stiffness that reaches the largest preload, for each tau_e (samples,)."""
+    """Return the piece of the joint stiffness that reaches the largest preload, for each tau_e (samples,)."""
     least, largest = balance.preload_range(tau_e)
     carried = least <= largest
     exists, fold = outermost_fold(balance, folds, tau_e)

@@ -67,7 +67,7 @@ class Hardening:
             yield slice(first, last + 1)
 
     def rises(self, piece: slice) -> bool:
-        """Whether the hardening increases over a piece."""
+        """Return whether the hardening increases over a piece."""
         rho = self.rho[piece]
         return bool(rho[-1] >= rho[0])
 
@@ -91,7 +91,7 @@ class CriticalCurve(NamedTuple):
         return (self.tau_1 - self.tau_2) / 2
 
     def take(self, chosen: slice | IndexArray) -> CriticalCurve:
-        """Some of the points."""
+        """Return some of the points."""
         return CriticalCurve(*(values[chosen] for values in self))
 
 
@@ -149,7 +149,7 @@ def _peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
 
 
 def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCurve]:
-    """All critical points of positive torques, in curves over which tau_e increases."""
+    """Yield all critical points of positive torques, in curves over which tau_e increases."""
     one, two = sample_hardening(first), sample_hardening(second)
     curves = list(_curves(one, two)) if one and two else []
     if not curves:
@@ -166,7 +166,7 @@ def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCur
 
 
 def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
-    """The curve of each pair of pieces of hardening, if there are two points on it.
+    """Yield the curve of each pair of pieces of hardening, if there are two points on it.
 
     Along it both torques increase together if the pieces both rise or both fall, else one against the other.
     Where a hardening has become constant but for rounding, so has the torque of the other spring.
@@ -222,7 +222,7 @@ def _cusp_brackets(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
 
 
 def _cusps(first: SpringLaw, second: SpringLaw, low: CriticalCurve, high: CriticalCurve) -> CriticalCurve:
-    """The points between two others of a curve at which tau_e is stationary along it."""
+    """Return the points between two others of a curve at which tau_e is stationary along it."""
 
     def partner(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         return _equal_hardening(second, first.hardening(phi), low, high)
@@ -245,7 +245,7 @@ def _hardening_slope(law: SpringLaw, phi: FloatArray) -> FloatArray:
 def _split(
     curve: CriticalCurve, low: IndexArray, high: IndexArray, cusps: CriticalCurve
 ) -> Iterator[CriticalCurve]:
-    """A curve split at its cusps, each between two of its points, in parts of ascending tau_e."""
+    """Yield a curve split at its cusps, each between two of its points, in parts of ascending tau_e."""
     starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
         around = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
@@ -273,7 +273,7 @@ def along_critical_curve(state: PairState, rho: Sides) -> tuple[FloatArray, Floa
 
 
 def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
-    """A Newton step on tau_1 + tau_2 = tau_e, rho_1 = rho_2, which keeps the first to the third order.
+    """Return a Newton step on tau_1 + tau_2 = tau_e, rho_1 = rho_2, which keeps the first to the third order.
 
     Both sides alike make up for the bend of the springs, since next to a cusp the critical curve does not.
     """
@@ -287,7 +287,7 @@ def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
 
 
 def is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
-    """Whether a step is so short that the next would be rounding."""
+    """Return whether a step is so short that the next would be rounding."""
     (rho_1, rho_2), (size_1, size_2) = rho, map(np.abs, steps)
     hardened = np.abs(rho_1) * size_1 + np.abs(rho_2) * size_2
     short: BoolArray = (hardened <= SHORT_RTOL) & (
@@ -297,7 +297,7 @@ def is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
 
 
 def bracketed_in_box(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:
-    """The critical point within a box by bracketing the preload torque.
+    """Return the critical point within a box by bracketing the preload torque.
 
     Args:
         balance: the springs.

@@ -69,7 +69,7 @@ class _Cells(NamedTuple):
 
 
 def outermost_folds(balance: Balance) -> FoldPoints:
-    """The points of a pair over all elastic torques, so dense that each feature of the springs has some."""
+    """Return points of a pair over all elastic torques, dense enough for each feature of the springs."""
     return _row(balance, _cut(balance, _cells(balance.first, balance.second)))
 
 
@@ -111,7 +111,7 @@ def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:
 
 
 def _cut(balance: Balance, cells: _Cells) -> _Cells:
-    """The same with corners on the edges, also where another curve takes over between two points of one."""
+    """Return the curve with corners on the edges, also where another curve takes over between points."""
     corners = cells.corners.copy()
     low, high = np.sort(cells.corners, axis=1).swapaxes(0, 1)
     for side, edges in enumerate((cells.edges[:-1], cells.edges[1:])):
@@ -122,7 +122,7 @@ def _cut(balance: Balance, cells: _Cells) -> _Cells:
 
 
 def _row(balance: Balance, cells: _Cells) -> FoldPoints:
-    """The corners in a row, one where there is no fold, and one at infinity."""
+    """Return the corners in a row, one where there is no fold, and one at infinity."""
     ends = np.append(np.flatnonzero(np.diff(cells.curve)) + 1, cells.curve.size)
     rows: list[FloatArray] = []
     last: list[int] = []
@@ -197,7 +197,7 @@ class FoldMap(NamedTuple):
     cusp: FloatArray
 
     def guess(self, tau_e: FloatArray) -> tuple[BoolArray, Values, Values]:
-        """Whether there is a fold, phi_1 and phi_2 near it, and those at the nodes before and after."""
+        """Return whether there is a fold, phi_1 and phi_2 near it, and those of adjacent nodes."""
         cell = np.searchsorted(self.tau_e[1:-1], tau_e, side="right")
         low, low_1, low_2, *of_low = look_up(self, cell)
         high, high_1, high_2, *of_high = look_up(self, cell + 1)
@@ -222,19 +222,19 @@ class _Cubic(NamedTuple):
 
     @classmethod
     def of(cls, share: FloatArray, width: FloatArray, cusps: Values) -> _Cubic:
-        """The place of a share of a cell; one end at most is a cusp."""
+        """Return the place of a share of a cell; one end at most is a cusp."""
         first, last = cusps
         root = np.sqrt(np.where(last > 0, 1 - share, share))
         x = np.where(first > 0, root, np.where(last > 0, 1 - root, share))
         return cls(x, width * (1 + last), width * (1 + first))
 
     def __call__(self, low: FloatArray, high: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
-        """The cubic from values and slopes at both ends."""
+        """Return the cubic from values and slopes at both ends."""
         return hermite(self.x, low, high, first * self.start, last * self.end)
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
-    """The outermost folds of a pair over all elastic torques."""
+    """Return the outermost folds of a pair over all elastic torques."""
     balance = Balance(first, second)
     with np.errstate(all="ignore"):  # vertical at a cusp, unknown without stiffness, and far away
         points = outermost_folds(balance)
@@ -267,7 +267,7 @@ def _farthest(points: FoldPoints) -> IndexArray:
 
 
 def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
-    """Whether cubics from points to others are close to the critical points between them."""
+    """Return whether cubics from points to others are close to the critical points between them."""
     between = start + np.rint(TESTED[:, None] * (end - start)).astype(int)
     cubic = _cubic(points, start, end, between)
     error, hardened, size = (np.zeros(between.shape) for _ in range(3))
@@ -314,13 +314,13 @@ def _cubic(points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArra
 
 
 def _limited(slope: FloatArray, chord: FloatArray) -> FloatArray:
-    """A slope with which a cubic of that chord is monotone."""
+    """Return a slope with which a cubic of that chord is monotone."""
     ratio = np.nan_to_num(slope / chord, nan=1.0, posinf=MONOTONE_SLOPE_RATIO, neginf=0.0)
     return chord * np.clip(ratio, 0, MONOTONE_SLOPE_RATIO)
 
 
 def _map(points: FoldPoints, kept: IndexArray) -> FoldMap:
-    """The map with nodes at some of the points."""
+    """Return the map with nodes at some of the points."""
     joined = np.flatnonzero(points.last[kept[1:]] == points.last[kept[:-1]])
     before, after = np.full((2, 2, kept.size), np.nan)
     for side in range(2):
@@ -342,7 +342,7 @@ NEWTON_RTOL = OfRounding(1e-9, power=0.5)
 
 
 def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple[BoolArray, PairState]:
-    """Whether there is a fold, and the state of the springs at the outermost; arrays (samples,)."""
+    """Return whether there is a fold, and the state of the springs at the outermost; arrays (samples,)."""
     if np.isnan(folds.phi_1).all():
         nowhere = np.full_like(tau_e, np.nan)
         spring = SpringState(*[nowhere] * len(SpringState._fields))
@@ -374,7 +374,7 @@ def _within(box: Values, near: Values, steps: Values) -> Values:
 def _safeguarded(
     balance: Balance, tau_e: FloatArray, guess_1: FloatArray, guess_2: FloatArray, *box: FloatArray
 ) -> Values:
-    """The fold between two corners of a box: by Newton's method from a guess, else by bracketing."""
+    """Return the fold between two corners of a box: by Newton's method from a guess, else by bracketing."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi_1, phi_2, _), (tau_e, low_1, high_1, low_2, high_2) = state, constants

@@ -55,12 +55,12 @@ class PairElasticity(Elasticity):
         self._springs = SpringRows(pairs)
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Each spring pulls the link and its motor alike."""
+        """Return each spring pulls the link and its motor alike."""
         tau = self._springs.torque(phi)
         return Torques(tau[..., 0] + tau[..., 1], tau)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """The sum over both springs."""
+        """Return the sum over both springs."""
         energy = self._springs.energy(phi)
         return energy[..., 0] + energy[..., 1]
 
@@ -77,12 +77,12 @@ class CoupledPairs(PairElasticity):
         self._coupling = coupling
 
     def torques(self, phi: FloatArray) -> Torques:
-        """The link does not feel the coupling, the motors feel it in opposite directions."""
+        """Return the link does not feel the coupling, the motors feel it in opposite directions."""
         tau_e, tau_spring = super().torques(phi)
         return Torques(tau_e, tau_spring + self._between(phi))
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """The sum over all three springs."""
+        """Return the sum over all three springs."""
         return super().energy(phi) + self._coupling.energy(phi[..., 0] - phi[..., 1])
 
     def state(self, phi: FloatArray) -> ElasticState:

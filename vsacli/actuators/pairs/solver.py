@@ -81,13 +81,13 @@ class _Box(NamedTuple):
 
     @classmethod
     def of(cls, piece: Corridor, demand: FloatArray) -> _Box:
-        """The box of a piece."""
+        """Return the box of a piece."""
         inner, outer = piece.inner, piece.outer
         near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
         return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
 
     def holds(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
-        """Whether deflections lie between the ends, and not at the outer one."""
+        """Return whether deflections lie between the ends, and not at the outer one."""
         inside: BoolArray = (
             (self.inner_1 <= phi_1)
             & (phi_1 < self.outer_1)
@@ -109,12 +109,15 @@ class _Box(NamedTuple):
 
 
 def _not_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> FloatArray:
-    """The target, or half way to the inner end if it lies on the other side of that."""
+    """Return the target, or half way to the inner end if it lies on the other side of that."""
     return np.where(target < inner, (start + inner) / 2, target)
 
 
 def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
-    """The target, not beyond the outer end; half way to it if the demand is far from the stiffness there."""
+    """Return the target, not beyond the outer end.
+
+    Half way to it if the demand is far from the stiffness there.
+    """
     return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
 
 
@@ -145,7 +148,7 @@ def _deflections(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: F
 
 
 def _step(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
-    """A step of third order on (14) that stays in the box, and whether it was the last."""
+    """Return a step of third order on (14) that stays in the box, and whether it was the last."""
     phi_1, phi_2, _ = state
     tau_e, demand, sign, inner_stiffness, *bounds = constants
     step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
@@ -169,7 +172,7 @@ def _confined_step(
     target_2: FloatArray,
     *bounds: FloatArray,
 ) -> Values:
-    """A step moved back into the box; none, and no error, where the demand is that of the inner end."""
+    """Return a step moved back into the box; zero, without error, if the demand is that of the inner end."""
     confined_1, confined_2 = _Box(*bounds).confined(phi_1, phi_2, target_1, target_2)
     met = demand == inner_stiffness
     return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)

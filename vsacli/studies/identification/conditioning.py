@@ -54,7 +54,7 @@ class Filter(NamedTuple):
         return cls(bandwidth, sections, max(1, int(rate / (2 * bandwidth))), int(RINGING * rate / bandwidth))
 
     def smoothed(self, columns: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
-        """The same columns, (samples, ...), filtered; those with NaN are NaN.
+        """Return the same columns, (samples, ...), filtered; those with NaN are NaN.
 
         Args:
             columns: as they are; beyond either end they are taken to go on.
@@ -102,7 +102,7 @@ class Signals(NamedTuple):
     noise: FloatArray | None = None
 
     def during(self, samples: slice) -> Signals:
-        """Some consecutive samples of it."""
+        """Return some consecutive samples of it."""
         over_time = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
         return self._replace(**{name: getattr(self, name)[samples] for name in over_time})
 
@@ -145,7 +145,7 @@ def _by_name(motion: Sequence[FloatArray]) -> dict[str, FloatArray]:
 
 
 def disturbed(signals: Signals) -> Signals:
-    """The same with noise of positions once more, as large as that of the record was, the same each time."""
+    """Return the recording with its noise of positions added once more, equal in every call."""
     assert signals.noise is not None, "of a record"
     samples = len(signals.time) + 2 * signals.filter.reach
     drawn = np.random.default_rng(0).normal(size=(samples, *signals.noise.shape)) * signals.noise
@@ -195,7 +195,7 @@ SAMPLES = 8.0
 
 
 def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
-    """A bandwidth for the equations of a record, Hz.
+    """Return a bandwidth for the equations of a record, Hz.
 
     Args:
         time: (samples,), s, in equal steps.
@@ -216,7 +216,7 @@ def bounds(time: FloatArray) -> tuple[float, float]:
 
 
 def _motion_and_noise_ends(time: FloatArray, column: FloatArray) -> tuple[float, float]:
-    """The highest frequency that can be told from noise, and that up to which accelerations can."""
+    """Return the highest frequency that can be told from noise, and that up to which accelerations can."""
     window = np.hanning(len(time))
     power = np.abs(np.fft.rfft(window * (column - np.mean(column)))) ** 2
     frequency = np.fft.rfftfreq(len(time), float(time[1] - time[0]))

@@ -72,7 +72,7 @@ class System(NamedTuple):
 
     @classmethod
     def of(cls, records: Sequence[Equations]) -> System:
-        """The system of some records."""
+        """Return the system of some records."""
         measured, predicted, slopes, group, sample = (
             np.concatenate([getattr(each, name) for each in records]) for name in Equations._fields[:5]
         )
@@ -182,7 +182,7 @@ class Combination(NamedTuple):
     standard_error: float
 
     def words(self, names: Sequence[str]) -> str:
-        """The sum in names of the unknowns, e.g. `k + 0.0123 k_c`."""
+        """Return the sum in names of the unknowns, e.g. `k + 0.0123 k_c`."""
         return in_words(self.terms, names)
 
 
@@ -253,7 +253,7 @@ def least_squares(
 
 
 def solved(system: System, tolerance: float = SEPARABLE) -> Step:
-    """The solution alone.
+    """Return the solution alone.
 
     Raises:
         InputError: there are no more equations than unknowns.
@@ -274,7 +274,7 @@ def solved(system: System, tolerance: float = SEPARABLE) -> Step:
 
 
 def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
-    """The solution with the noise of each group known, (groups,)."""
+    """Return the solution with the noise of each group known, (groups,)."""
     from scipy.linalg import solve_triangular
 
     weight = 1 / noise[system.group]

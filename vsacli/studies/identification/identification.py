@@ -139,7 +139,7 @@ def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tupl
 def _read(
     robot: Robot, recordings: str | Path | Sequence[str | Path], columns: str | Path | None
 ) -> list[Record]:
-    """The records.
+    """Return the records.
 
     Raises:
         InputError: there is none, one cannot be used, or two are the same.
@@ -154,7 +154,7 @@ def _read(
 
 
 def _conditioned(record: Record, bandwidth: float | None) -> Signals:
-    """A record ready for equations.
+    """Return a record ready for equations.
 
     Raises:
         InputError: the bandwidth that was asked for does not fit the record.
@@ -271,7 +271,7 @@ NOTHING = 1e-9
 
 
 def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
-    """The numbers that a file with what was found holds: of friction that it has none of, what was found."""
+    """Yield the parameters in the order of the file, friction that it lacks included."""
     known = set(map(str, parameters(robot)))
     for number in (number for system in systems for number in system.numbers):
         if number.told and not number.sum and (number.path in known or number.changed):
@@ -279,7 +279,7 @@ def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
 
 
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
-    """The text of the robot's file with the numbers found, their standard errors behind them as comments.
+    """Return the text of the robot's file with the identified parameters and their standard errors.
 
     Everything else, comments too, stays as the user wrote it; paths lead to the same files. Friction that the
     file has none of is put in where it was found.

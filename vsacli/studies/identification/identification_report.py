@@ -221,7 +221,7 @@ class Identification(Published):
         )
 
     def as_text(self) -> ReportText:
-        """The report in its parts, of its tables the numbers; the other is `residual_rows`."""
+        """Return the report in its parts, of its tables the numbers; the other is `residual_rows`."""
         lines = [self._summary(), *map(_used_line, self.records), *self._sentences()]
         return ReportText(self._headline(), self._numbers(), lines)
 
@@ -250,7 +250,7 @@ class Identification(Published):
         return rows
 
     def residual_rows(self) -> list[tuple[str, ...]]:
-        """A table of what the equations of each motor, or link, leave; its header first."""
+        """Return a table of what the equations of each motor, or link, leave; its header first."""
         rows: list[tuple[str, ...]] = [
             ("rms, filtered", "torque", "residual", "noise", "held out", "condition")
         ]
@@ -289,7 +289,7 @@ def _used_line(record: RecordReport) -> str:
 
 
 def significant(value: float, error: float) -> str:
-    """A value with as many digits as its standard error leaves meaning, two of that."""
+    """Return a value with as many digits as its standard error leaves meaning, two of that."""
     if not (math.isfinite(error) and error > 0):
         return f"{value:.6g}"
     decimals = 1 - math.floor(math.log10(error))

@@ -127,7 +127,7 @@ def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatA
 
 
 def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:
-    """A combination of unknowns, e.g. `k + 0.0123 k_c`.
+    """Return a combination of unknowns, e.g. `k + 0.0123 k_c`.
 
     Args:
         terms: index of each unknown with its factor; that of the first one is 1.

@@ -101,7 +101,7 @@ class LinkSystem(SystemOfEquations):
         )
 
     def admissible(self, number: int, value: float) -> float | None:
-        """The value itself unless it is of the robot file, and that may hold no more than zero."""
+        """Return the value itself unless it is of the robot file, and that may hold no more than zero."""
         if number < len(self.base.kept):
             return value
         return admissible(self._robot, self.names[number], value)

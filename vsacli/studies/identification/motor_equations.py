@@ -39,7 +39,7 @@ OF_MOTORS = ("motor", "coupled_inertia")
 
 
 def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, ...]:
-    """The numbers of one joint's motors and springs that are to be found.
+    """Return the numbers of one joint's motors and springs that are to be found.
 
     Terms of a spring that are zero, and the width of friction that is sharp, stay so unless a pattern names
     them: what is not there is not looked for.
@@ -57,7 +57,7 @@ def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, .
 
 
 def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
-    """A robot whose motors behind springs have friction of zero where they had none, so that it can be found.
+    """Return a robot with zero friction at motors behind springs that had none, to identify it.
 
     Args:
         robot: the robot.
@@ -72,7 +72,7 @@ def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
 
 
 def admissible(robot: Robot, path: str, value: float) -> float | None:
-    """A value that the robot file may hold at a path: this one, or else zero; None if it may hold neither."""
+    """Return this value if the robot file admits it at a path, else zero; None if it admits neither."""
     for each in (value, 0.0):
         try:
             robot.replace(path, each)
@@ -200,7 +200,7 @@ class MotorSystem(SystemOfEquations):
         )
 
     def admissible(self, number: int, value: float) -> float | None:
-        """The value itself if the robot file may hold it, else zero if it may hold that; None if neither."""
+        """Return the value if the robot file admits it, else zero; None if it admits neither."""
         return admissible(self._robot, self.names[number], value)
 
     def without(self, fixed: dict[int, float]) -> MotorSystem:

@@ -116,7 +116,7 @@ def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> It
 
 
 def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
-    """Whether a motor follows a joint, and much better than its own, about which its variance is given."""
+    """Return whether a motor follows another joint much better than its own, given its variance."""
     about = float(np.var(theta - q))
     return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
 
@@ -214,13 +214,13 @@ class Delay(NamedTuple):
     standard_error: float
 
     def matters(self, rate: float) -> bool:
-        """Whether it is to be taken out of a record with so many samples a second."""
+        """Return whether it is to be taken out of a record with so many samples a second."""
         size = abs(self.seconds)
         return size > CERTAIN_DELAY * self.standard_error and size * rate > WORTH_IT
 
 
 def delay(found: Sequence[Solution], signals: Signals) -> Delay:
-    """The one with which the equations of all motors hold best.
+    """Return the one with which the equations of all motors hold best.
 
     Torques that are late by d are tau(t - d) = tau(t) - d tau'(t): a further unknown of each system.
     """
@@ -235,7 +235,7 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
 
 
 def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tuple[float, float]]:
-    """The delay with its standard error, unless nothing of the system was recorded."""
+    """Yield the delay with its standard error, unless nothing of the system was recorded."""
     equations, of_rates = found.equations(signals), found.equations(rates)
     if len(equations.measured):
         of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
@@ -245,7 +245,7 @@ def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tup
 
 
 def without_delay(signals: Signals, late: float) -> Signals:
-    """The same with torques that are earlier by so many seconds."""
+    """Return the same with torques that are earlier by so many seconds."""
     from scipy.interpolate import make_interp_spline
 
     torques = signals.tau_motor.copy()
@@ -269,7 +269,7 @@ class Factor(NamedTuple):
     error: float
 
     def differs(self, other: float) -> bool:
-        """Whether it is certainly another one."""
+        """Return whether it is certainly another one."""
         return abs(self.value - other) > CERTAIN_FACTOR * self.error
 
     def __str__(self) -> str:
@@ -330,7 +330,7 @@ def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None
 
 
 def _fitted_factor(found: Solution, by_gain: FloatArray, told: IndexArray) -> Factor | None:
-    """The factor with which numbers come nearest to the file, if they then agree with it."""
+    """Return the factor with which numbers come nearest to the file, if they then agree with it."""
     of_file = found.system.before[list(found.free)][told]
     difference = found.fit.values[told] - of_file
     covariance = found.fit.covariance[np.ix_(told, told)]
@@ -380,7 +380,7 @@ def _of_link(equations: Equations, group: str, base: FloatArray, own: Sequence[i
 
 
 def _rotor_differs(robot: Robot, found: Solution) -> bool:
-    """Whether numbers of motors are certainly others than in the file, not those of springs alone."""
+    """Return whether numbers of motors are certainly others than in the file, not those of springs alone."""
     known = {str(each): each for each in parameters(robot)}
     return any(
         abs(found.fit.values[at] - found.system.before[number])

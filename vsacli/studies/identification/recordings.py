@@ -94,7 +94,7 @@ class _RobotColumns(NamedTuple):
 def recorded_columns(
     robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
 ) -> tuple[list[Column], tuple[str, ...], Source]:
-    """The columns that are needed, the names of the others, and the file as it was read.
+    """Return the columns that are needed, the names of the others, and the file as it was read.
 
     Args:
         robot: that was recorded.
@@ -165,7 +165,7 @@ def doubts(columns: Sequence[Column]) -> Iterator[str]:
 
 
 def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """A sentence for each clause that columns share."""
+    """Yield a sentence for each clause that columns share."""
     shared: dict[str, list[str]] = {}
     for name, clause in clauses:
         shared.setdefault(clause, []).append(name)

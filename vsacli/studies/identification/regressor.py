@@ -47,7 +47,7 @@ def parameters_of(link: Link) -> FloatArray:
 
 
 def link_of(parameters: FloatArray) -> Link:
-    """The link of standard inertial parameters, (10,), with a mass.
+    """Return the link of standard inertial parameters, (10,), with a mass.
 
     Raises:
         InvalidRecordError: its inertia about its centre of mass has a negative eigenvalue, or its mass is not
@@ -76,7 +76,7 @@ def steiner(point: FloatArray) -> FloatArray:
 
 
 def tensor(parameters: FloatArray) -> FloatArray:
-    """The inertia about the frame's origin, (3, 3)."""
+    """Return the inertia about the frame's origin, (3, 3)."""
     xx, yy, zz, xy, xz, yz = parameters[4:]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 

@@ -176,7 +176,7 @@ def _law(
     records: Sequence[Signals],
     terms: Sequence[FloatArray],
 ) -> Cause:
-    """A cause by functions of the motion, (terms, samples) of each record, filtered like all columns."""
+    """Return a cause by functions of the motion, (terms, samples) a recording, filtered like all columns."""
     columns = []
     for there, signals, of_record in zip(own, records, terms, strict=True):
         rows = np.zeros((len(there), len(of_record)))

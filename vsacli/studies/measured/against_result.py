@@ -108,7 +108,7 @@ def _variables(result: StoredResult) -> dict[str, Variable]:
 
 
 def _told(recorded: Recording) -> tuple[Recording, list[str]]:
-    """The recording with one column for each signal, the most direct one, and the names of the others."""
+    """Return the recording with the most direct column of each signal, and the names of the others."""
     best = {signal.column for signal in preferred(recorded.signals).values()}
     kept = tuple(signal for signal in recorded.signals if signal.column in best)
     behind = [signal.column for signal in recorded.signals if signal.column not in best]
@@ -184,7 +184,7 @@ def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
 def _agreements(
     result: StoredResult, recorded: Recording, pairings: Sequence[Pairing], alignment: Alignment
 ) -> tuple[Agreement, ...]:
-    """Every column against what was computed."""
+    """Return every column against what was computed."""
     groups = [_group(signal) for signal in recorded.signals]
     places = exchanged_places(pairings, groups, alignment.begins_at)
     followed = [

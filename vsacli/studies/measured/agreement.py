@@ -126,7 +126,7 @@ class Comparison(Published):
         return str(self.as_text())
 
     def as_text(self) -> ReportText:
-        """The report in its parts."""
+        """Return the report in its parts."""
         return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
 
     def _headline(self) -> str:

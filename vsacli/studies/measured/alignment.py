@@ -74,7 +74,7 @@ class Alignment(NamedTuple):
 
 @np.errstate(all="ignore")  # numbers too large, or too few, explain nothing
 def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | None:
-    """The shift that explains most; None if there is none that explains half, or nothing moves.
+    """Return the shift that explains most; None if there is none that explains half, or nothing moves.
 
     Args:
         pairings: all columns that may say something.
@@ -219,7 +219,7 @@ def _explained(pairing: Pairing, shift: float) -> float:
 
 
 def _agreed(pairings: Sequence[Pairing], shift: float) -> tuple[float, float]:
-    """The shift on which the columns agree that follow their computed signals, and its standard error."""
+    """Return the time shift on which the columns agree, and its standard error."""
     error = math.nan
     for _ in range(ROUNDS):
         fits = [fit_line(pairing, shift) for pairing in pairings]

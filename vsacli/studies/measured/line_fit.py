@@ -115,7 +115,7 @@ class _Step(NamedTuple):
 
 @np.errstate(all="ignore")  # columns without any relation end in infinite errors, which say so
 def fit_line(pairing: Pairing, shift: float) -> LineFit:
-    """The line, with a lag if the samples determine one, else without.
+    """Return the line, with a lag if the samples determine one, else without.
 
     Args:
         pairing: computed and measured values.
@@ -128,7 +128,7 @@ def fit_line(pairing: Pairing, shift: float) -> LineFit:
 
 
 def _lagging(pairing: Pairing, shift: float, start: _Step) -> tuple[_Step, float] | None:
-    """The line and its lag; None if they are not determined."""
+    """Return the line and its lag; None if they are not determined."""
     bound, lag, step = LAG_SHARE * pairing.duration, 0.0, start
     change, error = math.inf, 0.0
     for _ in range(MOST_STEPS):
@@ -224,7 +224,7 @@ def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
 
 
 def _line(pairing: Pairing, step: _Step, lag: float) -> LineFit:
-    """A line with its standard errors, to which interpolation adds; a lag of NaN is unknown."""
+    """Return a line with its standard errors, to which interpolation adds; a lag of NaN is unknown."""
     offset, gain = (float(each) for each in step.unknowns[:2])
     error, deviations = pairing.computed.error, np.sqrt(np.diag(step.covariance))
     return LineFit(

@@ -103,7 +103,7 @@ class Recording(NamedTuple):
 def read_recording(
     path: str | Path, places: Mapping[str, Place], owner: str, mapping: ColumnMapping
 ) -> Recording:
-    """The columns of a CSV file that have a place, NaN in cells that are empty.
+    """Return the columns of a CSV file that have a place, NaN in cells that are empty.
 
     Args:
         path: a file with a column `time`, and columns named as `vsacli export` names them, or by the number
@@ -157,7 +157,7 @@ def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Var
 
 
 def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) -> dict[str, Place]:
-    """Every name that a column may have of variables of joints.
+    """Return every name that a column may have of variables of joints.
 
     Args:
         jointed: what the recording is of.

@@ -76,7 +76,7 @@ class Pairing(NamedTuple):
     measured: FloatArray
 
     def thinned(self) -> Pairing:
-        """The same with at most `ENOUGH` samples."""
+        """Return the same with at most `ENOUGH` samples."""
         every = -(-len(self.time) // ENOUGH)
         return self._replace(time=self.time[::every], measured=self.measured[::every])
 
@@ -101,7 +101,7 @@ def noise(values: FloatArray) -> float:
 
 
 def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Computed:
-    """A stored signal as a function of the time from its beginning.
+    """Return a stored signal as a function of the time from its beginning.
 
     Args:
         time: of the samples, (samples,), s, the first at 0.

@@ -179,7 +179,7 @@ def _slip_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
 
 
 def _offset(agreement: Agreement) -> Iterator[str]:
-    """A sentence on an offset that is known and large."""
+    """Yield a sentence on an offset that is known and large."""
     turns = agreement.offset / (2 * math.pi)
     whole = abs(turns) > 1 / 2 and abs(turns - round(turns)) < NEAR
     if agreement.unit == "rad" and whole and abs(agreement.gain - 1) < NEAR:

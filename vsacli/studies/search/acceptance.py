@@ -77,7 +77,7 @@ class Acceptance:
     between: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
 
     def stricter(self, share: float) -> Acceptance:
-        """The same with a margin that is larger by a share, which is kept clear of limits as well."""
+        """Return the same with a margin that is larger by a share, which is kept clear of limits as well."""
         return replace(self, near_singular=(1 + share) * self.near_singular, reserve=share)
 
     def confirmed(
@@ -98,7 +98,7 @@ class Acceptance:
         return found, False
 
     def refused(self, passage: Passage) -> BoolArray:
-        """The steps that are not accepted, (samples, joints)."""
+        """Return the steps that are not accepted, (samples, joints)."""
         block = compute_block(self.robot, passage.motion, self.near_singular)
         values = map(block.of_joint, range(len(self.robot.joints)))
         by_joint = [
@@ -110,7 +110,7 @@ class Acceptance:
         return refused
 
     def passages(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[Passage]:
-        """All steps of a task, or of one that was stretched by a factor, in blocks; then what is between."""
+        """Yield the samples of a task, or of a slower one, in blocks; then the instants between samples."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
             yield Passage.of(trajectory, start, start + samples, factor)
@@ -125,14 +125,14 @@ class Acceptance:
         return joined(passages)
 
     def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
-        """The joints with any step that is not accepted, (joints,)."""
+        """Return the joints with any step that is not accepted, (joints,)."""
         joints: BoolArray = np.any(
             [np.any(self.refused(passage), axis=0) for passage in self.passages(trajectory, factor)], axis=0
         )
         return joints
 
     def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
-        """The steps of one joint that are not accepted, (samples,)."""
+        """Return the steps of one joint that are not accepted, (samples,)."""
         return self._refused(joint, self._driven(joint, load), load.instants)
 
     def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
@@ -153,24 +153,24 @@ class Acceptance:
         return tuple(reason for reason in found if reason)
 
     def trouble(self, joint: Joint, load: Load) -> Trouble | None:
-        """The worst that is wrong with the steps of one joint; None if they are accepted."""
+        """Return the worst that is wrong with the steps of one joint; None if they are accepted."""
         values = self._driven(joint, load)
         of_limits = self._limit_trouble(joint, values, load.time, load.instants)
         return self._reach_trouble(joint, load, values) or of_limits
 
     def reason(self, joint: Joint, load: Load) -> str:
-        """The same in a clause; empty if they are accepted."""
+        """Return the same in a clause; empty if they are accepted."""
         trouble = self.trouble(joint, load)
         return "" if trouble is None else trouble.clause(joint)
 
     def path_reason(self, joint: Joint, load: Load) -> str:
-        """A limit that the motion itself exceeds, whatever the stiffness, in a clause; empty if none."""
+        """Return a limit that the motion itself exceeds at any stiffness, as a clause; "" without one."""
         values = {"q": load.command.q, "dq": load.command.dq}
         trouble = self._limit_trouble(joint, values, load.time, load.instants)
         return "" if trouble is None else trouble.clause(joint)
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
-        """All variables of one joint, by name."""
+        """Return all variables of one joint, by name."""
         return {**load.command.arrays(), **drive(joint, load.command, self.near_singular).arrays()}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
@@ -182,7 +182,7 @@ class Acceptance:
         return refused | self._near_limits(joint, values)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
-        """The steps at which a reserve is used up, (samples,)."""
+        """Return the steps at which a reserve is used up, (samples,)."""
         near = np.zeros(len(values["flags"]), dtype=np.bool_)
         for check in limit_checks(joint) if self.reserve else ():
             if check.variable in RESERVED:
@@ -206,7 +206,7 @@ class Acceptance:
     def _limit_trouble(
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
     ) -> Trouble | None:
-        """The first kind of limit that is exceeded, of those on variables that were computed."""
+        """Return the first kind of limit that is exceeded, of those on variables that were computed."""
         flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint16))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
@@ -254,7 +254,7 @@ class Trouble(NamedTuple):
 
 
 def stiffness_text(joint: Joint, value: float) -> str:
-    """A stiffness with its unit."""
+    """Return a stiffness with its unit."""
     return f"{value:.6g} {units.STIFFNESS.unit(joint.type)}"
 
 
@@ -276,7 +276,7 @@ class RecordedLimits:
     trajectory: Trajectory
 
     def flags(self, robot: Robot, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
-        """The flags of steps of one joint, (samples,), with the limits that are certainly exceeded.
+        """Return the flags of steps of one joint, (samples,), with the limits that are certainly exceeded.
 
         Args:
             robot: the robot.
@@ -366,7 +366,7 @@ class Range(NamedTuple):
 
 
 def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
-    """The admissible stiffness at every instant of a load, whose low end always exists.
+    """Return the admissible stiffness at every instant of a load, whose low end always exists.
 
     Raises:
         ImpossibleError: no stiffness mends the joint, or it has none to choose.
@@ -381,7 +381,7 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
 
 
 def variable_stiffness_actuator(joint: Joint) -> Actuator:
-    """The actuator of a joint, if its stiffness can be chosen.
+    """Return the actuator of a joint, if its stiffness can be chosen.
 
     Raises:
         ImpossibleError: the actuator has none to choose.
@@ -412,7 +412,7 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
 
 
 def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray) -> FloatArray:
-    """The stiffness from `lower` on up to which both deflections keep their limit.
+    """Return the stiffness from `lower` on up to which both deflections keep their limit.
 
     With the stiffness grows the preload: phi_1 increases and phi_2 decreases, or the other way round. What is
     halved is a share x of 0 to 1, which maps to all stiffness above `lower`.

@@ -25,7 +25,7 @@ NOTHING: Mapping[int, FloatArray] = MappingProxyType({})
 
 
 def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]) -> Trajectory:
-    """A trajectory with constants added to the stiffness of joints, given by index, N m/rad (N/m).
+    """Return a trajectory with constants added to the stiffness of joints, given by index, N m/rad (N/m).
 
     A stiffness that is a formula stays one, and one to which nothing is added stays as it is.
     """
@@ -41,12 +41,12 @@ def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]
 
 
 def with_stiffness(trajectory: Trajectory, stiffness: Profile) -> Trajectory:
-    """A trajectory at the same times with another profile of the stiffness."""
+    """Return a trajectory at the same times with another profile of the stiffness."""
     return _fixed(trajectory, trajectory.times, stiffness)
 
 
 def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
-    """A trajectory with the same steps, whose stiffness is recorded at them.
+    """Return a trajectory with the same steps, whose stiffness is recorded at them.
 
     Args:
         trajectory: what is to be changed.
@@ -59,7 +59,7 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
 
 
 def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
-    """The same, but what was recorded at other times than the steps is known at the steps alone.
+    """Return the same, but what was recorded at other times than the steps is known at the steps alone.
 
     All that a file records has the same times, and the stiffness has those of the steps.
     """
@@ -74,7 +74,7 @@ def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
 def _at_steps(
     signal: Signal, profile: Profile, trajectory: Trajectory, changes: Mapping[int, FloatArray] = NOTHING
 ) -> HermiteSpline:
-    """A signal known at the steps with all its derivatives, and something added to some components."""
+    """Return a signal known at the steps with all its derivatives, and something added to some components."""
     elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
     rows = profile.samples(0, trajectory.samples, elapsed).copy()
     for component, change in changes.items():
@@ -136,7 +136,7 @@ def _has_derivatives(trajectory: Trajectory) -> bool:
 
 
 def _resampled(profile: Profile, start: float) -> Profile:
-    """A record whose fit counts; what was changed at the samples is fitted through its values."""
+    """Return a record whose fit counts; what was changed at the samples is fitted through its values."""
     if isinstance(profile, HermiteSpline):
         samples = Samples(
             signal=profile.signal,
@@ -176,7 +176,7 @@ def reads_back(trajectory: Trajectory) -> bool:
 
 
 def _divided(trajectory: Trajectory, parts: int) -> Trajectory:
-    """The same functions at more steps; formulas stay formulas."""
+    """Return the same functions at more steps; formulas stay formulas."""
     steps = trajectory.times.block(0, trajectory.samples)
     shares = np.arange(parts) / parts
     time = np.append((steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel(), steps[-1])

@@ -53,7 +53,7 @@ TIME, TIMING, BOTH = "time", "timing", "both"
 
 
 def varied_joints(robot: Robot, vary: str) -> list[int]:
-    """The joints whose stiffness varies, by index.
+    """Return the joints whose stiffness varies, by index.
 
     Raises:
         InputError: there are none, although it is to vary, or there is no such word.
@@ -74,7 +74,7 @@ def check_timing_varies(vary: str) -> None:
 
 
 def chosen_joints(robot: Robot) -> list[int]:
-    """The joints whose stiffness is commanded, by index.
+    """Return the joints whose stiffness is commanded, by index.
 
     Raises:
         InputError: there are none.
@@ -123,7 +123,7 @@ def cheapest_stiffness(
     seed: int,
     progress: Callable[[int], object],
 ) -> Optimum:
-    """The best stiffness of all joints, confirmed by a run."""
+    """Return the best stiffness of all joints, confirmed by a run."""
     search = CheapestStiffness(Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress)
     try:
         found = search.confirmed(what)
@@ -256,7 +256,7 @@ class CheapestStiffness:
         return type(self._criterion)(repeating=self._periods[index] > 0)
 
     def _of_joint(self, acceptance: Acceptance, index: int, load: Load) -> tuple[Profile | None, Profile]:
-        """The best constant, if there is one, and the best profile over a period of a joint."""
+        """Return the best constant, if there is one, and the best profile over a period of a joint."""
         steps = np.arange(len(load.time))[load.steps][: self._steps_of_period(index) + 1]
         period = replace(load.at(slice(steps[-1] + 1)), steps=steps)
         search = StiffnessSearch(
@@ -276,7 +276,7 @@ class CheapestStiffness:
         return (self._trajectory.samples - 1) // max(self._periods[index], 1)
 
     def _with_stiffness(self, profiles: Mapping[int, Profile]) -> Trajectory:
-        """The motion with other stiffness profiles of joints, by index."""
+        """Return the motion with other stiffness profiles of joints, by index."""
         commanded = self._trajectory.block(0, self._trajectory.samples).commanded
         changes = {}
         for index, profile in profiles.items():

@@ -61,11 +61,11 @@ class CombinedSearch:
         return any(len(choices) > 1 for choices in self._choices)
 
     def smallest(self) -> Combination | None:
-        """The combination of least cost; confirmed on all steps if its changes are constants."""
+        """Return the combination of least cost; confirmed on all steps if its changes are constants."""
         return self._confirmed(self._smallest)
 
     def fastest(self) -> Combination | None:
-        """The combination with the least slow-down, likewise."""
+        """Return the combination with the least slow-down, likewise."""
         return self._confirmed(self._fastest)
 
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
@@ -93,7 +93,7 @@ class CombinedSearch:
         return None
 
     def _fastest(self) -> Combination | None:
-        """The combination with the least factor that scan and bisection find."""
+        """Return the combination with the least factor that scan and bisection find."""
         refused = self._factors.first - 1
         for number in self._scanned():
             if self._at(number) is not None:
@@ -107,7 +107,7 @@ class CombinedSearch:
         return self._at(number)
 
     def _smallest(self) -> Combination | None:
-        """The combination of least cost, by the scan, and then steps to either side that get shorter."""
+        """Return the combination of least cost: a scan, then ever shorter steps to either side."""
         best, at, cost = None, 0, self.task.cost
         for number in self._scanned():
             if best is not None and cost.of_factor(self._factors.factor(number)) >= best.size:
@@ -165,7 +165,7 @@ class CombinedSearch:
         return found
 
     def _refusing(self, passage: Passage) -> BoolArray:
-        """The steps at which no stiffness of some joint is accepted, (samples,)."""
+        """Return the steps at which no stiffness of some joint is accepted, (samples,)."""
         acceptance = self.task.acceptance
         impossible = np.zeros(len(passage.factor), dtype=np.bool_)
         loads = passage.loads(acceptance.robot)
@@ -183,7 +183,7 @@ class CombinedSearch:
         return impossible
 
     def _mended(self, factor: float) -> Combination:
-        """The changes of all joints at a factor.
+        """Return the changes of all joints at a factor.
 
         Raises:
             ImpossibleError: some joint is refused whatever its stiffness.
@@ -229,7 +229,7 @@ class CombinedSearch:
         return self.form(acceptance, joint, load)
 
     def _scanned(self) -> Iterator[int]:
-        """The numbers of the factors at which a search looks."""
+        """Yield the numbers of the factors at which a search looks."""
         number = self._factors.first
         while number < self._factors.last:
             yield number
@@ -262,7 +262,7 @@ def _choices(robot: Robot, watched: Passage | None) -> list[dict[str, Joint]]:
 
 
 def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
-    """Whether two preloads of an actuator are mirror images, as those of like springs are."""
+    """Return whether two preloads of an actuator are mirror images, as those of like springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
     asked = command.tau_e, command.commanded["stiffness"], command.q

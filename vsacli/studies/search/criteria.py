@@ -104,7 +104,7 @@ class Criterion:
         return ()
 
     def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """The cost itself, in its unit."""
+        """Return the cost itself, in its unit."""
         raise NotImplementedError
 
     def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
@@ -116,7 +116,7 @@ class Criterion:
         raise NotImplementedError
 
     def together(self, costs: Sequence[float]) -> float:
-        """The cost of all joints; of shares of what they cost as commanded if these are relative."""
+        """Return the cost of all joints; of shares of what they cost as commanded if these are relative."""
         return math.fsum(costs)
 
 
@@ -148,7 +148,7 @@ class Torque(Criterion):
     relative = True
 
     def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The mean square."""
+        """Return the mean square."""
         torques = _of_motors(joint, driven.tau_motor)
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
@@ -187,7 +187,7 @@ class Copper(Criterion):
             )
 
     def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The power of all windings."""
+        """Return the power of all windings."""
         return [sum(_of_motors(joint, driven.copper_loss)) / scale.cost]
 
     def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
@@ -212,14 +212,14 @@ class Energy(Criterion):
     smoothings = SMOOTHINGS
 
     def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The positive part of each power, smoothed; and the energy in the springs."""
+        """Return the positive part of each power, smoothed; and the energy in the springs."""
         width = scale.smoothing * scale.cost / scale.duration
         powers = _of_motors(joint, driven.motor_power)
         positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
         return [sum(positive) / scale.cost, driven.elastic_energy / scale.cost]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """An integral, and the value at the start."""
+        """Return an integral, and the value at the start."""
         loaded = np.zeros_like(time)
         loaded[0] = 0.0 if self.repeating else 1.0
         return np.stack([trapezoidal(time), loaded])
@@ -251,7 +251,7 @@ class Peak(Criterion):
     levels = 1
 
     def integrands(self, _joint: Joint, _driven: Drive, level: Values | None, _scale: Scale) -> Sequence[Any]:
-        """The level."""
+        """Return the level."""
         return [level]
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -263,7 +263,7 @@ class Peak(Criterion):
         return 2 * joint.actuator.motor_count
 
     def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The torques, either way."""
+        """Return the torques, either way."""
         torques = _of_motors(joint, driven.tau_motor)
         return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
 
@@ -276,7 +276,7 @@ class Peak(Criterion):
         return float(np.abs(_torques_of(result, index)).max())
 
     def together(self, costs: Sequence[float]) -> float:
-        """The largest."""
+        """Return the largest."""
         return max(costs)
 
 
@@ -310,7 +310,7 @@ def limit_bounds(
 
 
 def _finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
-    """The ends of a range that bound anything, each with the direction that is outside."""
+    """Yield the ends of a range that bound anything, each with the direction that is outside."""
     yield from ((sign, end) for sign, end in zip((-1.0, 1.0), check.range, strict=True) if np.isfinite(end))
 
 
@@ -330,12 +330,12 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
 
 
 def _of_motors(joint: Joint, variable: Any) -> list[Any]:
-    """The rows of the motors there are."""
+    """Return the rows of the motors there are."""
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
 
 
 def _torques_of(result: Result, index: int) -> FloatArray:
-    """The torques of the motors of a joint at the steps of a run, (motors, steps)."""
+    """Return the torques of the motors of a joint at the steps of a run, (motors, steps)."""
     torques: FloatArray = result.tau_motor[:, index].T[: result.robot.joints[index].actuator.motor_count]
     return torques
 
@@ -364,7 +364,7 @@ class Costed(Protocol):
 
 
 def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Sequence[Costed]) -> Minimum:
-    """A minimum of a cost that is smoothed less and less, far from it at least.
+    """Return a minimum of a cost that is smoothed less and less, far from it at least.
 
     From far it is found as well as comparing starts takes; a warm search goes on from the best of these.
 

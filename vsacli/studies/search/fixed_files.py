@@ -30,7 +30,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
-    """The YAML file, which is always written, and the CSV file and the robot file beside it."""
+    """Return the YAML file, which is always written, and the CSV file and the robot file beside it."""
     document = Path(path)
     return document, document.with_suffix(".csv"), document.with_name(f"{document.stem}-robot.yaml")
 
@@ -78,7 +78,7 @@ def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
 
 
 def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
-    """The keys and values that declare each signal; those without a formula are recorded in the table."""
+    """Return the keys and values that declare each signal; signals without formula refer to the table."""
     profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
     chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
     profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
@@ -158,7 +158,7 @@ def _write_table(
 
 
 def _stamps(trajectory: Trajectory) -> FloatArray:
-    """The times of what is recorded: those of the steps, or of a record if these differ."""
+    """Return the times of what is recorded: those of the steps, or of a record if these differ."""
     for estimate in trajectory.estimates.values():
         if estimate.resampled:
             return estimate.record.start + estimate.record.time
@@ -170,7 +170,7 @@ def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
 
 
 def robot_text(remedy: Remedy, folder: Path) -> str:
-    """The text of the robot's file with the preloads of a remedy, as it stands in a folder.
+    """Return the text of the robot's file with the preloads of a remedy, as it stands in a folder.
 
     Everything else, comments too, stays as the user wrote it; paths lead to the same files.
 

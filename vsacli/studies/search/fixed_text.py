@@ -34,7 +34,7 @@ SAME_TRANSITION = 1e-9
 
 
 def formula(profile: Profile) -> dict[str, Any] | None:
-    """The keys and values that declare a profile over its span; None if there is no formula of it."""
+    """Return the keys and values that declare a profile over its span; None if there is no formula of it."""
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
             return {"type": "polynomial", "degree": degree, "start": _values(start), "end": _values(end)}
@@ -62,7 +62,7 @@ def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
 
 
 def _sequence(chain: Chain) -> dict[str, Any] | None:
-    """A motion in parts, each with its duration; where it stands still it dwells."""
+    """Return a motion in parts, each with its duration; where it stands still it dwells."""
     parts = []
     for part in chain.parts:
         declared = formula(part)
@@ -75,7 +75,7 @@ def _sequence(chain: Chain) -> dict[str, Any] | None:
 
 
 def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
-    """The changes between levels that last equally long; None if the parts are something else."""
+    """Return the changes between levels that last equally long; None if the parts are something else."""
     changes = [part for part in chain.parts if isinstance(part, RestToRest)]
     held = [part for part in chain.parts if isinstance(part, Constant)]
     durations = list(map(_length, changes))
@@ -183,7 +183,7 @@ def _duration(root: Node, asked: Trajectory, fixed: Trajectory) -> Values:
 
 
 def _changed(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
-    """The numbers of formulas that differ, by path, where the text has them."""
+    """Return the numbers of formulas that differ, by path, where the text has them."""
     values: Values = {}
     for signal, profile in _profiles(asked).items():
         old, new = formula(profile), formula(_profiles(fixed)[signal])
@@ -226,7 +226,7 @@ def _differences(
 
 
 def _same(old: Any, new: Any) -> bool:
-    """Whether numbers, or lists of them, are the same but for rounding."""
+    """Return whether numbers, or lists of them, are the same but for rounding."""
     if isinstance(old, list):
         return all(map(_same, old, new))
     if isinstance(old, float | int) and isinstance(new, float | int):
@@ -246,7 +246,7 @@ def _rounded(value: float) -> float | int:
 
 
 def _with(text: str, values: Values, table: TableFile | None) -> str:
-    """The text with values; with a table the stiffness is recorded, and the times come from there."""
+    """Return the text with values; with a table the stiffness is recorded, and the times come from there."""
     if table is None:
         return edited(text, values)
     values = {key: value for key, value in values.items() if not key.startswith("stiffness.")}
@@ -260,7 +260,7 @@ def _with(text: str, values: Values, table: TableFile | None) -> str:
 
 
 def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool:
-    """Whether a text in place of the user's file says what the fix is, at every step."""
+    """Return whether a text in place of the user's file says what the fix is, at every step."""
     with temporary_folder() as place:
         copies = {path: str(place / "text")}
         (place / "text").write_text(text, encoding="utf-8")

@@ -40,7 +40,7 @@ FASTER_SHARE = 0.8
 
 
 def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
-    """The smallest changes after which every step has the margin and keeps every limit.
+    """Return the smallest changes after which every step has the margin and keeps every limit.
 
     Slow-down, constant change and other profile of the stiffness each by itself; and remedies to choose from,
     which combine them, also with another preload. Each is recomputed over all steps and confirmed.
@@ -159,7 +159,7 @@ def _attempt(find: Callable[[], Remedy]) -> Remedy | NotPossible:
 
 
 def _part(found: Remedy | NotPossible | None, name: str, failed: Sequence[Remedy]) -> Any:
-    """The only change of a remedy, or why there is none."""
+    """Return the only change of a remedy, or why there is none."""
     if not isinstance(found, Remedy):
         return found
     if any(found is each for each in failed):
@@ -181,7 +181,7 @@ def _combined(task: Task) -> Iterator[Remedy]:
 
 
 def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:
-    """The remedies with profiles that slow down as these combinations do, as far as there are any."""
+    """Yield the remedies with profiles that slow down as these combinations do, as far as there are any."""
     factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
     for found in factors.values():
         with suppress(ImpossibleError):
@@ -210,7 +210,7 @@ def _worth_choosing(
 
 
 def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
-    """Whether a remedy has nothing for it that another one, no more complicated, has not."""
+    """Return whether a remedy has nothing for it that another one, no more complicated, has not."""
     if beside.kinds < remedy.kinds:
         return beside.size <= SIMPLER_SHARE * remedy.size
     faster = remedy.longer < FASTER_SHARE * beside.longer
@@ -235,7 +235,7 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
 
 
 def is_fixable(task: Task, index: int) -> bool:
-    """Whether a joint by itself can be fixed, by any kind of change."""
+    """Return whether a joint by itself can be fixed, by any kind of change."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
     if CombinedSearch(alone, preloads=True).smallest() is not None:
@@ -249,7 +249,7 @@ def is_fixable(task: Task, index: int) -> bool:
 
 
 def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> tuple[str, bool]:
-    """The cause, and whether it is sure that something helps."""
+    """Return the cause, and whether it is sure that something helps."""
     at_rest = acceptance.trouble(joint, resting)
     if at_rest is None:
         worst = acceptance.trouble(joint, moving)
@@ -269,7 +269,7 @@ def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> 
 
 
 def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
-    """The limit that the softest constant stiffness exceeds, in a clause; empty if there is none."""
+    """Return the limit that the softest constant stiffness exceeds, in a clause; empty if there is none."""
     try:
         offset = lowest_offset(acceptance, joint, resting)
     except ImpossibleError:

@@ -64,7 +64,7 @@ class Point(Protocol):
         """What the bounds change by with a step, to first order, (bounds,)."""
 
     def pull(self, weights: FloatArray) -> FloatArray:
-        """The sum of the gradients of the bounds, each times its weight, (unknowns,)."""
+        """Return the sum of the gradients of the bounds, each times its weight, (unknowns,)."""
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """Hessian of the cost plus multipliers times bounds, plus their gradients' squares times stiffening.
@@ -80,7 +80,7 @@ class Problem(Protocol):
         """Cost and bounds; not finite where they are not defined."""
 
     def at(self, unknowns: FloatArray) -> Point:
-        """The same with derivatives."""
+        """Return the same with derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def minimise(
 
 
 def _stalled(costs: Sequence[float], share: float) -> bool:
-    """Whether the last steps changed hardly anything."""
+    """Return whether the last steps changed hardly anything."""
     recent = costs[-PATIENCE - 1 :]
     return len(recent) > PATIENCE and max(recent) - min(recent) < share * abs(recent[-1])
 
@@ -164,7 +164,7 @@ class _Newton:
         self.factor = _factor(point, multipliers, self._stiffening)
 
     def step(self, barrier: float) -> _Step:
-        """The step of both, whose part for the unknowns the Cholesky factor solves."""
+        """Return the step of both, whose part for the unknowns the Cholesky factor solves."""
         from scipy.linalg import cho_solve
 
         assert self.factor is not None
@@ -176,7 +176,7 @@ class _Newton:
         return _Step(unknowns, multipliers, float(right @ unknowns))
 
     def centred(self, barrier: float) -> bool:
-        """Whether products of bounds and multipliers are near the barrier parameter."""
+        """Return whether products of bounds and multipliers are near the barrier parameter."""
         off = np.abs(self._slack * self._multipliers - barrier)
         return bool(off.max(initial=0.0) <= CENTRED * barrier)
 
@@ -202,7 +202,10 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 def _line_search(
     problem: Problem, point: Point, unknowns: FloatArray, step: _Step, barrier: float
 ) -> float | None:
-    """The share of the step that lowers the barrier function and keeps the bounds; None if none does."""
+    """Return the share of the step that lowers the barrier function and keeps the bounds.
+
+    None if none does.
+    """
     merit = point.cost - barrier * float(np.log(-point.bounds).sum())
     share = _share_to_boundary(-point.bounds, -point.changes(step.unknowns))
     rounding = 1e-14 * max(1.0, abs(merit))
@@ -223,7 +226,7 @@ def _moved(multipliers: FloatArray, step: FloatArray, central: FloatArray) -> Fl
 
 
 def _share_to_boundary(values: FloatArray, step: FloatArray) -> float:
-    """The share of a step after which positive values are positive still."""
+    """Return the share of a step after which positive values are positive still."""
     falling = step < 0
     shares = -TO_BOUNDARY * values[falling] / step[falling]
     return float(min(1.0, shares.min(initial=1.0)))

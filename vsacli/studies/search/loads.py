@@ -32,7 +32,7 @@ class Instants(NamedTuple):
     factor: FloatArray
 
     def at(self, steps: IndexArray | slice) -> Instants:
-        """Some of them."""
+        """Return some of them."""
         return Instants(self.time[steps], self.factor[steps])
 
 
@@ -49,7 +49,7 @@ class Passage(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> Passage:
-        """The steps start..stop-1 of a task, or of one that was stretched by a factor."""
+        """Return the steps start..stop-1 of a task, or of one that was stretched by a factor."""
         motion = trajectory.block(start, stop)
         if factor != 1:
             motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
@@ -74,7 +74,7 @@ class Passage(NamedTuple):
         return Instants(self.motion.time, self.factor)
 
     def slowed(self, factor: float) -> Passage:
-        """The same passed more slowly, at rest if the factor is infinite."""
+        """Return the same passed more slowly, at rest if the factor is infinite."""
         slower = self.motion.mapped(self.motion.time, lambda array, order: array / factor**order)
         return Passage(slower, self.factor * factor)
 
@@ -85,20 +85,20 @@ class Passage(NamedTuple):
         return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
 
     def loads(self, robot: Robot) -> list[Load]:
-        """The load of each joint of a robot."""
+        """Return the load of each joint of a robot."""
         motion = self.motion
         commanded = {**motion.variables(), **elastic_torques(robot, motion)}
         commands = (command_of(index, commanded) for index in range(len(robot.joints)))
         return [Load(motion.time, command, self.instants) for command in commands]
 
     def select(self, steps: IndexArray) -> Passage:
-        """Some of the steps, by index."""
+        """Return some of the steps, by index."""
         motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
         return Passage(motion, self.factor[steps])
 
 
 def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Motion:
-    """The motion at instants, as of `Passage.between`, with the times of the trajectory."""
+    """Return the motion at instants, as of `Passage.between`, with the times of the trajectory."""
     return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
 
 
@@ -114,7 +114,7 @@ def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
 
 
 def joined(passages: Iterable[Passage]) -> Passage:
-    """The steps of several passages, one after the other."""
+    """Return the steps of several passages, one after the other."""
     motions, factors = zip(*passages, strict=True)
     variables = [motion.variables() for motion in motions]
     arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
@@ -147,12 +147,12 @@ class Load:
         return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
 
     def at(self, steps: IndexArray | slice) -> Load:
-        """The load at some of the times."""
+        """Return the load at some of the times."""
         rows = {name: row[steps] for name, row in self.command.arrays().items()}
         return Load(self.time[steps], Command.of(rows), self.instants.at(steps))
 
     def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
-        """The load with something added to the stiffness and, if given, to its rate and second derivative."""
+        """Return the load with an addition to the stiffness and, if given, to its first two derivatives."""
         commanded = dict(self.command.commanded)
         for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
             commanded[name] = commanded[name] + change
@@ -166,7 +166,7 @@ def joint_loads(
     factor: float = 1.0,
     between: FloatArray | None = None,
 ) -> list[Load]:
-    """The loads of some joints, given by index: at every step, and half-way from one to the next.
+    """Return the loads of some joints, given by index: at every step, and half-way from one to the next.
 
     Every second instant, from the first on, is a step, unless there are further instants.
 
@@ -243,12 +243,12 @@ class Ends(NamedTuple):
 
 
 def rests(trajectory: Trajectory) -> bool:
-    """Whether all joints stand still at both ends of a trajectory."""
+    """Return whether all joints stand still at both ends of a trajectory."""
     return not any(_moving_ends(trajectory))
 
 
 def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
-    """Whether any joint moves at the start, and at the end."""
+    """Return whether any joint moves at the start, and at the end."""
     some = np.abs(trajectory.block(0, trajectory.samples).dq)
     first, last = (bool(np.any(row > AT_REST * some.max(axis=0))) for row in some[[0, -1]])
     return first, last

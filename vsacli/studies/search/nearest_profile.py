@@ -79,7 +79,7 @@ class Bounds:
 
 
 def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = None) -> BSpline[np.float64]:
-    """The C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
+    """Return the C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
 
     Its first and second derivative vanish at both ends, so that what it is added to starts and stops as it
     did. A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least
@@ -143,14 +143,14 @@ def _shapes(free: BoolArray) -> FloatArray:
 
 
 def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
-    """The pieces with one of these ascending times in reach."""
+    """Return the pieces with one of these ascending times in reach."""
     next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
     near: BoolArray = next_time <= ends[1:] + reach
     return near
 
 
 def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
-    """The amount of each shape, with as many of the bounds as matter."""
+    """Return the amount of each shape, with as many of the bounds as matter."""
     from scipy.interpolate import BSpline
 
     root = _objective(knots, shapes, smoothing)
@@ -183,7 +183,7 @@ def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> Float
 
 
 def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> FloatArray:
-    """The x of least |root x| with rows x >= low."""
+    """Return the x of least |root x| with rows x >= low."""
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
@@ -201,7 +201,7 @@ def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> Floa
 
 
 def peaks(missed: FloatArray) -> IndexArray:
-    """The worst instant of each stretch at which bounds are missed."""
+    """Return the worst instant of each stretch at which bounds are missed."""
     padded = np.concatenate([[0.0], np.maximum(missed, 0), [0.0]])
     rising, falling = padded[1:-1] > padded[:-2], padded[1:-1] >= padded[2:]
     return np.flatnonzero(rising & falling & (missed > 0))
@@ -231,7 +231,7 @@ class Change:
 
     @classmethod
     def constant(cls, time: FloatArray, value: float) -> Change:
-        """A change that is the same at every instant."""
+        """Return a change that is the same at every instant."""
         rows = np.zeros((3, len(time)))
         rows[0] = value
         return cls(time, rows)
@@ -246,7 +246,7 @@ class Change:
 
 
 def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: float | None) -> Change:
-    """The C2 change of least mean square, smoothed a little, that mends a joint; or the constant, if nearer.
+    """Return the smoothed C2 change of least mean square that fixes a joint; the constant one if nearer.
 
     Where the limits of the motors refuse it, the nearest of some that are smoother and keep further away from
     the ends of the corridor.
@@ -286,7 +286,7 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
 def _change(
     acceptance: Acceptance, joint: Joint, load: Load, margins: float, smoothings: float
 ) -> Change | None:
-    """The nearest change for multiples of margin and smoothing time, or None if no spline does."""
+    """Return the nearest change for multiples of margin and smoothing time, or None if no spline does."""
     near_singular = margins * acceptance.near_singular
     if near_singular >= 1:
         return None

@@ -63,7 +63,7 @@ def optimize(
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Optimum:
-    """The stiffness or the timing with which a motion costs least, or takes least time, within all limits.
+    """Return the stiffness or timing of least cost, or of least time, within all limits.
 
     A stiffness profile is four times continuously differentiable. Its first two derivatives vanish at both
     ends, unless the motion repeats itself: then so does the profile. A timing passes the same path at another
@@ -118,7 +118,7 @@ _Search = TypeVar("_Search", bound=PacedSearch)
 def fastest(
     what: Optimum, trajectory: Trajectory, varied: Sequence[int], seed: int, progress: Callable[[int], object]
 ) -> Optimum:
-    """The fastest pace, and the stiffness of joints that varies, by index, confirmed by runs.
+    """Return the fastest pace, and the stiffness of joints that varies, by index, confirmed by runs.
 
     If no slow-down makes the stiffness as commanded feasible, the search begins from the smallest slow-down
     with other constants.
@@ -156,7 +156,7 @@ def _fastest(
     seed: int,
     progress: Callable[[], None],
 ) -> tuple[float, Pacing, Trajectory]:
-    """The duration of the fastest uniform motion, the fastest pace, and the motion at it."""
+    """Return the duration of the fastest uniform motion, the fastest pace, and the motion at it."""
     search, found, best = _confirmed(
         what, path, ends, lambda rule: TimingSearch(rule, path, ends, varied, seed, progress)
     )
@@ -171,7 +171,7 @@ def cheapest_pace(
     seed: int,
     progress: Callable[[int], object],
 ) -> Optimum:
-    """The pace with which a motion costs least in its duration, confirmed by runs.
+    """Return the pace with which a motion costs least in its duration, confirmed by runs.
 
     Where the stiffness of joints, by index, varies as well, the search begins with that which is best at the
     pace as commanded. If there is none, the search for the fastest motion begins with the smallest slow-down
@@ -222,7 +222,7 @@ def cheapest_pace(
 
 
 def _of_faster(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
-    """A pace along a path that was slowed down by a factor, as one along the path as it was."""
+    """Return a pace along a path that was slowed down by a factor, as one along the path as it was."""
     return pace if factor == 1 else type(pace)(pace.t / factor, factor * pace.c, pace.k)
 
 
@@ -231,7 +231,7 @@ def _ends(what: Optimum, trajectory: Trajectory) -> Ends:
 
 
 def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
-    """The smallest slow-down with which other constants than commanded keep every limit, and these.
+    """Return the smallest slow-down with which other constants than commanded keep every limit, and these.
 
     Raises:
         ImpossibleError: there is none.
@@ -279,7 +279,7 @@ def _confirmed(
 def _retimed(
     what: Optimum, path: Trajectory, found: Pacing, count: int
 ) -> tuple[Trajectory, FloatArray | None]:
-    """The motion at a pace, and when a run of it falls short, if it does.
+    """Return the motion at a pace, and when a run of it falls short, if it does.
 
     At its own rate if its samples say what lies between them; else at a multiple of it.
     """
@@ -298,7 +298,7 @@ def _retimed(
 def _costed(
     rule: Acceptance, motion: PacedMotion, criterion: Criterion, sizes: Sequence[float], varied: Sequence[int]
 ) -> list[PacedJoint]:
-    """The joints with their share in the cost, which is about one for the motion these sizes are of."""
+    """Return the joints with their shares in the cost, about one for the motion that gave the sizes."""
     if criterion.relative:
         share = 1 / len(sizes)
     else:

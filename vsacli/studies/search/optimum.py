@@ -88,7 +88,7 @@ class TimingOptimum(Published):
     bounding: dict[str, dict[str, float]]
 
     def lines(self) -> Iterator[str]:
-        """The durations, and for each joint what holds it back."""
+        """Yield the durations, and for each joint what holds it back."""
         yield f"as commanded {self.before:.4g} s"
         if not math.isnan(self.uniform):
             yield f"fastest when slowed down or sped up as a whole {self.uniform:.4g} s"

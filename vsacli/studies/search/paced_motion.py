@@ -87,7 +87,7 @@ class Speeds(NamedTuple):
         )
 
     def rates(self, by_s: Sequence[Row]) -> list[Row]:
-        """A function of s, whose derivatives by s are given, and its derivatives by time, at most four."""
+        """Return a function of the path coordinate s with derivatives by s, and its derivatives by time."""
         f, *slopes = by_s
         s1, s2, s3, s4 = self
         rates = [f, slopes[0] * s1, slopes[1] * (s1 * s1) + slopes[0] * s2]
@@ -152,7 +152,7 @@ class PacedMotion:
         return stiffness
 
     def stiffness_rates(self, pace: Sequence[Row], by_s: Sequence[Row]) -> list[Row]:
-        """A stiffness along the path, and its two derivatives by time."""
+        """Return a stiffness along the path, and its two derivatives by time."""
         return Speeds.of(pace).rates(by_s)
 
     def _computed(self, speeds: Speeds, instants: IndexArray) -> list[Command]:
@@ -177,7 +177,7 @@ class PacedMotion:
         ]
 
     def _rates(self, names: Sequence[str], speeds: Speeds, instants: IndexArray) -> Mapping[str, list[Row]]:
-        """The rows of a signal by the names of its derivatives by time."""
+        """Return the rows of a signal by the names of its derivatives by time."""
         by_s = np.stack([self._variables[name] for name in names])[..., instants]
         components = [speeds.rates(list(by_s[:, component])) for component in range(by_s.shape[1])]
         return {name: [each[order] for each in components] for order, name in enumerate(names)}
@@ -343,7 +343,7 @@ def retimed(
     name: str,
     refined: int = 1,
 ) -> Trajectory:
-    """The motion of a trajectory along its path at a pace dt/ds, at about its own rate.
+    """Return the motion of a trajectory along its path at a pace dt/ds, at about its own rate.
 
     Args:
         trajectory: the path, whose parameter s is the time since its start.

@@ -88,7 +88,7 @@ class PacedSearch:
         self._scale = self._span[1]
 
     def _spaces(self, pieces: int) -> PacedSpaces:
-        """The splines of so many pieces among which is searched."""
+        """Return the splines of so many pieces among which is searched."""
         raise NotImplementedError
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
@@ -112,7 +112,7 @@ class PacedSearch:
         raise NotImplementedError
 
     def best(self) -> Pacing:
-        """The best that is found from several starts.
+        """Return the best that is found from several starts.
 
         Raises:
             ImpossibleError: nothing was found.
@@ -144,7 +144,7 @@ class PacedSearch:
         }
 
     def _drawn(self, least: float, most: float) -> list[FloatArray]:
-        """Some paces between two, (instants,)."""
+        """Return some paces between two, (instants,)."""
         generator = np.random.default_rng(self._seed)
         places = np.linspace(*self._span, LEVELS)
         return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
@@ -170,7 +170,7 @@ class PacedSearch:
         return None
 
     def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
-        """The pace by itself, and each joint, at some instants."""
+        """Return the pace by itself, and each joint, at some instants."""
         s = self._s[instants]
         pace = spaces.rows(None, s, PACE_ORDERS)
         of_pace = Pace(self._motion.resting, self._scale)
@@ -288,7 +288,7 @@ class TimingSearch(PacedSearch):
         self.uniform = math.nan
 
     def best(self) -> Pacing:
-        """The fastest pace that is found.
+        """Return the fastest pace that is found.
 
         Raises:
             ImpossibleError: none was found.
@@ -328,13 +328,13 @@ class TimingSearch(PacedSearch):
         return begun
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        """A little slower, since the way out of a corner is long."""
+        """Return a little slower, since the way out of a corner is long."""
         stiffness = {key: row for key, row in rows.items() if key is not None}
         slower = spaces.fitted(self._s, SLACK * rows[None], stiffness)
         return slower, slower
 
     def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
-        """The least pace that is the same everywhere and keeps all bounds; None if none does."""
+        """Return the least pace that is the same everywhere and keeps all bounds; None if none does."""
         few = self._groups(spaces, evenly(len(self._s), FEW))
         every = self._groups(spaces, np.arange(len(self._s)))
 
@@ -358,7 +358,7 @@ class TimingSearch(PacedSearch):
         return minimise(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """The same so little slower that all bounds are kept at every instant; None if that takes more."""
+        """Return a slightly slower timing that keeps all bounds at every instant; None if it takes more."""
         for share in SLOWER:
             unknowns = spaces.slowed(found.unknowns, share)
             cost, bounds = SeparableProblem(every).values(unknowns)
@@ -417,7 +417,7 @@ class CheapestPaceSearch(PacedSearch):
         return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        """The pace as commanded with some stiffnesses, and drawn paces with the first of these."""
+        """Return the pace as commanded with some stiffnesses, and drawn paces with the first of these."""
         asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
         even = np.ones_like(self._s)
         if self._near is not None:
@@ -435,7 +435,7 @@ class CheapestPaceSearch(PacedSearch):
         return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
 
     def _lasting(self, pace: FloatArray) -> FloatArray:
-        """A pace scaled to the duration as commanded, (instants,)."""
+        """Return a pace scaled to the duration as commanded, (instants,)."""
         scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
         return scaled
 

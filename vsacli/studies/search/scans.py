@@ -31,14 +31,14 @@ class Candidates(Protocol):
         """How far a scan goes from a refused number, at least 1."""
 
     def accepts(self, number: int) -> bool:
-        """Whether the change is accepted at the watched steps."""
+        """Return whether the change is accepted at the watched steps."""
 
     def confirms(self, number: int) -> bool:
-        """Whether it is accepted at all steps; some of those that refuse it are watched from now on."""
+        """Return whether it is accepted at all samples; watch some of those that refuse it from now on."""
 
 
 def smallest_confirmed(candidates: Candidates, start: int, stop: int) -> int | None:
-    """The smallest number from `start` to `stop` that scan, bisection and confirmation find; None if none."""
+    """Return the smallest number from `start` to `stop` found by scan, bisection, confirmation; or None."""
     number: int | None = start if start <= stop else None
     while number is not None:
         number = _smallest_accepted(candidates, number, stop)
@@ -124,7 +124,7 @@ class Factors(NamedTuple):
 
 
 def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
-    """The smallest factor by which position, stiffness and wrench must be stretched together in time.
+    """Return the smallest factor by which position, stiffness and wrench must be stretched together in time.
 
     It is found by a scan upward in steps of 1 %, then bisection to one step, and confirmed on all steps of
     the stretched trajectory.
@@ -154,7 +154,7 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
 
 
 def _scan_start(acceptance: Acceptance, few: Passage, factors: Factors) -> int | None:
-    """A number up to which the scan would find one of a few steps refused; None if it always would.
+    """Return a number up to which the scan would find one of a few steps refused; None if it always would.
 
     It tries many factors at once, which costs hardly more than one of them.
     """
@@ -182,11 +182,14 @@ class SlowDownCandidates:
         return _stride(number)
 
     def accepts(self, number: int) -> bool:
-        """Whether every watched step is accepted."""
+        """Return whether every watched step is accepted."""
         return not self._acceptance.refused(self._watched.slowed(self._factors.factor(number))).any()
 
     def confirms(self, number: int) -> bool:
-        """Whether every step is accepted; those of the first block with others are watched from now on."""
+        """Return whether every step is accepted.
+
+        Those of the first block with others are watched from now on.
+        """
         factor = self._factors.factor(number)
         for passage in self._acceptance.passages(self._trajectory.stretched(factor), factor):
             steps = np.flatnonzero(np.any(self._acceptance.refused(passage), axis=1))
@@ -218,7 +221,7 @@ GRID_ROUNDING = 1e-6
 
 
 def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
-    """The constant closest to zero that mends a joint, N m/rad (N/m).
+    """Return the constant closest to zero that mends a joint, N m/rad (N/m).
 
     Where only the corridor and the limits of stiffness and deflection are at stake, its bounds are closed;
     for the limits of the motors it is a scan outward in steps of 1 % of the stiffness, then bisection.
@@ -244,7 +247,7 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
 
 
 def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
-    """The constant with which a joint is as soft as its load and its limit of stiffness admit, N m/rad (N/m).
+    """Return the constant that makes a joint as soft as load and stiffness limit admit, N m/rad (N/m).
 
     Raises:
         ImpossibleError: no stiffness mends the joint.
@@ -281,11 +284,11 @@ class OffsetCandidates:
         self._watched = evenly(len(load.time), WATCHED_STEPS)
 
     def value(self, number: int) -> float:
-        """The constant that a number stands for: the double nearest to the decimal."""
+        """Return the constant that a number stands for: the double nearest to the decimal."""
         return float(f"{self._sign * number}e{self._exponent}")
 
     def smallest(self, low: float, high: float) -> float | None:
-        """The constant closest to zero between two bounds on its size, or None."""
+        """Return the constant closest to zero between two bounds on its size, or None."""
         unit = 10.0**self._exponent
         ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
         start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
@@ -295,7 +298,7 @@ class OffsetCandidates:
         return None if number is None else self.value(number)
 
     def _scan_start(self, start: int, stop: int) -> int | None:
-        """A number up to which the scan would find some watched step refused; None if it always would.
+        """Return a number up to which the scan would find some watched step refused; None if it always would.
 
         Found by looking at a few steps, to which others are added as long as the watched ones refuse.
         """
@@ -310,12 +313,12 @@ class OffsetCandidates:
         return None
 
     def _hardest(self, number: int) -> IndexArray:
-        """Some of the watched steps that refuse a number."""
+        """Return some of the watched steps that refuse a number."""
         refused = self._watched[self._refused(self._load.at(self._watched), number)]
         return refused[evenly(len(refused), FIRST_STEPS)]
 
     def _strides(self, start: int, stop: int) -> Iterator[int]:
-        """The numbers at which the scan looks."""
+        """Yield the numbers at which the scan looks."""
         number = start
         while number < stop:
             yield number
@@ -340,11 +343,11 @@ class OffsetCandidates:
         return math.ceil((self._softest / 10.0**self._exponent + max(self._sign * number, 0)) / 100)
 
     def accepts(self, number: int) -> bool:
-        """Whether every watched step is accepted."""
+        """Return whether every watched step is accepted."""
         return not self._refused(self._load.at(self._watched), number).size
 
     def confirms(self, number: int) -> bool:
-        """Whether every step is accepted; steps that are not are watched from now on."""
+        """Return whether every step is accepted; steps that are not are watched from now on."""
         refused = self._refused(self._load, number)
         self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
         return not refused.size
@@ -359,18 +362,18 @@ DIGITS = 3
 
 
 def has_transitions(trajectory: Trajectory) -> bool:
-    """Whether the stiffness is given by levels with transitions between them."""
+    """Return whether the stiffness is given by levels with transitions between them."""
     return bool(_changes(trajectory))
 
 
 def _changes(trajectory: Trajectory) -> list[RestToRest]:
-    """The changes from level to level, none if the stiffness is something else."""
+    """Return the changes from level to level, none if the stiffness is something else."""
     stiffness = trajectory.commanded[STIFFNESS.key]
     return (changes_of_steps(stiffness) or []) if isinstance(stiffness, Chain) else []
 
 
 def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
-    """The transition as commanded, the shortest longer one that is accepted, and the trajectory with it.
+    """Return the commanded transition, the shortest accepted longer one, and the trajectory with it.
 
     Each change of level begins when it did. It is found by a scan in steps of 1 %, then bisection.
 
@@ -414,11 +417,11 @@ class _Transitions:
         return math.floor(self.longest / 10.0**self._exponent * (1 + 1e-9))
 
     def length(self, number: int) -> float:
-        """The transition that a number stands for, s."""
+        """Return the transition that a number stands for, s."""
         return min(float(f"{number}e{self._exponent}"), self.longest)
 
     def trajectory(self, number: int) -> Trajectory:
-        """The trajectory with transitions of that length."""
+        """Return the trajectory with transitions of that length."""
         first, length = self._changes[0], self.length(number)
         levels = [first.start, *(change.end for change in self._changes)]
         spans = [
@@ -433,11 +436,11 @@ class _Transitions:
         return math.ceil(number / 100)
 
     def accepts(self, number: int) -> bool:
-        """Whether every watched instant is accepted."""
+        """Return whether every watched instant is accepted."""
         return not self._refused(number, self._watched).size
 
     def confirms(self, number: int) -> bool:
-        """Whether every step is accepted; steps that are not are watched from now on."""
+        """Return whether every step is accepted; steps that are not are watched from now on."""
         refused = self._refused(number, self._steps)
         self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
         return not refused.size

@@ -55,7 +55,7 @@ class Sampled(NamedTuple):
     gradients: FloatArray
 
     def split(self, parts: int) -> tuple[Sampled, list[FloatArray]]:
-        """The first of so many equal parts of the instants, and the gradients of each of the others."""
+        """Return the first of equal parts of the instants, and the gradients of each of the others."""
         instants = self.values.shape[1] // parts
         first = Sampled(self.values[:, :instants], self.gradients[..., :instants])
         return first, np.split(self.gradients[..., instants:], parts - 1, axis=-1)
@@ -86,7 +86,7 @@ class Group:
     offsets: FloatArray | None = None
 
     def rows(self, unknowns: FloatArray) -> FloatArray:
-        """The rows of all unknowns of a problem, (rows, instants)."""
+        """Return the rows of all unknowns of a problem, (rows, instants)."""
         rows: FloatArray = self.basis @ unknowns[self.unknowns]
         return rows if self.offsets is None else rows + self.offsets[:, None]
 
@@ -96,13 +96,13 @@ class Group:
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
 
     def values(self, rows: FloatArray) -> tuple[float, FloatArray]:
-        """The cost and the bounds there are."""
+        """Return the cost and the bounds there are."""
         integrands, bounds = self.functions(rows, self.instants)
         cost = float(np.sum(self.weights * _stacked(integrands, rows)))
         return cost, _stacked(bounds, rows)[self.there]
 
     def bounds(self, rows: FloatArray) -> FloatArray:
-        """All bounds, (bounds, instants)."""
+        """Return all bounds, (bounds, instants)."""
         return _stacked(self.functions(rows, self.instants)[1], rows)
 
     def sampled(self, rows: FloatArray, instants: IndexArray) -> tuple[Sampled, Sampled]:
@@ -147,7 +147,7 @@ class _Expanded:
         return self._by_unknowns(_weighted(self.group.weights, self.integrands.gradients))
 
     def pull(self, weights: FloatArray) -> FloatArray:
-        """The sum of the bounds' gradients by the own unknowns, (own unknowns,)."""
+        """Return the sum of the bounds' gradients by the own unknowns, (own unknowns,)."""
         return self._by_unknowns(_weighted(self._of_all(weights), self.bounds.gradients))
 
     def changes(self, step: FloatArray) -> FloatArray:
@@ -195,7 +195,7 @@ class _Expanded:
 
 
 def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
-    """The sum of gradients times weights, (rows, instants); what has no weight may be no number."""
+    """Return the sum of gradients times weights, (rows, instants); what has no weight may be no number."""
     kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
     summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)
     return summed
@@ -251,7 +251,7 @@ class SeparableProblem:
         return sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found])
 
     def at(self, unknowns: FloatArray) -> SeparablePoint:
-        """The same with derivatives."""
+        """Return the same with derivatives."""
         return SeparablePoint(self.groups, unknowns)
 
 
@@ -281,7 +281,7 @@ def interior(
 
 
 def _relieved(group: Group, start: FloatArray) -> Group:
-    """The same bounds less a further unknown, which is the cost, with a little more for going far."""
+    """Return the same bounds less a further unknown, which is the cost, with a little more for going far."""
     rows, instants, own = group.basis.shape
     basis = np.zeros((rows + 1, instants, own + 1))
     basis[:-1, :, :-1], basis[-1, :, -1] = group.basis, 1.0
@@ -306,7 +306,7 @@ class _Relieved:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """The relief, and the bounds less that."""
+        """Return the relief, and the bounds less that."""
         *own, relief = rows
         _, bounds = self._group.functions(own, self._group.instants[instants])
         sizes = zip(own, self._start[:, instants], self._group.scales, strict=True)

@@ -97,7 +97,7 @@ class SplineSpace:
         return replace(self, shapes=self.shapes @ null_space(integrals[None]), offset=mean)
 
     def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
-        """A spline that goes on at the end as it begins, passed so many times."""
+        """Return a spline that goes on at the end as it begins, passed so many times."""
         first, last = self.knots[DEGREE], self.knots[-DEGREE - 1]
         pieces = len(self.shapes) - DEGREE
         whole = self.periodic((first, first + count * (last - first)), count * pieces)
@@ -115,7 +115,7 @@ class SplineSpace:
         return float(ends[-1] - ends[0]) / (len(ends) - 1)
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
-        """The shapes and their derivatives, (orders, instants, shapes)."""
+        """Return the shapes and their derivatives, (orders, instants, shapes)."""
         from scipy.interpolate import BSpline
 
         every = BSpline(self.knots, self.shapes, DEGREE)
@@ -126,19 +126,19 @@ class SplineSpace:
         return np.append(self.offset, np.zeros(orders - 1))
 
     def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
-        """The spline of so much of each shape, (shapes, ...)."""
+        """Return the spline of so much of each shape, (shapes, ...)."""
         from scipy.interpolate import BSpline
 
         return BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
-        """The amounts of the shapes with which they come nearest to values, (shapes,)."""
+        """Return the amounts of the shapes with which they come nearest to values, (shapes,)."""
         amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0]
         return amounts
 
 
 def _ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:
-    """The ends of pieces of about equal length, each the nearest that is allowed."""
+    """Return the ends of pieces of about equal length, each the nearest that is allowed."""
     ends = np.linspace(*span, pieces + 1)
     if allowed is None:
         return ends
@@ -174,7 +174,7 @@ class Pacing:
         return {key: self._spline(key, count) for key in self.splines if key is not None}
 
     def stiffness_at(self, s: FloatArray) -> dict[int, FloatArray]:
-        """The stiffness of these joints at instants of the path, or of its first period, (instants,) each."""
+        """Return the stiffness of these joints at instants of the path or its first period, (instants,)."""
         return {joint: spline(s) for joint, spline in self.stiffness().items()}
 
     def _spline(self, key: int | None, count: int) -> BSpline[np.float64]:
@@ -191,7 +191,7 @@ class Rows(NamedTuple):
     offsets: FloatArray
 
     def first(self) -> Rows:
-        """The first of them alone."""
+        """Return the first of them alone."""
         return Rows(self.basis[:1], self.places, self.scales[:1], self.offsets[:1])
 
     def beside(self, other: Rows) -> Rows:
@@ -262,12 +262,12 @@ class PacedSpaces(NamedTuple):
         return slower
 
     def rows(self, key: int | None, s: FloatArray, orders: int, size: float = 1.0) -> Rows:
-        """The pace, None, or the stiffness of a joint, of about a size, with its derivatives at instants."""
+        """Return None (the timing) or the stiffness of a joint, scaled, with its derivatives at instants."""
         space, own = self.parts()[key]
         scales = size * space.piece ** -np.arange(orders, dtype=np.float64)
         return Rows(space.basis(s, orders), own, scales, space.offsets(orders))
 
     def level(self, s: FloatArray) -> Rows:
-        """A further unknown, behind all others, that is the same everywhere."""
+        """Return a further unknown, behind all others, that is the same everywhere."""
         last = sum(space.size for space, _ in self.parts().values())
         return Rows(np.ones((1, len(s), 1)), np.array([last]), np.ones(1), np.zeros(1))

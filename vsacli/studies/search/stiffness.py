@@ -117,7 +117,7 @@ class _Distance:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
-        """The square of the distance, and what the bounds are exceeded by."""
+        """Return the square of the distance, and what the bounds are exceeded by."""
         low, high = (row[instants] for row in self._within)
         missed = (rows[0] - self._target[instants]) / self._size
         return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
@@ -139,7 +139,7 @@ def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -
 def nearest_profile(
     space: SplineSpace, time: FloatArray, target: FloatArray, admissible: Range
 ) -> FloatArray | None:
-    """The amounts of a space's shapes that come nearest to a target, within what is admissible, if any do."""
+    """Return the admissible amounts of a space's shapes nearest to a target, if there are any."""
     size = float(np.median(admissible.low))
     clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
     within = Range(admissible.low + clearance, admissible.high - clearance)
@@ -224,7 +224,7 @@ class _Attempt(NamedTuple):
     instants: IndexArray
 
     def in_space(self, space: SplineSpace, time: FloatArray) -> FloatArray:
-        """The same profile in another space, (shapes,)."""
+        """Return the same profile in another space, (shapes,)."""
         return space.fitted(time, self.space.basis(time, 1)[0] @ self.minimum.unknowns[: self.space.size])
 
 
@@ -266,7 +266,7 @@ class StiffnessSearch:
         self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
     def best(self) -> Profile:
-        """The best profile that is found from several starts.
+        """Return the best profile that is found from several starts.
 
         Raises:
             ImpossibleError: none was found.
@@ -290,7 +290,7 @@ class StiffnessSearch:
         return self._profile(self._refined(best, pieces, start), len(starts), agreeing)
 
     def best_constant(self) -> Profile | None:
-        """The best constant; None if no constant keeps all bounds."""
+        """Return the best constant; None if no constant keeps all bounds."""
         space = SplineSpace.constant(self._span)
         start = nearest_profile(space, self._load.time, self._asked, self._admissible)
         if start is None:
@@ -307,7 +307,7 @@ class StiffnessSearch:
         return self._spaces(self._span, pieces, self._steps)
 
     def _starts(self) -> tuple[int, list[FloatArray]]:
-        """The pieces of splines of which some lie within what is admissible, and these."""
+        """Return the pieces of splines of which some lie within what is admissible, and these."""
         time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
@@ -397,7 +397,7 @@ class StiffnessSearch:
         )
 
     def _with_level(self, every: Group, start: FloatArray) -> FloatArray:
-        """A start with a level that bounds what it shall, if there are any."""
+        """Return a start with a level that bounds what it shall, if there are any."""
         if not self._criterion.levels:
             return start
         driven = self._whole.driven((every.basis[:-1, :, :-1] @ start), every.instants)
@@ -411,7 +411,7 @@ class StiffnessSearch:
         return missed_instants(missed)
 
     def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
-        """The same with finer pieces, as long as these lower the cost."""
+        """Return the same with finer pieces, as long as these lower the cost."""
         coarse = best.space
         for finer_pieces in self._finer_than(pieces):
             space = self._space(finer_pieces)

@@ -241,7 +241,7 @@ class Suggestions(Published):
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        """A numbered sentence for each remedy under a heading, and why kinds do not do by themselves."""
+        """Yield a numbered sentence for each fix under a heading, and why single kinds are not enough."""
         margin = f"a margin of at least {100 * self.near_singular:.6g} %"
         if self.slow_down is None:
             yield f"nothing to change: every step has {margin} and keeps every limit"

@@ -81,12 +81,12 @@ Form = Callable[[Acceptance, Joint, Load], FloatArray]
 
 
 def constant_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
-    """The smallest that is the same at every sample."""
+    """Return the smallest that is the same at every sample."""
     return np.full(len(load.time), smallest_offset(acceptance, joint, load))
 
 
 def least_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
-    """The smallest at each sample by itself, whatever the motors may do: no smooth profile has a smaller."""
+    """Return the smallest stiffness of each sample on its own; no smooth profile can have a smaller one."""
     low, high = checked_range(acceptance, joint, load)
     if np.any(low > high):
         raise ImpossibleError(f"corridor and limits leave {joint.name} no stiffness")
@@ -118,7 +118,7 @@ class Combination:
         return {index: float(change[0]) for index, change in self.changes.items()}
 
     def robot(self, robot: Robot) -> Robot:
-        """The robot with the preloads of the combination."""
+        """Return the robot with the preloads of the combination."""
         return robot.replace(
             {preload_path(robot, index): preload for index, preload in self.preloads.items()}
         )
@@ -128,7 +128,7 @@ AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
 
 def preload_path(robot: Robot, index: int) -> str:
-    """The path to the preload of a joint in the file of its robot."""
+    """Return the path to the preload of a joint in the file of its robot."""
     return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"
 
 
@@ -164,11 +164,11 @@ class Task:
     impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
 
     def acceptance_with(self, found: Combination) -> Acceptance:
-        """The rule for the robot with the preloads of a combination."""
+        """Return the rule for the robot with the preloads of a combination."""
         return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
 
     def with_constants(self, found: Combination) -> Remedy:
-        """The remedy of a combination whose changes of stiffness are constants."""
+        """Return the remedy of a combination whose changes of stiffness are constants."""
         offsets = tuple(
             Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
             for index, joint in enumerate(self.acceptance.robot.joints)
@@ -190,7 +190,7 @@ class Task:
         )
 
     def with_profiles(self, found: Combination) -> Remedy:
-        """The remedy with slow-down and preloads of a combination, and the nearest profiles that they admit.
+        """Return the fix with slow-down and preloads of a combination, and the nearest profiles.
 
         Raises:
             ImpossibleError: there is none for some joint.
@@ -216,7 +216,7 @@ class Task:
         )
 
     def with_transition(self) -> Remedy:
-        """The remedy with the shortest transitions between levels of stiffness that do.
+        """Return the remedy with the shortest transitions between levels of stiffness that do.
 
         Raises:
             ImpossibleError: there are none.
@@ -243,7 +243,7 @@ class Task:
         return isinstance(self.trajectory.commanded[STIFFNESS.key], ClosedForm)
 
     def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
-        """The trajectory passed more slowly by a factor, and by which factor it is still to be stretched.
+        """Return the slower trajectory, and the factor by which it is still to be stretched.
 
         A record is stretched after its fit only: that of slower samples could be another one, hum of mains at
         other frequencies for example. Resampled steps with another stiffness are known as such, at the rate
@@ -265,7 +265,7 @@ class Task:
         return with_kept_rate(declared, factor, rate_of(self.trajectory))
 
     def constants(self) -> Combination:
-        """The smallest constant changes of stiffness that mend the task by themselves.
+        """Return the smallest constant changes of stiffness that mend the task by themselves.
 
         Raises:
             ImpossibleError: there is none for some joint.
@@ -314,11 +314,11 @@ class Task:
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 
     def _is_short(self, joint: JointReport) -> bool:
-        """Whether the report of a joint shows what no remedy may have."""
+        """Return whether the report of a joint shows what no remedy may have."""
         return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
 
     def _refused_between(self, remedy: Remedy) -> FloatArray:
-        """Some of the instants between the steps of a remedy that are not accepted."""
+        """Return some of the instants between the steps of a remedy that are not accepted."""
         trajectory, factor = remedy.trajectory, 1 + remedy.longer
         # what is allowed for the noise of a recording is known at its steps; between them the run looks
         if not trajectory.known_between or trajectory.estimates:
@@ -372,12 +372,12 @@ def for_refused_joints(
 
 
 def _counting(load: Load, trajectory: Trajectory) -> Load:
-    """The load where it is known: at the steps alone, if the trajectory is known there alone."""
+    """Return the load where it is known: at the steps alone, if the trajectory is known there alone."""
     return load if trajectory.known_between else load.at(load.steps)
 
 
 def _nearest_change(acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load) -> Change:
-    """The nearest profile, or the constant if that is nearer."""
+    """Return the nearest profile, or the constant if that is nearer."""
     try:
         constant = smallest_offset(acceptance, joint, _counting(load, trajectory))
     except ImpossibleError:

@@ -70,7 +70,7 @@ class ImplicitSolution:
     def solve_within(
         self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray
     ) -> PairSolution:
-        """The same with a corridor that carries none, as where nothing that moves it does."""
+        """Return the same with a corridor that carries none, as where nothing that moves it does."""
         found = self._actuator.solve(value_of(tau_e), value_of(stiffness), q)
         slopes = self._slopes(found.deflections[: self._actuator.motor_count], q)
         torque = self._all(tau_e, q) - slopes.of_torque
@@ -108,7 +108,7 @@ class ImplicitSolution:
     def _end(
         self, tau_e: Dual | FloatArray, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray
     ) -> Dual | FloatArray:
-        """An end of the corridor: critical, or where a side goes slack, or at the end of a range.
+        """Return an end of the corridor: critical, or where a side goes slack, or at the end of a range.
 
         Where nothing bounds the corridor it does not change.
         """

@@ -181,7 +181,7 @@ class Sensitivity(Published):
 
 
 def _margins(effect: ParameterEffect) -> str:
-    """The largest change of a smallest margin."""
+    """Return the largest change of a smallest margin."""
     changes = {name: each.margin for name, each in effect.joints.items() if math.isfinite(each.margin)}
     joint = max(changes, key=lambda name: abs(changes[name]), default=None)
     return "-" if joint is None or not changes[joint] else f"{joint} {100 * changes[joint]:+.2g} points"

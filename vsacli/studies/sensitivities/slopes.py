@@ -73,7 +73,7 @@ def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
 
 
 def _mixed(plain: Chain, carrying: Chain, joint: int | None) -> Chain:
-    """The chain that carries derivatives by the numbers of one joint alone, or of the robot as a whole."""
+    """Return the chain with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
         return plain._replace(gravity=carrying.gravity, tip=carrying.tip)
     links, states = list(plain.links), list(plain.states)

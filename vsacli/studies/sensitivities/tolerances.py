@@ -41,13 +41,13 @@ SMALL_CHANGES: Mapping[Quantity, tuple[float, str]] = {
 
 
 def step_of(parameter: Parameter) -> float:
-    """The change, in SI units; zero for a number that is zero and is compared by a share of it."""
+    """Return the change, in SI units; zero for a number that is zero and is compared by a share of it."""
     change, _ = SMALL_CHANGES.get(parameter.quantity, (RELATIVE * abs(parameter.value), ""))
     return change
 
 
 def words_of(parameter: Parameter) -> str:
-    """The change as people say it."""
+    """Return the change as people say it."""
     _, words = SMALL_CHANGES.get(parameter.quantity, (0.0, f"{100 * RELATIVE:g} %"))
     return words
 
@@ -73,13 +73,13 @@ class Tolerance(NamedTuple):
         return self.size if self.shape == "normal" else self.size / math.sqrt(3)
 
     def drawn(self, random: np.random.Generator) -> float:
-        """A deviation from the value."""
+        """Return a deviation from the value."""
         if self.shape == "normal":
             return float(random.normal(0.0, self.size))
         return float(random.uniform(-self.size, self.size))
 
     def below(self, share: float) -> float:
-        """The deviation that so large a share of all is below: the quantile."""
+        """Return the deviation that so large a share of all is below: the quantile."""
         if self.shape == "normal":
             from scipy.special import ndtri
 
@@ -91,7 +91,7 @@ SHAPES = ("normal", "uniform")
 
 
 def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | None, ...]:
-    """The tolerance of each parameter; None for what is exact.
+    """Return the tolerance of each parameter; None for what is exact.
 
     Args:
         text: a share such as `5 %`, or the path of a YAML file of paths into the robot, each with a
@@ -146,7 +146,7 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
 
 
 def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
-    """The tolerance that a file says of a number.
+    """Return the tolerance that a file says of a number.
 
     Args:
         node: such as `{normal: 5 %}`.

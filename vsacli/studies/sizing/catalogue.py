@@ -139,6 +139,6 @@ def _or_infinite(bound: float | None) -> float:
 
 
 def _smallest(torque: float | None, current: float | None, constant: float) -> float:
-    """The torque that is within both bounds."""
+    """Return the torque that is within both bounds."""
     by_current = math.inf if current is None else current * constant
     return min(_or_infinite(torque), by_current)

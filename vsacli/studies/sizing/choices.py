@@ -77,7 +77,7 @@ class Choice(Published):
 
 
 def usual_criterion(motors: Sequence[CatalogueMotor]) -> str:
-    """The copper loss, if it is known of all motors."""
+    """Return the copper loss, if it is known of all motors."""
     known = all(motor.resistance is not None for motor in motors)
     return "copper" if known else "utilisation"
 
@@ -99,7 +99,7 @@ def check_criterion(criterion: str, motors: Sequence[CatalogueMotor]) -> None:
 def choices(
     demand: MotorDemand, motors: Sequence[CatalogueMotor], gears: Gears, criterion: str
 ) -> tuple[Choice, ...]:
-    """Every motor of a catalogue with its best gear: those that do first, and the best of these first.
+    """Return every motor of a catalogue with its best gear: those that do first, and the best of these first.
 
     Args:
         demand: what is asked of the motor.
@@ -146,7 +146,7 @@ def _trials(
     gears: Gears,
     criterion: str,
 ) -> _Trials:
-    """Each listed ratio, or of a range that with which a motor is best; but gears that motors have stay."""
+    """Return the listed ratios, or the best one of a range; gears that motors have stay."""
     fixed = np.array([math.nan if motor.gear_ratio is None else motor.gear_ratio for motor in motors])
     listed = [np.full_like(fixed, ratio) for ratio in gears.listed]
     free = listed or [_best_of_range(demand, shafts, possible, gears, criterion)]
@@ -160,7 +160,7 @@ def _trials(
 def _best_of_range(
     demand: MotorDemand, shafts: Shaft, possible: Ratios, gears: Gears, criterion: str
 ) -> FloatArray:
-    """The best ratio of each motor, (motors,); where none does, that with which it is nearest to it."""
+    """Return the best ratio of each motor, (motors,), or the one nearest to its limits if none will do."""
     ends = Ratios(np.full_like(possible.low, gears.low), np.full_like(possible.high, gears.high))
     within = possible.within(ends)
     wanted = least_rms(demand, shafts)
@@ -180,7 +180,7 @@ def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:
 def _choice(
     motor: CatalogueMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
 ) -> Choice:
-    """A motor as it was best, in a trial."""
+    """Return a motor as it was best, in a trial."""
     _, index = place
     ends = (float(possible.low[index]), float(possible.high[index]))
     low, high = (math.nan, math.nan) if possible.empty[index] else ends

@@ -44,7 +44,7 @@ class Peak(Published):
         return cls(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else cls()
 
     def or_larger(self, other: Self) -> Self:
-        """The larger one of both."""
+        """Return the larger one of both."""
         return self if self.value >= other.value or math.isnan(other.value) else other
 
 
@@ -82,7 +82,7 @@ class MotorDemand:
         return f"{self.joint} {self.number}"
 
     def peak(self, values: FloatArray) -> Peak:
-        """The largest size of values, (samples,)."""
+        """Return the largest size of values, (samples,)."""
         step = int(np.abs(values).argmax())
         return Peak(float(abs(values[step])), self.trajectories[int(self.run[step])], float(self.time[step]))
 
@@ -168,7 +168,7 @@ class SpringPeaks:
 
 
 def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
-    """The larger of the peaks of both."""
+    """Return the larger of the peaks of both."""
     return replace(
         one,
         energy=one.energy.or_larger(other.energy),

@@ -62,7 +62,7 @@ class Gears(NamedTuple):
 
 
 def gears_of_joints(texts: Sequence[str], joints: Sequence[str]) -> dict[str, Gears]:
-    """The gears of each joint.
+    """Return the gears of each joint.
 
     Args:
         texts: as `Gears.read` takes them, for all joints, or as `slide=500..3000` for one of them.
@@ -118,7 +118,7 @@ class Ratios(NamedTuple):
         return empty
 
     def nearest(self, ratio: FloatArray) -> FloatArray:
-        """The ratio of a range that is nearest to one; what is not finite becomes an end, or 1."""
+        """Return the ratio of a range that is nearest to one; what is not finite becomes an end, or 1."""
         inside = np.minimum(np.maximum(ratio, self.low), self.high)
         finite = np.where((inside > 0) & (inside < math.inf), inside, np.where(self.low > 0, self.low, 1.0))
         nearest: FloatArray = np.minimum(finite, self.high)
@@ -168,7 +168,7 @@ def _mean_product(one: FloatArray, moments: FloatArray, other: FloatArray) -> Fl
 
 
 def ratios_within(demand: MotorDemand, shafts: Shaft) -> Ratios:
-    """The ratios at which motors keep all their limits."""
+    """Return the ratios at which motors keep all their limits."""
     found = Ratios(np.zeros_like(shafts.inertia), np.full_like(shafts.inertia, math.inf))
     with np.errstate(divide="ignore", invalid="ignore"):
         found = found._replace(high=shafts.max_velocity / np.float64(demand.top_speed))
@@ -210,7 +210,7 @@ def _below(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Rati
 
 
 def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
-    """The ratios at which the root mean square of the torque is smallest, (motors,).
+    """Return the ratios at which the root mean square of the torque is smallest, (motors,).
 
     It is 0 or infinite where that becomes ever smaller.
     """
@@ -261,7 +261,7 @@ def _turning_point(
 
 
 def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
-    """The ratios at which the largest share of a limit is smallest, (motors,), among those that are allowed.
+    """Return the allowed ratios with the smallest largest share of a limit, (motors,).
 
     By golden section: the largest share falls up to there, and then rises. It is 0 or infinite where that
     becomes ever smaller.

@@ -58,12 +58,12 @@ class Shaft(NamedTuple):
 
     @classmethod
     def of(cls, shafts: Iterable[Self]) -> Self:
-        """Several motors."""
+        """Return several motors."""
         return cls(*(np.array(column, dtype=float) for column in zip(*shafts, strict=True)))
 
     @classmethod
     def of_joint_motor(cls, motor: JointMotor) -> Self:
-        """The shaft of a robot's own motor; what is said of the joint's side if its gear is not known."""
+        """Return the shaft of a robot's own motor, on the joint side if its gear is not known."""
         ratio = abs(motor.gear_ratio or 1.0)
         friction = motor.friction or NO_FRICTION
         constant = math.nan if motor.torque_constant is None else abs(motor.torque_constant) / ratio
@@ -141,7 +141,7 @@ class Shaft(NamedTuple):
 
 
 def shaft_signals(velocity: FloatArray, acceleration: FloatArray, load: FloatArray) -> FloatArray:
-    """The seven signals of a demand, (7, samples), from what it is on the joint's side, each (samples,).
+    """Return the seven signals of a demand, (7, samples), from those of the joint side, each (samples,).
 
     Acceleration, velocity, whether it moves backward, and forward, one, the load where it is driven, and
     where it is braked. At rest a load counts as driven.

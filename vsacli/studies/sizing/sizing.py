@@ -173,7 +173,7 @@ KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_curr
 
 
 def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
-    """The text of the robot's file with the best motors in it, where one does.
+    """Return the text of the robot's file with the best motors in it, where one does.
 
     Everything else, comments too, stays as the user wrote it. Masses of links stay as they are, and so does a
     coupled inertia on the joint's side; a robot file knows no continuous torque and no efficiency of gears.
@@ -201,7 +201,7 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
 
 
 def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:
-    """The motor that was chosen, with its gear, as `motor:` of an actuator."""
+    """Return the motor that was chosen, with its gear, as `motor:` of an actuator."""
     motor, choice = place.record, place.best
     assert motor is not None, "as of every place"
     assert choice is not None, "likewise"

@@ -72,7 +72,7 @@ class Sizing(Published):
         return tuple(motor for motor in self.motors if not motor.does)
 
     def __str__(self) -> str:
-        """The lines that the command prints, without a final newline."""
+        """Return the lines that the command prints, without a final newline."""
         known = [motor for motor in self.motors if motor.asked is not None]
         several = len(self.outcomes) > 1
         return "\n".join(
@@ -181,7 +181,7 @@ def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
 
 
 def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
-    """The best motor of a catalogue for each place."""
+    """Yield the best motor of a catalogue for each place."""
     if not motors:
         return
     used = [name for name in LIMITS if any(motor.best and name in motor.best.shares for motor in motors)]

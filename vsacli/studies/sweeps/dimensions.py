@@ -97,13 +97,13 @@ class Dimension(NamedTuple):
     numeric: bool = True
 
     def drawn(self, share: float) -> Any:
-        """The value that so large a share of all is below; of listed ones each has an equal share."""
+        """Return the value that so large a share of all is below; of listed ones each has an equal share."""
         if self.tolerance is not None:
             return self.centre + self.tolerance.below(share)
         return self.values[int(share * len(self.values))]
 
     def number(self, value: Any) -> float | None:
-        """A value as a number in SI units; None if it is none."""
+        """Return a value as a number in SI units; None if it is none."""
         try:
             return (
                 float(evaluate(str(value), self.unit or str(ANY_SI_UNIT)))
@@ -154,7 +154,7 @@ def dimensions_of(
 
 
 def _fits(number: Held, path: str) -> bool:
-    """Whether a number is what a path leads to, or stands in it."""
+    """Return whether a number is what a path leads to, or stands in it."""
     return any(fnmatchcase(each, pattern) for each in number[:2] for pattern in (path, f"{path}.*"))
 
 
@@ -319,7 +319,7 @@ class Design:
         return math.prod(len(each.values) for each in own)
 
     def values(self, point: int) -> dict[str, Any]:
-        """The value of each dimension at a point, by path."""
+        """Return the value of each dimension at a point, by path."""
         if self._shares is None:
             places = np.unravel_index(point, self._sizes) if self._sizes else ()
             found = {each.path: each.values[place] for each, place in zip(self._own, places, strict=True)}

@@ -126,7 +126,7 @@ class Executor(ABC):
                 yield from self._rows_of(future, given.pop(future))
 
     def _rows_of(self, future: Future[Answer], runs: Sequence[int]) -> Sequence[Row]:
-        """The rows of a task that has ended."""
+        """Return the rows of a task that has ended."""
         try:
             found = future.result()
         except Exception as error:

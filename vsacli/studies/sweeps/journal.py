@@ -152,7 +152,7 @@ class Journal:
         self._end += len(line)
 
     def row(self, run: int, key: str) -> Row:
-        """The row of a run that is there.
+        """Return the row of a run that is there.
 
         Raises:
             KeyError: it is not.

@@ -65,7 +65,7 @@ class Row(NamedTuple):
 
 
 def failed(run: int, key: str, reason: str) -> Row:
-    """The row of a run that could not be computed."""
+    """Return the row of a run that could not be computed."""
     return _without_values(run, key, FAILED, reason)
 
 
@@ -74,7 +74,7 @@ def _without_values(run: int, key: str, verdict: str, reason: str) -> Row:
 
 
 def lost(study: Study, run: int, how: str) -> Row:
-    """The row of a run whose process has ended."""
+    """Return the row of a run whose process has ended."""
     return failed(run, study.key(study.point(run)), f"{LOST} {how}")
 
 
@@ -90,7 +90,7 @@ class Computer:
         self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
 
     def row(self, run: int) -> Row:
-        """The row of a run; no error of the run is raised.
+        """Return the row of a run; no error of the run is raised.
 
         Raises:
             ChangedError: a file is not what it was.
@@ -202,5 +202,5 @@ def answer(job: Job, runs: Sequence[int]) -> Answer:
 
 @lru_cache(maxsize=4)
 def _computer(job: Job, _thread: int) -> Computer:
-    """The computer of a thread, kept for its next tasks: threads share none."""
+    """Return the computer of a thread, kept for its next tasks: threads share none."""
     return Computer(job.study())

@@ -34,7 +34,7 @@ from vsacli.trajectory.file import load_trajectory
 def settled_engine(
     name: str, robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> Settled:
-    """The engine of a study. Code is compiled for each robot, so it pays by the runs that each has.
+    """Return the engine of a study. Code is compiled for each robot, so it pays by the runs that each has.
 
     Args:
         name: as of `settle`.
@@ -209,7 +209,7 @@ class Study:
                 raise _changed(path)
 
     def as_named(self, error: InputError) -> InputError:
-        """An error that names files as the study does, relative to it: the same wherever it is computed."""
+        """Return the error with file names relative to the study, equal wherever it is computed."""
         folder = Path(self.source.path).parent
         return InputError(
             problem._replace(file=str(Path(problem.file).relative_to(folder)))

@@ -101,7 +101,7 @@ class Ways(OwnKind):
     words = "mapping from paths to values"
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """A tuple of `Varied`."""
+        """Return a tuple of `Varied`."""
         if not isinstance(node, tree.Mapping):
             return scope.unexpected(node, "a mapping from paths to values", label)
         found = []

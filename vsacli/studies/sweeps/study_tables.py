@@ -160,7 +160,7 @@ def _check_alike(parts: Sequence[StoredStudy]) -> None:
 
 
 def _order(parts: Sequence[StoredStudy]) -> IndexArray:
-    """The place of each run among all rows of the parts, one part after the other."""
+    """Return the place of each run among all rows of the parts, one part after the other."""
     runs = np.concatenate([part.read("run") for part in parts])
     lost = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
     order = np.full(parts[0].runs, -1)
@@ -174,7 +174,7 @@ def _order(parts: Sequence[StoredStudy]) -> IndexArray:
 
 
 def _arrays(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
-    """All columns of some runs, whose rows are those among all rows of the parts."""
+    """Return all columns of some runs, whose rows are those among all rows of the parts."""
     first = parts[0]
     texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}
     arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in texts}

@@ -67,7 +67,7 @@ class ClosedForm(ABC):
         """Value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """The same at the steps start..stop-1, whose times are `time`."""
+        """Return the same at the steps start..stop-1, whose times are `time`."""
         return self.at(time)
 
     @property
@@ -76,17 +76,17 @@ class ClosedForm(ABC):
         return None
 
     def stretched(self, factor: float) -> Self:
-        """The same profile, slower by a factor."""
+        """Return the same profile, slower by a factor."""
         first, last = self.span
         return replace(self, span=(first, stretch(last, first, factor)))
 
     @abstractmethod
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component."""
+        """Return the same profile with a constant added to each component."""
 
 
 def added(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
-    """The sum of two values of each component."""
+    """Return the sum of two values of each component."""
     return tuple(value + constant for value, constant in zip(values, by, strict=True))
 
 
@@ -108,5 +108,5 @@ class Constant(ClosedForm):
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component."""
+        """Return the same profile with a constant added to each component."""
         return replace(self, value=added(self.value, by))

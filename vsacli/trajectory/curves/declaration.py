@@ -63,20 +63,20 @@ class Use:
         return 2 if self.rigid else self.signal.orders - 1
 
     def one(self, role: str, **options: Any) -> Any:
-        """The field of a value, e.g. `role` "at the start"."""
+        """Return the field of a value, e.g. `role` "at the start"."""
         return self._field(self._kind, f"{self.signal.key} {role}", **options)
 
     def several(self, role: str) -> Any:
-        """The field of a list of values, e.g. `role` "to pass"."""
+        """Return the field of a list of values, e.g. `role` "to pass"."""
         plural = self.signal.key + ("es" if self.signal.key.endswith(("s", "ch")) else "s")
         return self._field(Items(self._kind), plural + role)
 
     def size(self, doc: str) -> Any:
-        """The field of a positive value in the unit of the signal, which may be absent."""
+        """Return the field of a positive value in the unit of the signal, which may be absent."""
         return value(self._kind, doc, check=POSITIVE, default=None)
 
     def frame(self) -> dict[str, Any]:
-        """The field that says along whose axes a wrench is given; none for other signals."""
+        """Return the field that says along whose axes a wrench is given; none for other signals."""
         if self.signal is not WRENCH:
             return {}
         doc = f"along whose axes `{' '.join(WRENCH_AXES)}` are given"
@@ -104,7 +104,7 @@ class Use:
 
 
 def odd(degrees: range, lowest: int, reason: str) -> Check:
-    """The odd degrees from the lowest on that is smooth enough."""
+    """Return the odd degrees from the lowest on that is smooth enough."""
     allowed = range(max(lowest, degrees.start), degrees.stop, degrees.step)
     words = f"odd, {allowed[0]} to {allowed[-1]} ({reason})"
     return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
@@ -124,7 +124,7 @@ class Declaration(ABC):
     @classmethod
     @abstractmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
 
     @classmethod
     def meaning(cls, _use: Use) -> str:
@@ -133,7 +133,7 @@ class Declaration(ABC):
 
     @classmethod
     def record(cls, use: Use) -> type[Self]:
-        """The record class in which it is declared for a use."""
+        """Return the record class in which it is declared for a use."""
         made: type[Self] = _record(cls, use)
         return made
 
@@ -165,7 +165,7 @@ class Recorded(Declaration):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         from vsacli.documents.columns_file import columns_field, ignore_field
         from vsacli.trajectory.fits import METHODS
 
@@ -231,7 +231,7 @@ class Formula(Declaration):
 
     @abstractmethod
     def over(self, span: tuple[float, float]) -> ClosedForm:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
         """What keeps it from lasting so long, in s."""
@@ -258,7 +258,7 @@ class Formula(Declaration):
 
 
 def same_time(one: float, other: float) -> bool:
-    """Whether two times are the same but for rounding."""
+    """Return whether two times are the same but for rounding."""
     return math.isclose(one, other, rel_tol=SAME_TIME)
 
 

@@ -61,12 +61,12 @@ class RestToRest(ClosedForm):
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component."""
+        """Return the same profile with a constant added to each component."""
         return replace(self, start=added(self.start, by), end=added(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:
-    """The polynomial from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
+    """Return the polynomial from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
 
     With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
     """
@@ -121,7 +121,7 @@ class Polynomial(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         degree = "degree of the polynomial"
         if use.signal is not POSITION:
             degree += f", odd, {DEGREES[0]} to {DEGREES[-1]}"
@@ -144,7 +144,7 @@ class Polynomial(Formula):
         return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
 
     def over(self, span: tuple[float, float]) -> RestToRest:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         start, end = numbers(self.start), numbers(self.end)
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
@@ -156,7 +156,7 @@ class Hold(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         return {**use.frame(), "value": use.one("all the time" + (AXES if use.signal is WRENCH else ""))}
 
     @classmethod
@@ -167,5 +167,5 @@ class Hold(Formula):
         return f"The same {use.signal.key} all the time."
 
     def over(self, span: tuple[float, float]) -> Constant:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         return Constant(signal=self.signal, span=span, value=numbers(self.value))

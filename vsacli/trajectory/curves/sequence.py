@@ -42,7 +42,7 @@ class Part(Declaration):
 
     @abstractmethod
     def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
-        """The profile over a span, in s, after a part that ends here."""
+        """Return the profile over a span, in s, after a part that ends here."""
 
     def own_problems(self) -> Iterator[FieldProblem]:
         """What keeps it from being executed."""
@@ -56,7 +56,7 @@ class _Timed(Part):
 
     @classmethod
     def fields(cls, _use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         return {"duration": number(units.TIME, "duration of the part", check=POSITIVE)}
 
     @property
@@ -72,7 +72,7 @@ class Dwell(_Timed):
     begins = None
 
     def placed(self, span: tuple[float, float], here: Position) -> Constant:
-        """The profile over a span, in s, after a part that ends here."""
+        """Return the profile over a span, in s, after a part that ends here."""
         return Constant(signal=POSITION, span=span, value=here)
 
 
@@ -86,7 +86,7 @@ class PolynomialPart(_Timed):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         degree = "degree of the polynomial"
         if not use.rigid:
             degree += ": from 9 on next to another part; from 5 on if all joints are rigid"
@@ -108,7 +108,7 @@ class PolynomialPart(_Timed):
         return self.start
 
     def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
-        """The profile over a span, in s, after a part that ends here."""
+        """Return the profile over a span, in s, after a part that ends here."""
         start = here if self.start is None else self.start
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
@@ -128,7 +128,7 @@ class _Standalone(Formula, Part):
         return start
 
     def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
-        """The profile over a span, in s."""
+        """Return the profile over a span, in s."""
         return self.over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
@@ -144,7 +144,7 @@ class ViaPart(Via, _Standalone):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         doc = "duration of the part, if there are no times"
         return {**super().fields(use), "duration": number(units.TIME, doc, check=POSITIVE, default=None)}
 
@@ -179,7 +179,7 @@ class SinusoidsPart(SumOfSinusoids, _Standalone):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         duration = number(units.TIME, "duration of the part", check=POSITIVE)
         return {**super().fields(use), "duration": duration}
 
@@ -204,7 +204,7 @@ class Sequence(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         parts = {name: part.record(use) for name, part in PARTS.items()}
         return {"parts": value(Items(OneOf(parts)), "what happens, in this order")}
 
@@ -271,11 +271,11 @@ class Sequence(Formula):
         return float(self._ends()[-1])
 
     def over(self, span: tuple[float, float]) -> Chain:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
 
     def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
-        """Each part with its profile."""
+        """Yield each part with its profile."""
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
         here = next(part.begins for part in self.parts if part.begins is not None)
         for part, piece in zip(self.parts, pairwise(ends), strict=True):

@@ -91,7 +91,7 @@ class Sinusoids(ClosedForm):
         return rows
 
     def lowest(self) -> Lowest:
-        """The smallest values over the span."""
+        """Return the smallest values over the span."""
         stretches = [self._sampled_lowest(time) for time in self._searched()]
         values, times = (np.stack(rows) for rows in zip(*stretches, strict=True))
         first = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
@@ -117,7 +117,7 @@ class Sinusoids(ClosedForm):
         yield np.array(self.span)
 
     def _sampled_lowest(self, time: FloatArray) -> Lowest:
-        """The smallest of the values at ascending times and at the extremes next to them."""
+        """Return the smallest of the values at ascending times and at the extremes next to them."""
         values = self.at(time)[0]
         found = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
         for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
@@ -140,11 +140,11 @@ class Sinusoids(ClosedForm):
         return (low + high) / 2
 
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component."""
+        """Return the same profile with a constant added to each component."""
         return replace(self, offset=added(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
-        """The sum without the offset."""
+        """Return the sum without the offset."""
         first, last = self.span
         turns = self.cycles * ((time - first) / (last - first))
         rows = np.zeros((self.signal.orders, self.components, len(time)))
@@ -195,7 +195,7 @@ class SumOfSinusoids(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         amplitudes = Items(PerJoint(use.signal.quantities[0], use.signal.key))
         subject = "robot" if use.signal is POSITION else use.signal.key
         about = "the joint moves" if use.signal is POSITION else "it swings"
@@ -229,7 +229,7 @@ class SumOfSinusoids(Formula):
                 yield FieldProblem((name,), f"at most {MAX_HARMONICS} harmonics are possible, not {count}")
 
     def over(self, span: tuple[float, float]) -> Sinusoids:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         duration = span[1] - span[0]
         return Sinusoids(
             signal=self.signal,

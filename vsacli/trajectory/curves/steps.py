@@ -86,7 +86,7 @@ class Chain(ClosedForm):
         return rows
 
     def stretched(self, factor: float) -> Self:
-        """The same profile, every part slower by a factor."""
+        """Return the same profile, every part slower by a factor."""
 
         def later(span: tuple[float, float]) -> tuple[float, float]:
             start, end = (stretch(time, self.span[0], factor) for time in span)
@@ -96,7 +96,7 @@ class Chain(ClosedForm):
         return replace(self, span=later(self.span), parts=parts)
 
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component of every part."""
+        """Return the same profile with a constant added to each component of every part."""
         return replace(self, parts=tuple(part.raised(by) for part in self.parts))
 
     def jumps(self, orders: int) -> Iterator[Jump]:
@@ -161,7 +161,7 @@ class Steps(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         degree = "degree of the polynomials that lead from level to level"
         times = "when the change to each further level begins, from the start on; one less than levels"
         axes = f" {AXES.removeprefix(', ')}" if use.signal is WRENCH else ""
@@ -192,7 +192,7 @@ class Steps(Formula):
             yield from super().problems_over(duration)
 
     def over(self, span: tuple[float, float]) -> Chain:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         starts = [span[0] + time for time in self.times]
         ends = [
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])

@@ -130,11 +130,11 @@ class ViaPoints(ClosedForm):
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """The same profile with a constant added to each component."""
+        """Return the same profile with a constant added to each component."""
         return replace(self, points=tuple(added(point, by) for point in self.points))
 
     def extremes(self) -> Extremes:
-        """The smallest and largest values, from the zeros of the first derivative.
+        """Return the smallest and largest values, from the zeros of the first derivative.
 
         Raises:
             InputError: as `at`.
@@ -182,7 +182,7 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
 
 
 def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
-    """Whether the expansions about neighbouring points meet half-way, with that many derivatives.
+    """Return whether the expansions about neighbouring points meet half-way, with that many derivatives.
 
     Values are compared with those of the points, derivatives with their peaks.
     """
@@ -204,7 +204,7 @@ def _unfit(degree: int) -> InputError:
 
 
 def _taylor_series(derivatives: Sequence[FloatArray], offset: FloatArray, orders: int) -> list[FloatArray]:
-    """The polynomial of given derivatives and its own derivatives of order 0 to orders-1, by Horner's rule.
+    """Return the polynomial of given derivatives, with its own of order 0 to orders-1, by Horner's rule.
 
     Args:
         derivatives: at the centre of each sample, from order 0 to the degree, each (components, samples).
@@ -247,7 +247,7 @@ class Via(Formula):
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
-        """The declared fields by name."""
+        """Return the declared fields by name."""
         degree = "degree of the spline"
         if use.signal is POSITION and not use.rigid:
             degree += "; from 3 on if all joints are rigid"
@@ -301,7 +301,7 @@ class Via(Formula):
         return None if self.times is None else self.times[-1]
 
     def over(self, span: tuple[float, float]) -> ViaPoints:
-        """The profile from the first to the last time of a span, in s."""
+        """Return the profile from the first to the last time of a span, in s."""
         points = tuple(map(numbers, self.points))
         if self.times is None:
             shares = passing_shares(points, self.degree)

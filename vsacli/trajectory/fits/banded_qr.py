@@ -120,7 +120,7 @@ class Posterior:
             self._roots[k] = _triangle(root.T).T
 
     def unknowns(self, right: FloatArray) -> FloatArray:
-        """The most probable values of the unknowns.
+        """Return the most probable values of the unknowns.
 
         Args:
             right: the transformed right-hand side, (blocks, `BLOCK`).
@@ -147,7 +147,7 @@ class Posterior:
 
 
 def _triangle(rows: FloatArray) -> FloatArray:
-    """The triangular factor of rows, (..., rows, columns), as mode "r" gives it in twice the time."""
+    """Return the triangular factor of rows, (..., rows, columns), as mode "r" gives it in twice the time."""
     from scipy.linalg.lapack import dgeqrf
 
     if rows.ndim > 2 and len(rows) > 1:

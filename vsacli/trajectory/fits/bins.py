@@ -166,7 +166,7 @@ class Bins:
         return self.start + self.span * places
 
     def stretch(self, first: int, spans: int) -> Bins:
-        """The bins of some spans, as if nothing else had been recorded.
+        """Return the bins of some spans, as if nothing else had been recorded.
 
         Args:
             first: index of the first of the spans.
@@ -251,7 +251,7 @@ class Bins:
 
 
 def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:
-    """The B-splines that are not zero on a span, first to last, on knots one apart.
+    """Return the B-splines that are not zero on a span, first to last, on knots one apart.
 
     Args:
         place: within the span, 0 to 1, (samples,).

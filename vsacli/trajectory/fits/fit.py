@@ -111,7 +111,7 @@ class Part:
             return None
 
     def stretched(self, factor: float) -> Part:
-        """The same spline, slower by a factor, from the same first time on."""
+        """Return the same spline, slower by a factor, from the same first time on."""
         from scipy.interpolate import BSpline
 
         knots = stretch(self.spline.t, self.knots[0], factor)
@@ -177,7 +177,7 @@ class Fit:
         return rows
 
     def stretched(self, factor: float) -> Fit:
-        """The same spline, slower by a factor, from the same first time on."""
+        """Return the same spline, slower by a factor, from the same first time on."""
         parts = tuple(part.stretched(factor) for part in self.parts)
         return replace(self, parts=parts, time=stretch(self.time, self.time[0], factor))
 
@@ -236,7 +236,7 @@ def join(
     noise: FloatArray,
     given: FloatArray,
 ) -> Fit:
-    """The fit that consists of parts.
+    """Return the fit that consists of parts.
 
     Args:
         degree: of their splines.

@@ -44,7 +44,7 @@ def mismatches(
     *,
     start: float = 0.0,
 ) -> Iterator[str]:
-    """A sentence for each column of given derivatives that does not follow from the fit of the values.
+    """Yield a sentence for each column of given derivatives that does not follow from the fit of the values.
 
     The doubtful stretches at both ends play no part, or the first and last quarter if these are shorter. A
     column differs if the root mean square of the difference exceeds 5 % of that of the fit's derivative, plus

@@ -29,12 +29,12 @@ FINE_RATIOS = (2.0, 2.0**0.5, 2.0**0.25)
 
 
 def most_spans(samples: int, degree: int) -> int:
-    """The largest number of spans tried: half as many coefficients as samples, to tell noise by the rest."""
+    """Return the largest number of spans: half as many coefficients as samples, the rest shows noise."""
     return max(1, samples // 2 - degree)
 
 
 def fit_spline(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpline[np.float64]:
-    """The spline nearest to samples, with as many samples in each knot span.
+    """Return the spline nearest to samples, with as many samples in each knot span.
 
     Banded normal equations, solved once more for the residual: that gives back the digits that squaring the
     condition number costs (corrected seminormal equations, Björck, Numerical Methods for Least Squares
@@ -58,7 +58,7 @@ def fit_spline(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> B
 
 
 def best_spans(time: FloatArray, rows: FloatArray, degree: int) -> IndexArray:
-    """The number of knot spans for each row, by generalised cross-validation (Craven & Wahba, 1979).
+    """Return the number of knot spans for each row, by generalised cross-validation (Craven & Wahba, 1979).
 
     It minimises RSS / (1 - 1.4 coefficients/samples)^2, see `PENALTY`. Rows choose for themselves: one knot
     spacing for all would pass the noise of a slow joint through the knots of the fastest. Of successive
@@ -176,7 +176,7 @@ class LocalBasis(NamedTuple):
 
 
 def local_basis(knots: FloatArray, degree: int, time: FloatArray, orders: int) -> LocalBasis:
-    """The B-splines at some times: recurrence of Cox and de Boor, for derivatives that of their coefficients.
+    """Return the B-splines at times (Cox-de Boor recurrence), or their derivatives by their coefficients.
 
     Args:
         knots: all of the spline, those beyond both ends included, s.

@@ -56,7 +56,7 @@ def estimated_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArra
 
 
 def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
-    """Whether there is noise that neighbouring samples hardly show, since a filter took it, (components,).
+    """Return whether there is noise that a filter hides from neighbouring samples, (components,).
 
     Differences of every second, fourth, ... sample grow by 2^order each time as long as motion is smooth over
     so many samples, those of filtered noise by less and less.
@@ -92,7 +92,7 @@ def _strides(samples: int, order: int) -> list[int]:
 
 
 def _typical(time: FloatArray, rows: FloatArray, order: int, stride: int) -> FloatArray:
-    """The standard deviation of normal differences with the same median, while moving, (components,)."""
+    """Return the standard deviation of normal differences with the same median, in motion, (components,)."""
     last = len(time) - 1 - order * stride
     first = np.unique(np.linspace(0, last, min(PROBES, last + 1)).astype(int))
     sizes = np.abs(_differences(time, rows, order, first, stride))
@@ -271,7 +271,7 @@ def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
-    """Whether an encoder's steps explain a residual: at constant velocity they leave lines, no vibration.
+    """Return whether steps of an encoder explain a residual: at constant velocity they are lines.
 
     Args:
         row: (samples,), what was recorded.

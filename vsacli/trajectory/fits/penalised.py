@@ -223,7 +223,7 @@ def _freedom(bins: Bins) -> int:
 
 
 def _derivative_rows(places: FloatArray, degree: int, order: int) -> FloatArray:
-    """A derivative of the B-splines of a span whose knots are one apart, (places, degree + 1)."""
+    """Return a derivative of the B-splines of a span whose knots are one apart, (places, degree + 1)."""
     lower = np.stack(uniform_basis(places, degree - order), axis=1)
     for _ in range(order):
         lower = -np.diff(lower, prepend=0, append=0, axis=1)
@@ -282,6 +282,6 @@ def motion_power(model: Model, order: int, bands: int, weight: FloatArray) -> Mo
 
 
 def falls(model: Model, order: int) -> bool:
-    """Whether the spectrum of a derivative falls towards the cut-off, as that of no impulse does."""
+    """Return whether the spectrum of a derivative falls towards the cut-off, as that of no impulse does."""
     lowest_last = motion_power(model, order, BANDS, model.inside / np.sum(model.inside)).found
     return bool(lowest_last[-1] > FALLING * max(lowest_last[0], 0.0))

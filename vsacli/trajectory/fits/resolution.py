@@ -48,7 +48,7 @@ LEAST_GAIN = 0.05
 
 
 def most_likely(bins: Bins, coarser: Model | None) -> Model:
-    """The model of the largest restricted likelihood that the search finds.
+    """Return the model of the largest restricted likelihood that the search finds.
 
     Args:
         bins: of the record.
@@ -250,7 +250,7 @@ def find_resolution(
     known: KnownNoise,
     below: float = np.inf,
 ) -> Resolution | None:
-    """The first resolution that the next one confirms, or that of a given bandwidth.
+    """Return the first resolution that the next one confirms, or that of a given bandwidth.
 
     Coarse to fine, since it is the band that counts: above the frequency at which the motion falls below the
     noise, whatever colour this has does not matter, and only a resolution beyond it would have to know it.
@@ -310,7 +310,7 @@ def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> li
 
 
 def _models(moments: Iterable[Moments], known: KnownNoise) -> Iterator[Model]:
-    """The most likely model of each resolution, coarse to fine."""
+    """Yield the most likely model of each resolution, coarse to fine."""
     model: Model | None = None
     for each in moments:
         bins = Bins.of(each, known.deviation)

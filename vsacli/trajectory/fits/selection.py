@@ -66,7 +66,7 @@ class Record(NamedTuple):
 
 
 def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | None = None) -> Part:
-    """A smoothing spline of one component; a polynomial by least squares if there can be none."""
+    """Return a smoothing spline of one component; a polynomial by least squares if there can be none."""
     row, members = record.values[member], np.array([member])
     found = smoothing_spline(record.time, row, degree, record.order, known or record.known[member])
     if found is None:
@@ -143,7 +143,7 @@ def _size(part: Part, order: int) -> float:
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:
-    """The smoothing spline of a component; one that follows a vibration, which may be motion."""
+    """Return the smoothing spline of a component; one that follows a vibration, which may be motion."""
     judge = smooth_part(record, member, degree)
     known, lines = record.known[member], judge.smoothing and judge.smoothing.lines
     if not lines or lines.share < VIBRATION or known.bandwidth is not None:
@@ -155,7 +155,7 @@ def _judge(record: Record, member: int, degree: int) -> Part:
 
 
 def _better(judge: Part, difference: float, record: Record, filtered: bool) -> bool:
-    """Whether a smoothing spline is to stand for a component instead of one through its samples.
+    """Return whether a smoothing spline is to stand for a component instead of one through its samples.
 
     If no resolution is accepted, noise must spoil the latter. If noise was filtered, it must differ by more
     than the smoothing spline's own deviation explains.
@@ -181,7 +181,7 @@ def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
 
 
 def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
-    """All parts, some components taken out of them and put in again by themselves."""
+    """Return all parts, some components taken out of them and put in again by themselves."""
     taken = np.concatenate([part.members for part in instead])
     kept: list[Part] = []
     for part in parts:

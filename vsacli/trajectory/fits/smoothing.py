@@ -49,7 +49,7 @@ class Calibration(NamedTuple):
 
 
 def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
-    """The deviations of value and derivatives.
+    """Return the deviations of value and derivatives.
 
     Args:
         model: the spline.
@@ -78,7 +78,7 @@ def posterior_error(model: Model, order: int) -> float:
 
 
 def _bias_share(model: Model, order: int) -> float:
-    """The squared bias of a derivative, as share of what the prior expects, by the motion at the cut-off.
+    """Return the squared bias of a derivative as a share of the prior, by the motion at the cut-off.
 
     What lies above the cut-off is extrapolated: if the spectrum falls more slowly than the prior's, it is
     more again.
@@ -167,7 +167,7 @@ class Smoothing:
 def smoothing_spline(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> tuple[BSpline[np.float64], Smoothing] | None:
-    """The smoothing spline near samples at the resolution that the record asks for.
+    """Return the smoothing spline near samples at the resolution that the record asks for.
 
     Args:
         time: (samples,), s.
@@ -213,7 +213,7 @@ def smoothing_spline(
 def _found(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> Resolution | None:
-    """The resolution that the record asks for, and no mains hum, which a fine one follows like a motion."""
+    """Return the resolution of the recording, without mains hum, which a fine one follows like a motion."""
     found = find_resolution(time, row, degree, order, known)
     if found is None or found.given:
         return found

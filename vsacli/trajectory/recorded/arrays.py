@@ -46,7 +46,7 @@ def profiles_of_arrays(
 def _recorded(
     signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
 ) -> Iterator[Samples]:
-    """The samples of a signal, if there are any."""
+    """Yield the samples of a signal, if there are any."""
     if values is not None:
         yield samples_of_arrays(signal, times, values, *derivatives)
     elif any(given is not None for given in derivatives):
@@ -73,7 +73,7 @@ def samples_of_arrays(
 
 
 def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatArray:
-    """The array as float64; None in the shape stands for any length.
+    """Return the array as float64; None in the shape stands for any length.
 
     Raises:
         InputError: the array holds something else than numbers, or has another shape.

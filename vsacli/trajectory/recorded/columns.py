@@ -65,7 +65,7 @@ class ColumnLayout:
 
 
 def known_columns(joints: CommandedJoints) -> set[str]:
-    """Every name that a column of a recorded trajectory of these joints may have."""
+    """Return every name that a column of a recorded trajectory of these joints may have."""
     return _known(_of_every_joint(joints))
 
 
@@ -148,7 +148,7 @@ def _layout(
 
 
 def _columns(pattern: str, joints: CommandedJoints) -> Way:
-    """The columns of the joints, those of each signal for the joints that take it."""
+    """Return the columns of the joints, those of each signal for the joints that take it."""
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1)
@@ -160,7 +160,7 @@ def _columns(pattern: str, joints: CommandedJoints) -> Way:
 
 
 def _of_signals(ways: Sequence[Way]) -> dict[str, set[str]]:
-    """All columns of each commanded signal, by its key."""
+    """Return all columns of each commanded signal, by its key."""
     return {
         key: {column for way in ways for name in signal.names for column in way[name].values()}
         for key, signal in COMMANDED.items()
@@ -194,7 +194,7 @@ def _strangers(
 
 
 def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
-    """Whether no column is known but the time, and some are like none that is: no slips, but other names."""
+    """Return whether only the time is known, and other names are no slips of known ones."""
     columns = [name for name in names if name != TIME]
     signals = [name for name in known if name != TIME]
     none_known = not any(name in known for name in columns)
@@ -233,7 +233,7 @@ def _measured(
     joints: CommandedJoints,
     problems: list[str],
 ) -> Iterator[tuple[str, Column]]:
-    """The columns that are used, by name; notes units that cannot be converted."""
+    """Yield the columns that are used, by name; notes units that cannot be converted."""
     types = tuple(joints.types.values())
     expected = {TIME: VARIABLES[TIME].quantity.unit("")}
     for quantity, columns in way.items():

@@ -42,7 +42,7 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
 
 
 def _even(elapsed: FloatArray) -> FloatArray:
-    """The nearest multiples of a step that is the last time over a whole number."""
+    """Return the nearest multiples of a step that is the last time over a whole number."""
     steps = np.diff(elapsed)
     step = float(np.mean(steps[steps < LOST * np.median(steps)]))
     places = np.round(elapsed / (elapsed[-1] / np.round(elapsed[-1] / step)))
@@ -50,7 +50,7 @@ def _even(elapsed: FloatArray) -> FloatArray:
 
 
 def resolution(stamps: FloatArray) -> float:
-    """The last digit of stamps, s: of their decimals, or of their floating-point numbers."""
+    """Return the last digit of stamps, s: of their decimals, or of their floating-point numbers."""
     few = stamps[:: max(1, len(stamps) // 1000)]
     rounding = _rounding(stamps)
     for decimals in range(MOST_DECIMALS + 1):

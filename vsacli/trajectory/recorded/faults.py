@@ -96,7 +96,7 @@ class _Event(NamedTuple):
 
 
 def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
-    """The largest."""
+    """Return the largest."""
     if not centres.size:
         return []
     starts = np.flatnonzero(np.append(True, np.diff(centres) > ORDER))
@@ -108,7 +108,7 @@ def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
 
 
 def _at_ends(values: FloatArray, grain: Grain) -> Iterator[tuple[int, float]]:
-    """The first and the last sample if the next ones predict it far worse than they do each other."""
+    """Yield the first and the last sample if the next ones predict it far worse than they do each other."""
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
@@ -120,7 +120,7 @@ def _at_ends(values: FloatArray, grain: Grain) -> Iterator[tuple[int, float]]:
 
 
 def _isolated(time: FloatArray, values: FloatArray, event: _Event, grain: Grain) -> list[tuple[int, float]]:
-    """The samples without which all near them lie on a polynomial, and by what they are off; mostly none."""
+    """Return outliers: samples off the polynomial through all others near them, with their distances."""
     if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
@@ -176,7 +176,7 @@ def frozen(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
 def _catches_up(
     time: FloatArray, values: FloatArray, grain: Grain, first: IndexArray, last: IndexArray
 ) -> BoolArray:
-    """Whether after each run the signal jumps to where the speeds before and after it lead."""
+    """Return whether after each run the signal jumps to where the speeds before and after it lead."""
     after = last + 1
     before_speed = _speed(time, values, first - SPEED_SAMPLES, first)
     after_speed = _speed(time, values, after, after + SPEED_SAMPLES)
@@ -193,7 +193,7 @@ def _speed(time: FloatArray, values: FloatArray, start: IndexArray, stop: IndexA
 
 
 def _stops_abruptly(values: FloatArray, grain: Grain, first: int, last: int) -> bool:
-    """Whether a run at an end of the record begins, or ends, at full speed."""
+    """Return whether a run at an end of the record begins, or ends, at full speed."""
     reach = SPEED_SAMPLES + 1
     near = values[max(0, first - reach) : first + 1] if first else values[last : last + reach + 1][::-1]
     steps = np.diff(near)

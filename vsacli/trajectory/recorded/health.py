@@ -129,7 +129,7 @@ def _lasting(faults: Faults, stamps: FloatArray) -> str:
 
 
 def _extent(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
-    """The size of the only one, or of the worst with its time."""
+    """Return the size of the only one, or of the worst with its time."""
     size = sizes[faults.worst]
     when = time_text(float(stamps[faults.first[faults.worst]]))
     return size if faults.count == 1 else f"up to {size} (at t = {when})"

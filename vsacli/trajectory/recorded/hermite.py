@@ -74,11 +74,11 @@ class HermiteSpline:
         return interpolated(self.time, self.rows, time)
 
     def samples(self, start: int, stop: int, _time: FloatArray, /) -> FloatArray:
-        """The same at the samples start..stop-1, as given."""
+        """Return the same at the samples start..stop-1, as given."""
         return self.rows[:, :, start:stop]
 
     def stretched(self, factor: float) -> HermiteSpline:
-        """The same profile, slower by a factor."""
+        """Return the same profile, slower by a factor."""
         scale = factor ** np.arange(len(self.rows))[:, None, None]
         return replace(self, time=factor * self.time, rows=self.rows / scale)
 
@@ -99,7 +99,7 @@ def interpolated(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArr
 
 
 def belong_together(time: FloatArray, rows: FloatArray) -> bool:
-    """Whether samples with all their derivatives are those of one smooth function.
+    """Return whether samples with all their derivatives are those of one smooth function.
 
     Derivatives that were measured, or rounded to a few digits, are not: the polynomials between them swing.
 
@@ -149,7 +149,7 @@ def _coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> Flo
 
 
 def _derivative(coefficients: FloatArray, order: int, share: FloatArray) -> FloatArray:
-    """A derivative of polynomials with coefficients (powers, components, times), by Horner's rule."""
+    """Return a derivative of polynomials with coefficients (powers, components, times), by Horner's rule."""
     total: FloatArray = np.zeros_like(coefficients[0])
     for power in range(len(coefficients) - 1, order - 1, -1):
         total = total * share + math.perm(power, order) * coefficients[power]

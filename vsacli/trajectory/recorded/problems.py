@@ -68,7 +68,7 @@ def value_problems(samples: Samples) -> Iterator[SampleProblem]:
 def _breach(
     quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
 ) -> Iterator[SampleProblem]:
-    """The first sample at which a requirement does not hold, and how many there are."""
+    """Yield the first sample at which a requirement does not hold, and how many there are."""
     if holds.all():
         return
     first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))

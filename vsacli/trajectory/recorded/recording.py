@@ -62,7 +62,7 @@ class Recording:
     rated: bool = False
 
     def times_at(self, rate: float | None, file: str) -> Times:
-        """The times of a trajectory that is recorded here: those of the samples, or equally spaced ones.
+        """Return the times of a recorded trajectory: those of the samples, or equally spaced ones.
 
         Args:
             rate: samples per second; None if the recorded times are meant.
@@ -216,7 +216,7 @@ def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[
 
 
 def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
-    """The types of joints whose position has no unit in the header, by index."""
+    """Return the types of joints whose position has no unit in the header, by index."""
     headings = {
         index: table.columns[column.index]
         for index, column in layout.quantities.get(POSITION.names[0], {}).items()
@@ -234,7 +234,7 @@ def _rows(table: Table, columns: Mapping[int, Column], components: int) -> Float
 
 
 def _si(table: Table, column: Column) -> FloatArray:
-    """A column in SI; divided rather than multiplied where that is exact, so that 3 ms are 0.003 s."""
+    """Return a column in SI; divided rather than multiplied where that is exact, so that 3 ms are 0.003 s."""
     values = np.ascontiguousarray(table.values[:, column.index])
     divisor = round(1 / column.factor)
     if divisor > 1 and math.isclose(divisor * column.factor, 1, rel_tol=1e-14):
@@ -257,7 +257,7 @@ def recorded_trajectory(
     progress: Progress = unseen,
     rate: float | None = None,
 ) -> Trajectory:
-    """A trajectory whose position and commanded signals come from one CSV file, named after the file.
+    """Return a trajectory whose position and commanded signals come from one CSV file, named after the file.
 
     Args:
         path: the file.

@@ -98,7 +98,7 @@ class Samples:
             )
 
     def stretched(self, factor: float) -> Samples:
-        """The same values further apart; what was given of derivatives becomes smaller."""
+        """Return the same values further apart; what was given of derivatives becomes smaller."""
         derivatives = tuple(
             None if given is None else given / factor**order
             for order, given in enumerate(self.derivatives, start=1)
@@ -194,7 +194,7 @@ class SampledProfile:
         return self if self.fitted else None
 
     def summary(self) -> dict[str, Any]:
-        """The fit in JSON values, for the report: see `describe`."""
+        """Return the fit in JSON values, for the report: see `describe`."""
         return describe(self.record.signal.names[0], self.record.labels, self.fit)
 
     @property
@@ -275,7 +275,7 @@ class SampledProfile:
         return list(unresolved(self.fit, self.signal.orders))
 
     def stretched(self, factor: float) -> SampledProfile:
-        """The same profile, slower by a factor; the warnings are those about the record."""
+        """Return the same profile, slower by a factor; the warnings are those about the record."""
         return replace(
             self,
             record=self.record.stretched(factor),

@@ -51,7 +51,7 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
 
 
 def step_text(step: float) -> str:
-    """A short time in its unit."""
+    """Return a short time in its unit."""
     size, unit = (step, "s") if step >= 1 else (1e3 * step, "ms") if step >= 9.9e-4 else (1e6 * step, "us")
     return f"{size:.3g} {unit}"
 

@@ -125,7 +125,7 @@ class LevelCurves:
         self._width = phi[1] - phi[0], theta_2[1] - theta_2[0]
 
     def spot(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> Spot:
-        """The point at a deflection, a position of motor 2 and one of the joint."""
+        """Return the point at a deflection, a position of motor 2 and one of the joint."""
         u = self._potential.derivatives(np.stack((phi, s, q), axis=-1), ROWS)
         rows, (by_phi, by_s) = u.rows, self._width
         return Spot(
@@ -140,7 +140,7 @@ class LevelCurves:
         )
 
     def moved(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
-        """A point moved by a part of the ranges."""
+        """Return a point moved by a part of the ranges."""
         return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
 
     def onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
@@ -171,7 +171,7 @@ class LevelCurves:
     def step(
         self, spot: Spot, h: FloatArray, tau_e: FloatArray, q: FloatArray, dq: FloatArray | float = 0.0
     ) -> tuple[Spot, BoolArray]:
-        """A step of length h along a level curve and onto that of tau_e, and whether it stays on the piece.
+        """Return a step of length h along a level curve, back onto tau_e, and whether it stays on the piece.
 
         Args:
             spot: where to begin.
@@ -250,7 +250,7 @@ class Branch:
             return self._followed(self.start.tau_e, np.zeros(1)).high
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """The reachable stiffness, and phi and theta_2 for the one in it; see `Mechanism.solve`."""
+        """Return the reachable stiffness, and phi and theta_2 for the one in it; see `Mechanism.solve`."""
         with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
             seed, low, high = self._piece(tau_e, q)
             none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
@@ -270,7 +270,10 @@ class Branch:
         )
 
     def _piece(self, tau_e: FloatArray, q: FloatArray) -> Piece:
-        """The pieces at torques and positions; the last ones are kept, since searches ask for them often."""
+        """Return the pieces at torques and positions.
+
+        The last ones are kept, since searches ask for them often.
+        """
         if not isinstance(tau_e, np.ndarray):
             return self._followed(tau_e, q)
         known = self._known
@@ -279,7 +282,7 @@ class Branch:
         return known[1]
 
     def _followed(self, tau_e: FloatArray, q: FloatArray) -> Piece:
-        """The pieces, by walks to both ends, which run side by side."""
+        """Return the pieces, by walks to both ends, which run side by side."""
         seed, count = self._seed(tau_e, q), len(tau_e)
         both = [np.concatenate((each, each)) for each in (tau_e, q, *seed)]
         side = np.concatenate((np.full_like(tau_e, -1.0), np.ones_like(tau_e)))
@@ -287,7 +290,7 @@ class Branch:
         return Piece(seed, Spot(*(each[:count] for each in ends)), Spot(*(each[count:] for each in ends)))
 
     def _seed(self, tau_e: FloatArray, q: FloatArray) -> Spot:
-        """A point of the branch at torques and positions, NaN where there is none.
+        """Return a point of the branch at torques and positions, NaN where there is none.
 
         While these move to their values in proportion, the point moves along the level curve towards where it
         has room on all sides, so that it goes on where the piece becomes short.
@@ -344,7 +347,10 @@ class Branch:
         return self._curves.spot(end.phi, end.s, q)
 
     def _met(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
-        """The point of the piece with a stiffness; near it, by Newton's method for torque and stiffness."""
+        """Return the point of the piece with a stiffness.
+
+        Near it, by Newton's method for torque and stiffness.
+        """
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
         spot = self._walk(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):

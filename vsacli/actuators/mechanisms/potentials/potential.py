@@ -93,7 +93,7 @@ class Potential(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A spring on an arm whose length motor 2 sets; on a slide a spring that motor 2 makes stiffer."""
+        """Return a spring on an arm of variable length; on a slide, a spring of variable stiffness."""
         if joint_type == "prismatic":
             return {
                 "energy": "k/2 * (theta_2/l)^2 * phi^2",
@@ -124,7 +124,7 @@ class Potential(Mechanism):
         return (*self._gaps(), *self._poles())
 
     def _gaps(self) -> Iterator[str]:
-        """The place nearest to the start, of a grid over the ranges, where the energy is no number."""
+        """Yield the place nearest to the start, of a grid over the ranges, where the energy is no number."""
         shares = (np.arange(GRID) + 0.5) / GRID
         ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
         axes = [low + (high - low) * shares for low, high in ends]
@@ -150,7 +150,7 @@ class Potential(Mechanism):
         return self._branch.solve(tau_e, stiffness, q)
 
     def state(self, coordinates: FloatArray) -> PotentialState:
-        """The potential with its derivatives."""
+        """Return the potential with its derivatives."""
         return PotentialState(self._potential, coordinates)
 
     @cached_property
@@ -198,7 +198,7 @@ class Potential(Mechanism):
                 yield FieldProblem(("start", motor), reason)
 
     def _branch_problems(self) -> Iterator[FieldProblem]:
-        """The state at the start, and whether the stiffness can be followed from there to both its ends."""
+        """Yield the state at the start, and whether the stiffness can be followed from there to both ends."""
         start = self._branch.start
         with np.errstate(all="ignore"):
             (sine,), (stiffness,) = np.abs(start.sine), start.stiffness

@@ -28,7 +28,7 @@ RESERVED = frozenset({*VARIABLES, "pi", *FUNCTIONS})
 
 
 def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
-    """The expression of a potential.
+    """Return the expression of a potential.
 
     Raises:
         ExpressionError: the text is none.
@@ -86,7 +86,7 @@ class PotentialEnergy:
         return RowFunction(trace(lambda rows: self._series(rows, truncation), [Kind.REAL] * 3))
 
     def _series(self, coordinates: Sequence[FloatArray], truncation: Truncation) -> list[FloatArray]:
-        """The derivatives in the truncation's order, from rows of phi, theta_2 and q."""
+        """Return the derivatives in the truncation's order, from rows of phi, theta_2 and q."""
         phi, s, q = coordinates
         names = {
             "q": truncation.linear(q, (1, 0, 0)),
@@ -108,7 +108,7 @@ class Derivatives:
         self._by_order = by_order
 
     def __call__(self, *variables: int) -> FloatArray:
-        """The derivative over variables, each by its number 0, 1 or 2."""
+        """Return the derivative over variables, each by its number 0, 1 or 2."""
         return self._by_order[variables.count(0), variables.count(1), variables.count(2)]
 
     @property

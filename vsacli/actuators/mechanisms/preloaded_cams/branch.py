@@ -96,7 +96,7 @@ LiftOf = Callable[[FloatArray], Lift]
 def map_branch(
     lift: LiftOf, domain: tuple[float, float], k: float, pretension: tuple[float, float]
 ) -> Branch:
-    """The branch of a cam.
+    """Return the branch of a cam.
 
     Args:
         lift: over deflections from rest, which is the minimum.
@@ -137,7 +137,7 @@ class _Nodes(NamedTuple):
         )
 
     def take(self, chosen: IndexArray | slice) -> _Nodes:
-        """Some of the nodes."""
+        """Return some of the nodes."""
         return _Nodes(*(values[chosen] for values in self))
 
     def merged(self, others: _Nodes) -> _Nodes:
@@ -245,7 +245,7 @@ class _Side:
         return nodes
 
     def _at_rest(self, near: _Nodes) -> _Nodes:
-        """The node without torque, from one next to it.
+        """Return the node without torque, from one next to it.
 
         There the deflection grows as the torque, only to a fold as its cube root.
         """
@@ -272,7 +272,7 @@ class _Side:
         )
 
     def _inner_ends(self, tau_e: FloatArray, outer: FloatArray) -> tuple[FloatArray, IndexArray]:
-        """The first end of the branch beyond the outer one, and which it is."""
+        """Return the first end of the branch beyond the outer one, and which it is."""
         inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
         beyond = self._phi > outer[:, None]
         for which, curve in self._ends.items():

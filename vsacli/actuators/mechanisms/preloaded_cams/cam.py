@@ -109,7 +109,7 @@ def _lift(spline: PPoly) -> PPoly:
 
 
 def _least(phi: FloatArray, lift: FloatArray) -> float:
-    """The smallest g: a share of that of a parabola as high as the lift."""
+    """Return the smallest g: a share of that of a parabola as high as the lift."""
     return LEAST_CURVATURE_SHARE * 2 * float(np.ptp(lift)) / float(np.abs(phi).max()) ** 2
 
 
@@ -144,7 +144,7 @@ def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
 
 
 def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
-    """Whether lifts are those of the opposite deflections."""
+    """Return whether lifts are those of the opposite deflections."""
     return all(
         np.allclose(column, other[::-1], rtol=0, atol=ROUNDING_SHARE * float(np.ptp(column)))
         for column, other in ((phi, -phi), (lift, lift))
@@ -175,7 +175,7 @@ class Cam(PreloadedCam):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """The cam of the example that comes along."""
+        """Return the cam of the example that comes along."""
         return {"k": 40000, "r": 0.005, "pretension": [0.001, 0.02], "profile": "cam_profile.csv"}
 
     @cached_property
@@ -183,7 +183,7 @@ class Cam(PreloadedCam):
         return fit_profile(*self.profile.values.T)
 
     def _misfits(self) -> Iterator[Problem]:
-        """The point that the fitted curve misses most, if it is that of another cam."""
+        """Yield the point that the fitted curve misses most, if it is that of another cam."""
         row, share = worst_misfit(self.profile, self._fitted.misfit)
         if share > LARGEST_MISFIT:
             missed = f"misses the lift {self.profile.values[row, 1]:.4g} by {100 * share:.2g} % of its range"
@@ -214,7 +214,7 @@ class Cam(PreloadedCam):
         return float(self.profile.values[0, 0]), float(self.profile.values[-1, 0])
 
     def lift(self, from_rest: FloatArray) -> Lift:
-        """The fitted curve."""
+        """Return the fitted curve."""
         return Lift(*self._fitted.curve(from_rest, 0, 4))
 
 

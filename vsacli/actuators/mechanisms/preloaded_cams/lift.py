@@ -31,7 +31,7 @@ class LinearInTorque(NamedTuple):
     b_slope: FloatArray
 
     def at(self, tau_e: FloatArray) -> FloatArray:
-        """The function at a torque."""
+        """Return the function at a torque."""
         return self.a + self.b * tau_e
 
     def slope(self, tau_e: FloatArray) -> FloatArray:
@@ -61,7 +61,7 @@ class Lift(NamedTuple):
         return self._replace(l1=-self.l1, l3=-self.l3)
 
     def after(self, step: FloatArray) -> Lift:
-        """The lift after a short step of the deflection, by Taylor's formula with the derivatives known."""
+        """Return the lift after a short step of the deflection, by Taylor's formula."""
         half, third, fourth = step / 2, step / 3, step / 4
         return Lift(
             self.l + step * (self.l1 + half * (self.l2 + third * (self.l3 + fourth * self.l4))),

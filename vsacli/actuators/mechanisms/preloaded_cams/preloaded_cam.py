@@ -57,7 +57,7 @@ class PreloadedCam(Mechanism):
 
     @abstractmethod
     def lift(self, from_rest: FloatArray) -> Lift:
-        """The lift from its minimum over the deflection from there."""
+        """Return the lift from its minimum over the deflection from there."""
 
     @property
     def setting_range(self) -> tuple[float, float]:

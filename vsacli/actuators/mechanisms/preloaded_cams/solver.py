@@ -105,7 +105,7 @@ class CamSolver:
         )
 
     def _piece(self, tau_e: FloatArray) -> Piece:
-        """The branch between its ends."""
+        """Return the branch between its ends."""
         k, (least, most) = self.k, self.pretension
         guess = self.branch.ends(tau_e)
         held, fold, peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
@@ -168,7 +168,7 @@ class CamSolver:
         return phi, Lift(*lift)
 
     def _first_guess(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
-        """The root if the lift were a parabola, whose curvature is that at the inner end."""
+        """Return the root if the lift were a parabola, whose curvature is that at the inner end."""
         curvature = np.maximum(piece.curvature, self._least_curvature)
         scale = np.sqrt(demand / (3 * self.k))
         load = 1.5 * tau_e * curvature / (demand * scale)
@@ -176,7 +176,7 @@ class CamSolver:
         return np.where(demand > 0, slope / curvature, piece.inner.phi)
 
     def _step(self, state: Values, constants: Values) -> tuple[Values, BoolArray]:
-        """A step to the root of the parabola that touches g, between the ends; else half way between them."""
+        """Return a step to the root of a parabola touching g, if between the ends; else to their middle."""
         (phi, low, high, *_), (tau_e, demand, sign) = state, constants
         lift = self.lift(phi)
         squared, growth = self.k * lift.l1 * lift.l1, self.k * lift.l1 * lift.l2
@@ -195,7 +195,7 @@ class CamSolver:
         return (target, low, high, error, *lift.after(step)), ~(error > STEP_RTOL)
 
     def _bracketed(self, tau_e: FloatArray, demand: FloatArray, low: FloatArray, high: FloatArray) -> Values:
-        """The deflection, and the lift there, by bracketing."""
+        """Return the deflection, and the lift there, by bracketing."""
 
         def g(phi: FloatArray, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
             lift = self.lift(phi)

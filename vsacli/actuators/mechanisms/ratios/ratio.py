@@ -53,7 +53,7 @@ class Sine:
         return (-self.k / self.ratio, self.k / self.ratio)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """The inverse, asin(ratio torque/k)/ratio."""
+        """Return the inverse, asin(ratio torque/k)/ratio."""
         return np.arcsin(torque * (self.ratio / self.k)) / self.ratio
 
     def deflection_at(self, quotient: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ class SineRatio(Mechanism):
 
     @abstractmethod
     def setting(self, scale: FloatArray) -> FloatArray:
-        """The setting s at which K(s) has a value."""
+        """Return the setting s at which K(s) has a value."""
 
     @property
     @abstractmethod
@@ -188,7 +188,7 @@ class Awas(SineRatio):
         return Scale(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
 
     def setting(self, scale: FloatArray) -> FloatArray:
-        """The arm is sqrt(K/k)."""
+        """Return the arm, sqrt(K/k)."""
         return np.sqrt(scale / self.k) / self.lead
 
 
@@ -219,7 +219,7 @@ class Lever(SineRatio):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """A pivot that moves over half of a lever of 10 cm."""
+        """Return a pivot that moves over half of a lever of 10 cm."""
         return {"k": 20000, "length": 0.1, "pivot": [0.03, 0.08], "lead": 0.01}
 
     @property
@@ -244,6 +244,6 @@ class Lever(SineRatio):
         return Scale(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
 
     def setting(self, scale: FloatArray) -> FloatArray:
-        """The pivot is at L x/(1 + x)."""
+        """Return the place of the pivot, L x/(1 + x)."""
         ratio = np.sqrt(2 * scale / self.k) / self.length
         return self.length * ratio / (1 + ratio) / self.lead

@@ -37,7 +37,7 @@ Where the slope vanishes, as next to a fold, steps that are short enough elsewhe
 def increasing_root(
     function: Function, low: FloatArray, high: FloatArray, start: FloatArray, constants: Values
 ) -> FloatArray:
-    """The x between `low` and `high` at which a function is zero, to rounding; an end if it has no zero.
+    """Return the zero of a function between `low` and `high`, to rounding; an end if it has none.
 
     Args:
         function: what increases between both.
@@ -95,7 +95,7 @@ class ScaleLaw(ABC):
         """K with its derivatives at settings."""
 
     def setting(self, scale: FloatArray, settings: tuple[float, float]) -> FloatArray:
-        """The setting in a range at which K has a value."""
+        """Return the setting in a range at which K has a value."""
         low, high = (np.full_like(scale, end) for end in settings)
         first, last = self.at(np.array(settings, dtype=float)).value.tolist()
         sign = math.copysign(1.0, last - first)
@@ -139,7 +139,7 @@ class Power(ScaleLaw):
         return Scale(scale, slope, (self.exponent - 1) * self.lead * slope / length)
 
     def setting(self, scale: FloatArray, _settings: tuple[float, float]) -> FloatArray:
-        """The root of K."""
+        """Return the root of K."""
         return (scale ** (1 / self.exponent) - self.offset) / self.lead
 
 
@@ -202,14 +202,14 @@ class MeasuredScale(ScaleLaw):
         return (settings[:-1], *CubicSpline(settings, scales).c[::-1])
 
     def at(self, s: FloatArray) -> Scale:
-        """The spline with its derivatives."""
+        """Return the spline with its derivatives."""
         piece = np.searchsorted(self._pieces[0][1:], s, side="right")
         start, a, b, c, d = look_up(self._pieces, piece)
         x = s - start
         return Scale(a + x * (b + x * (c + x * d)), b + x * (2 * c + x * (3 * d)), 2 * c + 6 * d * x)
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
-        """A table that is too short or does not reach so far, too."""
+        """Yield a table that is too short or does not reach so far, too."""
         rows = self.file.values[:, 0]
         if len(rows) < MIN_ROWS or not (np.diff(rows) > 0).all():
             yield f"the table needs {MIN_ROWS} rows or more, whose settings increase"

@@ -81,7 +81,7 @@ class VariableRatio(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A spring of which half, or all, or twice as much is there."""
+        """Return a spring of which half, or all, or twice as much is there."""
         stiffness = 600 if joint_type == "revolute" else 6000
         return {
             "setting": [0.5, 2],

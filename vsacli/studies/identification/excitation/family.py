@@ -174,7 +174,7 @@ class Design:
         return np.linspace(0.0, self.duration, 1 + round(SAMPLES_PER_PERIOD * highest * self.duration))
 
     def member(self, numbers: FloatArray, share: float) -> Trajectory:
-        """A trajectory of the family.
+        """Return a trajectory of the family.
 
         Args:
             numbers: of the `shape`.
@@ -244,7 +244,7 @@ class Design:
         return with_devices(Trajectory(times, position, {}, name=""), self.robot).at(self.grid)
 
     def _raw(self, signal: Signal, numbers: FloatArray) -> Sinusoids:
-        """The sums before they are placed; of joints that do not take the signal as well."""
+        """Return the sums before they are placed; of joints that do not take the signal as well."""
         amplitudes = numbers[:, : 2 * HARMONICS].T / np.repeat(np.arange(1, HARMONICS + 1), 2)[:, None]
         return Sinusoids(
             signal=signal,
@@ -270,7 +270,7 @@ def _placed(
     room: tuple[FloatArray, FloatArray],
     extent: tuple[FloatArray, FloatArray],
 ) -> Sinusoids:
-    """The sums scaled, and moved to a place in the room that they leave; digits as a file has them."""
+    """Return the sums scaled, and moved to a place in the room that they leave; digits as a file has them."""
     lowest, highest = room[0] - scale * extent[0], room[1] - scale * extent[1]
     offset = (lowest + highest + np.tanh(numbers[:, -1]) * (highest - lowest)) / 2
     sine, cosine = (
@@ -309,7 +309,7 @@ class Member(NamedTuple):
 
 
 def feasible(design: Design, numbers: FloatArray) -> Member | None:
-    """The member of a family, made as small as limits of torques, currents and the like ask for.
+    """Return the member of a family, made as small as limits of torques, currents and the like ask for.
 
     None if it keeps them not even nearly at rest.
     """
@@ -328,7 +328,7 @@ def feasible(design: Design, numbers: FloatArray) -> Member | None:
 
 
 def least_clearances(design: Design, block: Block) -> FloatArray:
-    """The least relative distance of everything that is `watched` to its bounds."""
+    """Return the least relative distance of everything that is `watched` to its bounds."""
     least: FloatArray = clearances(watched(design), block).min(axis=1, initial=np.inf)
     return least
 

@@ -135,7 +135,7 @@ def _condition(slopes: FloatArray) -> float:
 
 
 def exact_signals(block: Block) -> Signals:
-    """A motion without noise as a record."""
+    """Return a motion without noise as a record."""
     motion = {name: getattr(block, name) for name in ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")}
     return Signals(**motion, tau_motor=block.tau_motor, rate=np.nan, filter=ALL_PASS)
 
@@ -215,7 +215,7 @@ def predicted_errors(robot: Robot, trajectory: Trajectory, noise: Noise, seed: i
 
 
 def _identified(robot: Robot, record: Signals) -> list[Number]:
-    """All numbers, by a record of all joints."""
+    """Return all numbers, by a record of all joints."""
     joints = range(len(robot.joints))
     systems = solutions(with_friction(robot, joints), joints, WORDS, [record])
     return [number for system in systems for number in numbers_of(system)]

@@ -60,7 +60,7 @@ def search(
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Member | None:
-    """The best member of some families that is found; None if no member is feasible.
+    """Return the best member of some families that is found; None if no member is feasible.
 
     The (1+1) evolution strategy with the one-fifth success rule (H.-G. Beyer, H.-P. Schwefel, "Evolution
     strategies", Natural Computing 1 (2002)), each step of one signal of one joint. With as many trials from
@@ -97,7 +97,7 @@ def search(
 def _better(
     best: Member | None, design: Design, numbers: FloatArray, value: Callable[[Member], float]
 ) -> Member | None:
-    """The member with these numbers; None if it is not feasible, or no better than the best."""
+    """Return the member with these numbers; None if it is not feasible, or no better than the best."""
     member = feasible(design, numbers)
     if member is None:
         return None

@@ -159,7 +159,7 @@ def _share(number: Told) -> str:
 
 
 def excitation_text(excitation: Excitation) -> str:
-    """The trajectory file of a planned excitation, as text."""
+    """Return the trajectory file of a planned excitation, as text."""
     trajectory = excitation.trajectory
     profiles = {POSITION.key: trajectory.position}
     profiles |= {
