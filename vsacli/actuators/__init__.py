@@ -1,4 +1,4 @@
-"""What drives the joints of a robot: springs, and the kinds of actuator, one file each."""
+"""Drives of the joints of a robot: springs, and the kinds of actuator, one file each."""
 
 from typing import TYPE_CHECKING
 

@@ -56,7 +56,7 @@ class Antagonistic(Actuator):
         check_fields(self, *self.pair.problems(), *self._coupling_problems())
 
     def _coupling_problems(self) -> Iterator[FieldProblem]:
-        """How far the motors are apart is no variable of its own, so that a coupling must have no end."""
+        """Yield the problem of a coupling with a domain: the distance of the motors has no flag."""
         if self.coupling is None:
             return
         if self.coupling.domain != (-math.inf, math.inf):
@@ -98,12 +98,12 @@ class Antagonistic(Actuator):
 
     @property
     def max_deflections(self) -> tuple[float, ...]:
-        """Those of the springs."""
+        """Largest deflections of the springs."""
         return tuple(spring.max_deflection for spring in self.spring)
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Those of the springs."""
+        """Domains of the springs."""
         return tuple(law.domain for law in self.laws)
 
     @property
@@ -113,12 +113,12 @@ class Antagonistic(Actuator):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the springs, once if both are one."""
+        """Warnings of the springs, once if both are equal."""
         return tuple(warning for law in self._distinct_springs for warning in law.warnings)
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the springs."""
+        """Files of the springs."""
         return tuple(source for law in self._distinct_springs for source in law.sources)
 
     @property
@@ -224,7 +224,7 @@ class Antagonistic(Actuator):
         return self.pair.opposite
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
-        """Where the branch with the opposite preload reaches the stiffness."""
+        """See `Actuator.other_preload`: the branch with opposite preload."""
         return self.pair.opposite_reaches(tau_e, stiffness)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:

@@ -32,11 +32,11 @@ from vsacli.base.signals import DAMPING, STIFFNESS
 from vsacli.base.variables import VARIABLES
 
 NEWTON_STEPS = 4
-"""From a guess that is 1e-4 off, three reach rounding; one more does no harm."""
+"""Newton steps: from a guess that is 1e-4 off, three reach rounding; one more does no harm."""
 
 
 CONTINUATION_STEPS = 200
-"""From the equilibrium to where a robot file says that the motion starts."""
+"""Steps from the equilibrium to the start of the motion given in the robot file."""
 
 
 class InternalMotion(NamedTuple):
@@ -116,7 +116,7 @@ class DampedSprings:
         return self._springs(phi, q).pivot
 
     def within(self, phi: FloatArray) -> BoolArray:
-        """Where the laws of the springs hold."""
+        """Return where the laws of the springs hold."""
         lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
         inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
         return np.asarray(np.all(inside, axis=0))
@@ -150,7 +150,7 @@ class DampedSprings:
         return phi
 
     def driven(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
-        """What moves at deflections: w = (tau_l - T)/d, and w' = (tau_l' - d' w - T')/d."""
+        """Return w = (tau_l - T)/d and w' = (tau_l' - d' w - T')/d at deflections."""
         damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
         springs = self._springs(phi, command.q)
         velocity = (command.tau_e - springs.state.tau_e[..., 0]) / damping
@@ -219,7 +219,7 @@ class DampedSprings:
         )
 
     def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
-        """How far the stiffness is from its extremum at the same spread, relative to itself."""
+        """Return the distance of the stiffness from its extremum at the same spread, relative to it."""
         bent = springs.state.stiffness_curvature(self._coordinates(0 * stiffness, self._along(stiffness)))
         divisor = 2 * stiffness * np.abs(bent[..., 0])
         margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
@@ -244,7 +244,7 @@ class DampedSprings:
         return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
 
     def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
-        """What solves both rows; the first alone if there is one motor."""
+        """Return the solution of both rows; of the first alone if there is one motor."""
         if self._motors == 1:
             return of_spread[None]
         (b_1, b_2), (g_1, g_2) = self._behind, springs.stiffness
@@ -258,7 +258,7 @@ class DampedSprings:
     def _stiffness(
         self, springs: _Springs, rates: FloatArray, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As it is commanded; else what the springs have there, with its derivatives."""
+        """Return the commanded stiffness, or that of the springs, with its derivatives."""
         if self._settable:
             stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
             return stiffness, rate, acceleration
@@ -284,7 +284,7 @@ class DampedSprings:
         return self._coordinates(q, self._actuator.motor_positions(phi, q)[: self._motors])
 
     def _coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Of the springs, (samples, 1 joint, coordinates), from positions of joint and motors, or rates."""
+        """Return the coordinates of the springs, (samples, 1 joint, coordinates), or their rates."""
         return self._elasticity.coordinates(q[:, None], _columns(theta))
 
 

@@ -166,12 +166,12 @@ class Drivetrain:
         return self.of_springs(parts, theta)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What `domain` bounds, (..., springs), at positions as above."""
+        """Return the coordinates that `domain` bounds, (..., springs), at positions as above."""
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
     def torques(self, q: FloatArray, theta: FloatArray) -> Torques:
-        """Of the springs: on the links, (..., joints), and against the motors, (..., springs)."""
+        """Return the torques of the springs: on links, (..., joints), and against motors, (..., springs)."""
         parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
         return Torques(
             self.by_joint([part.tau_e for part in parts], q),
@@ -183,7 +183,7 @@ class Drivetrain:
         return self.by_joint([elasticity.energy(at) for elasticity, at in self.at(q, theta)], q)
 
     def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Of the joints (11), (..., joints), 0 where there are no springs."""
+        """Return the stiffness (11) of the joints, (..., joints), 0 without springs."""
         return self.by_joint([each.state(at).stiffness for each, at in self.at(q, theta)], q)
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -257,7 +257,7 @@ class DrivetrainState:
 
     @property
     def dtau_e(self) -> FloatArray:
-        """Its rate (17)."""
+        """Rate of the elastic torque (17)."""
         return self._drivetrain.by_joint([part.torque_rate(rates) for part, rates in self._parts], self._q)
 
     @property
@@ -267,7 +267,7 @@ class DrivetrainState:
 
     @property
     def dstiffness(self) -> FloatArray:
-        """Its rate (18)."""
+        """Rate of the stiffness (18)."""
         return self._drivetrain.by_joint([part.stiffness_rate(rates) for part, rates in self._parts], self._q)
 
     @property

@@ -80,22 +80,22 @@ class Elastic(Actuator):
 
     @property
     def max_deflections(self) -> tuple[float, ...]:
-        """That of the spring; none of a linear one."""
+        """Largest deflection of the spring; none for a linear one."""
         return (math.inf if self.spring is None else self.spring.max_deflection,)
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """That of the spring."""
+        """Domain of the spring."""
         return (self.law.domain,)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the spring."""
+        """Warnings of the spring."""
         return self.law.warnings
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the spring."""
+        """Files of the spring."""
         return self.law.sources
 
     @property
@@ -104,7 +104,7 @@ class Elastic(Actuator):
         return (SpringElement(self.law, -1.0, (1.0,)),)
 
     def limits(self) -> Iterator[LimitCheck]:
-        """Those of every actuator, and the torques that the spring can carry."""
+        """Yield the limits of every actuator, and the torques that the spring can carry."""
         yield from super().limits()
         yield self._carriable
 

@@ -15,7 +15,7 @@ from vsacli.base.arrays import FloatArray
 
 
 class Torques(NamedTuple):
-    """What springs exert: on the link of each joint (6), and against each motor (62)."""
+    """Torques of springs: on the link of each joint (6), and against each motor (62)."""
 
     tau_e: FloatArray
     tau_spring: FloatArray
@@ -33,11 +33,11 @@ class Elasticity(ABC):
         return theta - q[..., None]
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What `Actuator.phi_ranges` bounds, (..., joints, motors): phi, unless overridden."""
+        """Return the coordinates bounded by `Actuator.phi_ranges`, (..., joints, motors): phi by default."""
         return self.deflections(q, theta)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What the springs depend on, (..., joints, coordinates), or its rates: phi, unless overridden."""
+        """Return the coordinates of the springs, (..., joints, coordinates), or rates: phi by default."""
         return self.deflections(q, theta)
 
     @abstractmethod
@@ -81,7 +81,7 @@ class ElasticState(ABC):
 
     @abstractmethod
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """What the second derivative of the stiffness has from the rates alone, x' H x', (..., joints)."""
+        """Return the part x' H x' of the second derivative of the stiffness, (..., joints)."""
 
     @abstractmethod
     def motor_accelerations(

@@ -48,11 +48,11 @@ class Friction:
 
     @property
     def sharp(self) -> bool:
-        """Whether the torque at rest is not known: Coulomb friction whose shape is the sign."""
+        """Whether the torque at rest is undetermined."""
         return self.width == 0 and any(self.coulomb)
 
     def geared(self, ratio: float) -> Friction:
-        """On the joint's side of a gear, with what it is on the motor's shaft, which turns `ratio` times."""
+        """Return the friction on the joint side of a gear whose shaft turns `ratio` times."""
         backward, forward = (abs(ratio) * size for size in self.coulomb)
         return _Geared(
             coulomb=(backward, forward) if ratio > 0 else (forward, backward),
@@ -100,7 +100,7 @@ class FrictionLaws(NamedTuple):
 
     @property
     def sharp(self) -> BoolArray:
-        """Where the torque at rest is not known."""
+        """Joints at which the torque at rest is not known."""
         sharp: BoolArray = (self.width == 0) & (self.backward + self.forward > 0)
         return sharp
 
@@ -119,13 +119,13 @@ class FrictionLaws(NamedTuple):
         return self._size(velocity, sign) * np.where(self.width > 0, smooth, sign) + self.offset
 
     def beyond(self, torque: FloatArray) -> FloatArray:
-        """1 where a torque is more than sharp friction can hold, -1 where it is less, else 0."""
+        """Return 1 where a torque exceeds the holding friction, -1 where it is below its negative, else 0."""
         coulomb = torque - self.offset
         outside = np.where(coulomb > self.forward, 1.0, np.where(coulomb < -self.backward, -1.0, 0.0))
         return np.where(self.sharp, outside, 0.0)
 
     def power(self, velocity: FloatArray, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What smooth friction takes, offset included, and the rate of that; of the sign only its offset."""
+        """Return power and rate of smooth friction, offset included; of sharp friction, of the offset."""
         width = np.where(self.width > 0, self.width, 1.0)
         smooth = np.tanh(velocity / width)
         size = np.where(self.width > 0, self._size(velocity, smooth), 0.0)

@@ -33,7 +33,7 @@ NEEDED = {
     "max_current": ("torque_constant",),
     "max_voltage": ("torque_constant", "resistance"),
 }
-"""What must be given, too, where a constant of the windings is: they are those of the motor's shaft."""
+"""Keys required together with a constant of the windings, which is one of the motor's shaft."""
 
 _UNKNOWN = {
     "torque_constant": "the torque on the motor's shaft",
@@ -41,7 +41,7 @@ _UNKNOWN = {
     "max_current": "the current",
     "max_voltage": "the voltage",
 }
-"""What is not known without."""
+"""Quantities unknown without these keys."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Motor:
         check_fields(self, *problems, *self._missing())
 
     def _missing(self) -> Iterator[FieldProblem]:
-        """What constants of the windings cannot do without."""
+        """Yield the keys missing for constants of the windings."""
         for name, needed in NEEDED.items():
             missing = [key for key in needed if getattr(self, key) is None]
             if getattr(self, name) is not None and missing:
@@ -143,7 +143,7 @@ class Motor:
 
     @cached_property
     def at_joint(self) -> JointMotor:
-        """What its joint has of it: inertia and damping times the ratio squared, torques times the ratio."""
+        """Motor on the joint side: inertia and damping times the ratio squared, torques times the ratio."""
         signed = self.gear_ratio or 1.0
         ratio = abs(signed)
         return JointMotor(

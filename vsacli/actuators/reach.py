@@ -1,4 +1,4 @@
-"""Is a sample attainable, regular and within limits? Margins and flags of one joint, over samples."""
+"""Margins and flags of the samples of one joint: attainable, regular, and within limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OfJoint = Mapping[str, AnyArray]
 
 
 class Excess(NamedTuple):
-    """Where a limit is exceeded most.
+    """The worst excess over a limit.
 
     Attributes:
         first: index of the first step beyond the limit.
@@ -63,7 +63,7 @@ class LimitCheck(NamedTuple):
         return VARIABLES[self.variable].quantity.unit(joint_type)
 
     def values(self, of_joint: OfJoint) -> FloatArray:
-        """What is bounded, (samples,), out of the variables of the joint."""
+        """Return the bounded values, (samples,), from the variables of the joint."""
         rows = of_joint[self.variable]
         return rows if self.motor is None else rows[self.motor - 1]
 
@@ -76,7 +76,7 @@ class LimitCheck(NamedTuple):
         return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
 
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
-        """How far outside values may seem to be since they are uncertain, (samples,); 0 if they are not.
+        """Return by how much uncertain values may seem to exceed the range, (samples,); 0 for certain ones.
 
         Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one; none
         where the bit is no limit, but says that there is no way.
@@ -89,14 +89,14 @@ class LimitCheck(NamedTuple):
 
     @property
     def largest_allowance(self) -> float:
-        """How far outside values may seem to be at most, however uncertain they are."""
+        """Largest seeming excess, however uncertain the values are."""
         if self.flag not in LIMITS:
             return 0.0
         width = self.range[1] - self.range[0]
         return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
-        """How far within the range values are, relative to its larger end; negative outside, NaN for NaN."""
+        """Return the distance inside the range relative to its larger end; negative outside, NaN for NaN."""
         clearance: FloatArray = self._outside(self.values(of_joint)) / -(self._largest or 1.0)
         return clearance
 
@@ -117,7 +117,7 @@ class LimitCheck(NamedTuple):
         return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
 
     def _outside(self, values: FloatArray) -> FloatArray:
-        """How far values lie outside the range; zero or negative inside, NaN for NaN."""
+        """Return the distance outside the range; zero or negative inside, NaN for NaN."""
         return np.maximum(self.range[0] - values, values - self.range[1])
 
 

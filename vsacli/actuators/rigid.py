@@ -61,5 +61,5 @@ class Rigid(Actuator):
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """What lies in place of a spring carries tau_e."""
+        """Return the rates of the torque in place of a spring, tau_e."""
         return of_joint["dtau_e"][None]

@@ -109,27 +109,27 @@ class Serial(Actuator):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Where the mechanism works, in what its range is stated in."""
+        """Range of the mechanism, in its own coordinates."""
         return self.mechanism.ranges
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the mechanism."""
+        """Warnings of the mechanism."""
         return self.mechanism.warnings
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the mechanism."""
+        """Files of the mechanism."""
         return self.mechanism.sources
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
-        """Those of the mechanism."""
+        """Springs of the mechanism."""
         return self.mechanism.spring_elements
 
     @property
     def lever_spring(self) -> LeverSpring | None:
-        """That of the mechanism."""
+        """Lever spring of the mechanism."""
         return self.mechanism.lever_spring
 
     @property
@@ -176,7 +176,7 @@ class Serial(Actuator):
         return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """What the mechanism carries.
+        """Return torque and stiffness of the mechanism.
 
         Its stiffness may be a difference, next to zero while neither part is; phi and the setting then
         decide on it by their last digits.
@@ -199,11 +199,11 @@ class Serial(Actuator):
 
     @property
     def opposite_preload(self) -> str | None:
-        """That of the mechanism."""
+        """Other branch of the mechanism."""
         return self.mechanism.opposite_preload
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
-        """Where another branch of the mechanism reaches the stiffness."""
+        """See `Actuator.other_preload`: another branch of the mechanism."""
         return self.mechanism.other_preload(tau_e, stiffness, q)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
@@ -219,7 +219,7 @@ class Serial(Actuator):
         return self.mechanism.state(np.stack((*phi, q), axis=-1))
 
     def _state_of(self, of_joint: OfJoint) -> MechanismState:
-        """At the motion of joint and motors."""
+        """Return the state at the motion of joint and motors."""
         return self._state(np.stack((of_joint["phi"][0], of_joint["theta"][1])), of_joint["q"])
 
 
@@ -234,7 +234,7 @@ class _Springs(Elasticity):
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What the range of the mechanism is stated in."""
+        """Return the coordinates in which the range of the mechanism is stated."""
         return np.stack(self._mechanism.ranged(theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ class LinearRows:
         return torque
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """K phi^2/2."""
+        """Return the energy of the spring."""
         energy: FloatArray = phi * phi * (self._stiffness / 2)
         return energy
 
@@ -40,12 +40,12 @@ class SingleSprings(Elasticity):
         self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return the spring pulls link and motor alike."""
+        """Return the torques: the spring pulls link and motor equally."""
         tau = self._rows.torque(phi)
         return Torques(tau[..., 0], tau)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """That of the spring."""
+        """Return the energy of the spring."""
         return self._rows.energy(phi)[..., 0]
 
     def state(self, phi: FloatArray) -> ElasticState:
@@ -67,7 +67,7 @@ class _State(ElasticState):
 
     @property
     def stiffness(self) -> FloatArray:
-        """Its stiffness."""
+        """Stiffness of the spring."""
         return self._one.sigma
 
     @property

@@ -1,4 +1,4 @@
-"""What every actuator has in common: what it is asked to do, and what lies between joint and motors."""
+"""Command and transmission, common to all actuators: the demand, and the springs between joint and motors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vsacli.base.signals import COMMANDED, commanded_names
 
 
 class Command(NamedTuple):
-    """What a joint is asked to do and what its link demands of it; arrays (samples,), SI units.
+    """The demand on a joint, and the torque its link requires; arrays (samples,), SI units.
 
     Attributes:
         q, dq, ddq: motion of the joint.
@@ -36,14 +36,14 @@ class Command(NamedTuple):
 
     @classmethod
     def of(cls, arrays: Mapping[str, FloatArray]) -> Command:
-        """From arrays by their names; others are passed over."""
+        """Return the command from arrays by name; others are ignored."""
         commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         own = {name: arrays[name] for name in cls._fields[:-1]}
         return cls(**own, commanded=commanded)
 
     @classmethod
     def at_rest(cls, tau_e: FloatArray, q: FloatArray) -> Command:
-        """Of a joint that stands still and carries torques, (samples,); no signal is commanded."""
+        """Return the command of a resting joint that carries torques, (samples,); no signal is commanded."""
         still = np.zeros_like(tau_e)
         return cls(q, still, still, tau_e, still, still, {})
 

@@ -200,7 +200,7 @@ class _OpenMapping:
         self._key_lines: dict[str, int] = {}
 
     def child_line(self, line: int) -> int:
-        """Return a list or mapping behind a key is found at the key."""
+        """Return the line of a node; that of a list or mapping behind a key is the key's."""
         return self._key.line if self._key else line
 
     def add(self, node: Node) -> None:

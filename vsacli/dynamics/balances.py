@@ -35,7 +35,7 @@ POSITION_ROUNDING = 8 * np.finfo(float).eps
 """Share of q and theta by which their difference phi may be off: a few roundings."""
 
 Residual = tuple[FloatArray, FloatArray]
-"""What a balance misses, and the size of its terms, which bounds what rounding can miss."""
+"""Residual of a balance, and the size of its terms, to which rounding is relative."""
 
 
 def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular: BoolArray) -> FloatArray:
@@ -109,7 +109,7 @@ def _winding_residuals(
     voltage: FloatArray | None = None,
     copper_loss: FloatArray | None = None,
 ) -> Iterator[Residual]:
-    """Yield the current makes the torque, heat is R i^2, and u i is that heat and the power of the shaft."""
+    """Yield the balances of the windings: torque of the current, heat R i^2, u i as heat and shaft power."""
     assert motor.torque_constant is not None, "windings without a torque constant have no current"
     yield _residual(tau_motor, motor.torque_constant * current)
     if motor.resistance is None or voltage is None or copper_loss is None:
@@ -175,7 +175,7 @@ def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
 
 
 def shaft_powers(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
-    """What changes `shaft_energy`, term by term: the motors, what the link takes, and losses; W."""
+    """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
     motors = len(joint.actuator.motors)
     taken = [of_joint["tau_e"] * of_joint["dq"], *shaft_losses(joint, of_joint)]
     return [*of_joint["motor_power"][:motors], *(-power for power in taken)]
@@ -192,7 +192,7 @@ BALANCES = {
         Variable("damped_size", ("damped",), units.TORQUE, "size of the torques that are balanced", "(14)"),
     )
 }
-"""What is computed beside the variables of a result, and is not stored."""
+"""Quantities of the balances, which are computed with the variables of a result but not stored."""
 
 
 BALANCED = {*SHAFT_VARIABLES, "phi", "flags"}
@@ -211,7 +211,7 @@ class BalancedDynamics(InverseDynamics):
     block = BalancedBlock
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of the variables it gives, at one instant, by name."""
+        """Return the shapes of its variables at one instant, by name."""
         motors, damped = (len(self.robot.joints), SIDES), (len(damped_joints(self.robot.joints)),)
         return {
             **super().shapes(),
@@ -231,7 +231,7 @@ class BalancedDynamics(InverseDynamics):
 
 
 def damped_joints(joints: Sequence[Joint]) -> list[int]:
-    """Those with a damper beside their springs, by index."""
+    """Return the joints with a damper parallel to their springs, by index."""
     return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
 
 
@@ -283,13 +283,13 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
 
 
 def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:
-    """What rounding leaves of the torque of a damper, whose velocity is the difference theta' - q'."""
+    """Return the rounding of the torque of a damper, whose velocity is the difference theta' - q'."""
     rounding: FloatArray = 4 * np.finfo(float).eps * of_joint["damping"] * np.abs(of_joint["dq"])
     return rounding
 
 
 def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
-    """What the motors of a joint pass on to springs and dampers, or lose to damping, and its rate, W, W/s.
+    """Return the power of motors into springs, dampers and damping, and its rate, W, W/s.
 
     It is the motors' power but for that of their inertia and of dry friction. Each (2, samples), NaN where
     there is no motor.
@@ -338,7 +338,7 @@ def link_energy(robot: Robot, block: Block) -> FloatArray:
 
 
 def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArray]:
-    """What changes `link_energy`, term by term: joints, losses between links, and the wrench; W.
+    """Return the powers that change `link_energy`: joints, losses between links, and the wrench; W.
 
     Args:
         robot: the robot.

@@ -1,4 +1,4 @@
-"""What the recursion takes of a chain of links that moves, and what it gives; scalars of any kind."""
+"""Inputs and outputs of the recursion for a moving chain of links, with scalars of any kind."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vsacli.compute.vector import Scalar, SymmetricTensor, Vector
 
 
 class LinkConstants(NamedTuple):
-    """What the recursion needs of a joint and its link; scalars of any kind.
+    """Constants of a joint and its link for the recursion; scalars of any kind.
 
     Attributes:
         revolute: kind of the joint.
@@ -51,7 +51,7 @@ class JointState(NamedTuple):
 
 
 class TipLoad(NamedTuple):
-    """What the end effector exerts on the environment, at a point fixed to the last link.
+    """The force and moment of the end effector on the environment, at a point of the last link.
 
     Attributes:
         force: its components and their first and second derivatives.

@@ -47,7 +47,7 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
 
 
 def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
-    """What the damper beside a joint's springs exerts against its motors, and its rate, each (2, samples)."""
+    """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
     damping, d_damping, dphi, ddtheta = (
         of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
     )
@@ -60,7 +60,7 @@ def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArr
 
 
 class Passed(NamedTuple):
-    """What dampers exert on the links, (..., joints), and against the motors with springs, (..., springs)."""
+    """Torques of dampers on the links, (..., joints), and against motors with springs, (..., springs)."""
 
     links: Scalar
     motors: Scalar
@@ -82,14 +82,14 @@ class Dampers:
     def of_links(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, ddq: Scalar = 0, d3q: Scalar = 0
     ) -> TorqueDerivatives:
-        """What those between the links take, with its derivatives; exact zeros if there is none."""
+        """Return the torques of dampers between the links, with derivatives; exact zeros without any."""
         if not self._between_links.any():
             return TorqueDerivatives(0, 0, 0)
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
     def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
-        """What those beside the springs exert at velocities of joints, and of motors with springs.
+        """Return the torques of dampers parallel to springs, at velocities of joints and of sprung motors.
 
         Exact zeros if there is none.
         """

@@ -1,4 +1,4 @@
-"""What the actuator of a joint has to do for it, whatever its kind."""
+"""The work of the actuator of a joint, whatever its kind: motors, springs, flags."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Drive(NamedTuple):
     copper_loss: FloatArray | None = None
 
     def arrays(self) -> dict[str, AnyArray]:
-        """Those there are, by name."""
+        """Return the arrays that exist, by name."""
         return {name: values for name, values in self._asdict().items() if values is not None}
 
 
@@ -90,7 +90,7 @@ def driven_by(
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
 ) -> Drive:
-    """As `drive`, with the flags of reach alone; also with scalars that carry derivatives along."""
+    """Return `drive` with the flags of reach alone; also with scalars that carry derivatives."""
     actuator = joint.actuator
     if internal is None:
         transmission = actuator.transmit(command, near_singular, integrated)
@@ -139,7 +139,7 @@ def _damped(
 def _damper_torques(
     joint: Joint, command: Command, dphi: FloatArray
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """What a damper exerts on the link, (samples,), and what against each motor, (2, samples), if it does."""
+    """Return the torques of a damper on the link, (samples,), and against each motor, (2, samples)."""
     if joint.damper is None:
         return None, None
     damping = command.commanded[DAMPING.key]
@@ -158,7 +158,7 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
 
 
 def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
-    """Where something of the motors is no finite number, and neither infeasible nor singular says why.
+    """Return where a value of the motors is not finite, although neither infeasible nor singular.
 
     Of a demand that is no finite number itself, neither can be said. By (69) and (73)-(74) everything of a
     motor goes into its position or its power; singular steps have no power.

@@ -38,7 +38,7 @@ def joint_friction(
 
 
 class Response(NamedTuple):
-    """What follows from motor torques.
+    """Accelerations that follow from motor torques.
 
     Attributes:
         ddq: acceleration of the joints, (..., joints).
@@ -52,8 +52,9 @@ class Response(NamedTuple):
 
 
 Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
-"""From the torques of all motors (..., motors), and which are held, None if none can be, to the accelerations
-of joints and of motors with springs, and what the held ones must be held with, (..., motors), 0 of others."""
+"""Function from the torques of all motors (..., motors) and those held (None if none can be) to the
+accelerations of joints and of motors with springs, and to the torques that hold the held ones, (...,
+motors), 0 for others."""
 
 
 def response_with_friction(

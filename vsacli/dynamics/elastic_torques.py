@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 TORQUES = ("tau_e", "dtau_e", "ddtau_e")
-"""What the recursion computes."""
+"""Outputs of the recursion."""
 
 
 def link_constants(joint: Joint) -> LinkConstants:
@@ -58,7 +58,7 @@ def link_constants(joint: Joint) -> LinkConstants:
 
 
 def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> TipLoad:
-    """What the end effector exerts while the environment exerts a wrench on it.
+    """Return the load of the end effector while the environment exerts a wrench on it.
 
     Args:
         robot: whose base and tool count.
@@ -110,7 +110,7 @@ class LinkTorques(RowKernel):
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
     def chain(self, rows: Sequence[Scalar]) -> Chain:
-        """What the recursion takes, from rows as of `arguments`."""
+        """Return the inputs of the recursion, from rows as of `arguments`."""
         given, joints = self.arguments.unpack(rows), self.robot.joints
         none = [0] * len(joints)
         dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
@@ -126,7 +126,7 @@ class LinkTorques(RowKernel):
 
 
 class ElasticTorques(NamedTuple):
-    """What the links demand of the joints, each ([samples,] joints), N m (N) per s^k.
+    """Torques that the motion of the links requires of the joints, each ([samples,] joints), N m (N) per s^k.
 
     Attributes:
         tau_e: total elastic torque (58).

@@ -93,7 +93,7 @@ class Efforts(NamedTuple):
 
 
 def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[FloatArray]) -> Efforts:
-    """What two springs exert together and against each other over intervals, by trapezoids.
+    """Return the common and the opposing effort of two springs over intervals, by trapezoids.
 
     Args:
         interval: length, s.
@@ -140,7 +140,7 @@ class EnergyMeter:
         self._peak = np.fmax(self._peak, np.fmax.reduce(elastic_energy, axis=-1))
 
     def report(self, robot: Robot) -> list[JointEnergy]:
-        """What was found of each joint of a robot; something must have been added."""
+        """Return the energy of each joint of a robot; something must have been added."""
         there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
         totals = self._layout.arrays(np.asarray(self._totals))
         work, spent = (np.sum(total, axis=1, where=there) for total in (self._work, totals["spent"]))
@@ -176,7 +176,7 @@ def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
 
 
 AT_STEPS = ("dtheta", "motor_power", "tau_spring", "passed_power", "passed_rate")
-"""What the work of motors in an interval follows from, at the step before it and at the step after it."""
+"""Variables that give the work of motors in an interval, from the samples at both its ends."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ class IntervalEnergy(RowKernel):
 
     @cached_property
     def results(self) -> RowLayout:
-        """As of `Flow`."""
+        """See `Flow.results`."""
         joints = (len(self.inertia),)
         motors = dict.fromkeys(("work", "spent"), (*joints, SIDES))
         return RowLayout({**motors, **dict.fromkeys(("load", "co_contraction"), joints)})
@@ -260,7 +260,7 @@ def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:
 
 
 def _at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
-    """Those at one end of the intervals."""
+    """Return the rows at one end of the intervals."""
     half = len(rows) // 2
     return _by_joint(rows[end * half : (end + 1) * half])
 
@@ -313,7 +313,7 @@ class RunEnergy:
         return self._meter.add(flow)
 
     def report(self) -> list[JointEnergy]:
-        """What was found of each joint; at least one block must have been added."""
+        """Return the energy of each joint; at least one block must have been added."""
         return self._meter.report(self._robot)
 
 

@@ -84,7 +84,7 @@ class Task:
         )
 
     def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Actuator, Command]]:
-        """What is asked of some joints, from one pass of the recursion."""
+        """Yield the commands of some joints, from one pass of the recursion."""
         motion = self.trajectory.at(time)
         commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
         for joint in joints:

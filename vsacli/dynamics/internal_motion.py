@@ -26,7 +26,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 STAGES = 12
-"""With so many, a motion of half a second from rest to rest is exact to rounding in some forty cells."""
+"""Stages of a cell: with 12, half a second from rest to rest is exact to rounding in some forty cells."""
 
 
 class _Rule(NamedTuple):
@@ -71,11 +71,11 @@ class Collocation:
         return self._rule.slopes * (2 / (end - start))
 
     def coefficients(self, values: FloatArray) -> FloatArray:
-        """Of the polynomial with these values at the start and at the nodes, (..., stages + 1)."""
+        """Return the polynomial with these values at the start and at the nodes, (..., stages + 1)."""
         return values @ self._rule.to_coefficients.T
 
     def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
-        """Of the polynomial with these values at the nodes, (..., stages)."""
+        """Return the polynomial with these values at the nodes, (..., stages)."""
         return values @ self._rule.through_nodes.T
 
 
@@ -91,7 +91,7 @@ class Piecewise:
         self.ends, self._coefficients = ends, coefficients
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Its values, (rows, samples); beyond the ends those of the nearest cell."""
+        """Return the values, (rows, samples); beyond the ends those of the nearest cell."""
         from numpy.polynomial import chebyshev
 
         cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
@@ -108,21 +108,21 @@ RESOLVED = 1e-14
 """Share of the largest deflection that the last coefficients of a polynomial may have: rounding."""
 
 LEAST_SHARE, LEAST_SPREAD = 1e-6, 1e-9
-"""What a spread is measured against if it is smaller: a share of the largest deflection; rad (m)."""
+"""Smallest scale of a spread: as a share of the largest deflection, and in rad (m)."""
 
 TOLERATED, GAIN = 1e-9, 4.0
 """Below, halving twice must lower that share by this factor to be worth another one: else it is noise of the
 trajectory itself, whose knots may lie denser than the cells."""
 
 HALVINGS = 20
-"""To where a motion cannot go on, within a millionth of a first cell."""
+"""Bisections to the end of a motion that cannot go on, exact to a millionth of a first cell."""
 
 LAYER = 4.0
-"""Where the demand sets in anew, something dies away that need not show in a cell of more than so many time
-constants: its polynomial passes it over."""
+"""Largest cell, in time constants, where the demand begins anew: a fast decay there could hide in a longer
+one, whose polynomial passes over it."""
 
 FAST = 100.0
-"""In cells of more time constants, the polynomial of the spread knows the rates better than the equation.
+"""Time constants of a cell from which the polynomial of the spread gives better rates than the equation.
 
 By that rounding makes them wrong by eps T/d, by the polynomial by some eps spread STAGES^2 2/duration, which
 is less beyond 288 time constants; for the next derivative beyond 170.
@@ -162,7 +162,7 @@ class Marched(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """What was found in a cell, at its start and nodes, or at its nodes alone.
+    """The solution of a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
         phi: deflections, (2, 1 + stages).
@@ -312,7 +312,7 @@ class _Peaks:
         self._phi, self._spread = 0.0, LEAST_SPREAD
 
     def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
-        """Of the last coefficients of deflections, spread and torque of the damper, in its peak so far."""
+        """Return the last coefficients of deflections, spread and torque relative to the peaks so far."""
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
         self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
@@ -426,7 +426,7 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
 
 
 class _Demand:
-    """What joints are asked to do; times that were asked for before are remembered."""
+    """The demand on joints over time, which remembers earlier times."""
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
         self._robot, self._trajectory = robot, trajectory

@@ -53,7 +53,7 @@ def usual_block(joints: int) -> int:
 
 @dataclass(frozen=True)
 class Stop(Stored):
-    """From when on, s, the deflections of a joint cannot be integrated, and why."""
+    """The time, s, from which the deflections of a joint cannot be integrated, and the reason."""
 
     time: float
     reason: str
@@ -114,7 +114,7 @@ class InverseDynamics(RowKernel):
         return RowLayout(self.shapes())
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of the variables it gives, at one instant, by name."""
+        """Return the shapes of its variables at one instant, by name."""
         joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
         return {
             variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
@@ -161,7 +161,7 @@ class InverseDynamics(RowKernel):
         }
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
-        """What moves inside a joint, if its transmission is damped."""
+        """Return the internal motion of a joint, if its transmission is damped."""
         if index not in self.internal:
             return None
         from vsacli.actuators.damped_springs import InternalMotion
@@ -185,7 +185,7 @@ def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) 
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
-    """Of a joint that moves nothing, the recursion finds a plain zero; the actuator takes rows of samples."""
+    """Return a torque as a row of samples; the recursion gives a plain zero for joints that move nothing."""
     return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
 
 
@@ -221,7 +221,7 @@ def block_of(
     integrated: FloatArray | None = None,
     internal: Mapping[int, InternalMotion] = MappingProxyType({}),
 ) -> Block:
-    """What a kernel of inverse dynamics finds for a block of steps.
+    """Return the variables that a kernel of inverse dynamics computes for a block of samples.
 
     Args:
         kernel: what is computed, and in which block it comes.
@@ -246,7 +246,7 @@ def block_of(
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
-    """Where motions inside damped transmissions begin, with the rates that follow, by index of the joint."""
+    """Return the start of motions in damped transmissions, with rates, by index of the joint."""
     damped = {
         index: joint
         for index, joint in enumerate(robot.joints)

@@ -54,7 +54,7 @@ def work_on_each_other(
     rise, rise_after = interval * rise, interval * rise_after
 
     def turned(one: FloatArray, two: FloatArray) -> FloatArray:
-        """What is one motor's times what is the other's, less the same with the motors exchanged."""
+        """Return the product of one motor's value with the other's, minus that with the motors exchanged."""
         return one * two[::-1] - two * one[::-1]
 
     area = turned(begin, end) - turned(rise, rise_after) / 30
@@ -86,7 +86,7 @@ def positive_work(
 def _linear(
     interval: FloatArray, before: FloatArray, after: FloatArray, positive: FloatArray
 ) -> tuple[FloatArray]:
-    """Of a power that changes its sign, if that is more than what is there."""
+    """Return a power that changes its sign, where that exceeds the given one."""
     low, high = np.minimum(before, after), np.maximum(before, after)
     return (np.maximum(interval / 2 * high**2 / (high - low), positive),)
 
@@ -98,7 +98,7 @@ def trapezoids(intervals: FloatArray, values: FloatArray) -> FloatArray:
 
 
 MOTION = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")
-"""What losses follow from."""
+"""Variables that losses follow from."""
 
 DAMPED = ("damping", "ddamping", "dphi")
 """The same of dampers."""
@@ -166,14 +166,14 @@ class LossMeter:
         self._last: dict[str, FloatArray] = {}
 
     def add(self, block: Block) -> Lost:
-        """What is lost from the step before to each step of a block; nothing before the first."""
+        """Return the losses from the previous sample to each sample of a block; zero before the first."""
         rows = {name: by_joint(getattr(block, name)) for name in self._names}
         before = self._last or _step(rows, 0)
         self._last = _step(rows, -1)
         return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
 
     def between(self, rows: Mapping[str, FloatArray]) -> Lost:
-        """What is lost from step to step, from variables by name, samples last."""
+        """Return the losses from sample to sample, from variables by name, samples last."""
         intervals = np.diff(rows["time"])
         of_motors = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
         of_joints = [rows[name] for name in ("q", "dq", "ddq")]
@@ -218,7 +218,7 @@ def _friction_work(
     velocity: FloatArray,
     acceleration: FloatArray,
 ) -> FloatArray:
-    """Of smooth friction the integral of its power; of the sign function size times way, which is exact."""
+    """Return the work of friction: integrated for smooth laws, size times path for the sign function."""
     way = np.diff(position)
     if laws is None:
         return np.zeros_like(way)

@@ -46,7 +46,7 @@ class _PointRates(NamedTuple):
 
 
 class _Slide(NamedTuple):
-    """What the sliding of a prismatic joint adds to p', and to (40), (42), (44)."""
+    """Terms of the sliding of a prismatic joint in p', and in (40), (42), (44)."""
 
     dp: Vector
     a: Vector
@@ -58,7 +58,7 @@ _NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
 
 
 class Body(NamedTuple):
-    """What the backward pass needs of link k."""
+    """Quantities of link k for the backward pass."""
 
     rotation: Rotation
     z: Vector

@@ -186,7 +186,7 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
 
 
 def bare(robot: Robot) -> Robot:
-    """Its links and joints alone: equal for robots that differ in what drives them."""
+    """Return the links and joints alone, which are equal for robots that differ only in drives."""
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
     return Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints)

@@ -1,4 +1,4 @@
-"""How uncertain everything is that follows from recorded signals: propagation to first order.
+"""Uncertainty of everything that follows from recorded signals, by propagation to first order.
 
 Covariances C of recorded signals give what is computed from them the variance g C g', with g its gradient by
 the signals (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
 
 MARGIN = "margin"
-"""Of the stiffness to the nearer end of its corridor: has a deviation, too, but is no variable of results."""
+"""Name of the margin of the stiffness, which has a deviation but is no variable of results."""
 
 PROBES_OF_A_KNOT, FEWEST_PROBES, MOST_PROBES = 4, 2048, 32768
 """Times at which deviations are computed; each costs some thirty steps of a run with three joints, and
@@ -74,7 +74,7 @@ class Uncertainty:
         self.unstated = {name: np.any([part.unstated[name] for part in parts], axis=0) for name in names}
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
-        """By the names of the variables, and of `MARGIN`, at any times: each (samples, joints[, 2])."""
+        """Return the deviations at any times by variable, and of `MARGIN`: each (samples, joints[, 2])."""
         return {name: self._between(known, time) for name, known in self._known.items()}
 
     def _between(self, known: FloatArray, time: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ def probed_times(trajectory: Trajectory) -> FloatArray:
 
 
 class Deviations(NamedTuple):
-    """What is found at some times, by name of the variable.
+    """Standard deviations at some times, by variable.
 
     Attributes:
         deviations: (times, joints[, 2]), NaN where there is no value, infinite where nothing can be said.
@@ -130,7 +130,7 @@ def deviations(
     covariances: Mapping[Signal, FloatArray],
     engine: Engine = NUMPY,
 ) -> Deviations:
-    """Of all variables that recorded signals have a part in, along a motion.
+    """Return the deviations of all variables that depend on recorded signals, along a motion.
 
     Args:
         robot: the robot.
@@ -227,14 +227,14 @@ def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
 
 
 def _uncertain(block: Block) -> dict[str, AnyArray]:
-    """What of a block follows from signals."""
+    """Return the variables of a block that follow from signals."""
     given = orders_of_derivation()
     computed = {name: getattr(block, name) for name in COMPUTED if name in UNCERTAIN and name not in given}
     return {**computed, MARGIN: margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)}
 
 
 def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:
-    """Of variables that depend on one signal, (times, joints[, 2]).
+    """Return the variance of variables that depend on one signal, (times, joints[, 2]).
 
     Args:
         gradient: changes by one deviation of each component and order, (components * orders, times, ...).

@@ -50,7 +50,7 @@ _EXPORTS = LazyRegistry(
         "make_pair": "vsacli.actuators.pairs:make_pair",  # pairs know laws; no law knows them
     }
 )
-"""What is imported at its first use; each law by its name in a robot file, written as the name of a class."""
+"""Names imported at first use; each law by its name in a robot file, written as a class name."""
 
 __all__ = [
     "CUBIC_STIFFNESS",

@@ -17,8 +17,11 @@ from vsacli.documents.fields import POSITIVE, Check, number
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
 
 STRETCH_MARGIN = 1e-6
-"""How close to 1 the domain lets C sin(phi/2) come. Beyond, where the torque grows without bound, deflections
-that are neighbouring doubles differ in stiffness by more than 1e-10."""
+"""Distance from 1 up to which the domain lets C sin(phi/2) come.
+
+Beyond, where the torque grows without bound, adjacent doubles of the deflection differ in stiffness by more
+than 1e-10.
+"""
 
 GUESS_NODES = 20
 """Points of the curve that the first guess of the inverse begins with."""

@@ -170,7 +170,7 @@ class SpringLaw(ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """How far the law may be from the spring it describes, one sentence each."""
+        """Sentences on the distance of the law from the spring it describes."""
         return ()
 
     @property
@@ -269,7 +269,7 @@ class SpringRows:
     def _each(
         self, phi: FloatArray, values: Callable[[SpringLaw, FloatArray], Sequence[FloatArray]]
     ) -> Sequence[FloatArray]:
-        """What each spring's law makes of its deflection."""
+        """Return the values of both springs' laws at their deflections."""
         if len(self._alike) == 1:
             return values(self._alike[0][0], phi)
         flat = phi.reshape(*phi.shape[:-2], -1)

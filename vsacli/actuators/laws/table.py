@@ -96,7 +96,7 @@ class MeasuredSpring(SpringLaw):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """How well the curve fits."""
+        """Warnings of a poor fit."""
         deflection, torque = self.file.values.T
         return misfit_warnings(self.file, self._curve(deflection, 1, 1)[0] - torque)
 
@@ -179,7 +179,7 @@ class MeasuredSpring(SpringLaw):
 
 
 def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
-    """How far a curve is from the points of a table, (rows,), unless that is nothing."""
+    """Return warnings of the distance of a curve from the points of a table, (rows,)."""
     row, share = worst_misfit(table, misfit)
     if share < NO_MISFIT:
         return ()

@@ -109,7 +109,7 @@ class Mirrored(SpringLaw):
 
 
 def _mirrored_state(state: SpringState) -> SpringState:
-    """Of the state, the torque and the slope are odd in the deflection."""
+    """Return the state with torque and slope reversed, which are odd in the deflection."""
     return state._replace(tau=-state.tau, zeta=-state.zeta)
 
 

@@ -198,16 +198,16 @@ class Mechanism(ABC):
 
     @property
     def ranges(self) -> tuple[Range, Range]:
-        """Where `ranged` must lie, two coordinates one after the other."""
+        """Ranges of the two coordinates of `ranged`."""
         return self.deflection_range, self.setting_range
 
     def ranged(self, phi: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What the mechanism's range is stated in: phi and the setting, unless overridden."""
+        """Return the coordinates bounded by `ranges`: phi and the setting, unless overridden."""
         return phi, s
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """How far it may be from the device it describes, one sentence each."""
+        """Sentences on the distance of the mechanism from the device it describes."""
         return ()
 
     @property
@@ -245,7 +245,7 @@ class Mechanism(ABC):
         return None
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Where the other branch that the mechanism may be told to take would reach the stiffness."""
+        """Return where the other branch of the mechanism would attain the stiffness."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:

@@ -41,7 +41,7 @@ class ShiftedCams(Mechanism):
         check_fields(self, *self._cams.problems(), *self._limit_problems())
 
     def _limit_problems(self) -> Iterator[FieldProblem]:
-        """What a cam is turned by is no variable of its own, whose limit could be flagged."""
+        """Yield the problem of a limited rotation: the rotation of a cam is no flagged variable."""
         for side, law in enumerate(self.spring):
             if math.isfinite(law.max_deflection):
                 reason = "is not known of a cam, whose turn is no variable of results; leave it out"
@@ -77,17 +77,17 @@ class ShiftedCams(Mechanism):
         return first.domain, second.domain
 
     def ranged(self, phi: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """By how much either cam is turned."""
+        """Return the rotations of both cams."""
         return phi + s, phi - s
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the cams, once if both are one."""
+        """Warnings of the cams, once if both are equal."""
         return tuple(warning for law in self._cams.distinct for warning in law.warnings)
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the cams."""
+        """Files of the cams."""
         return tuple(source for law in self._cams.distinct for source in law.sources)
 
     @property
@@ -109,7 +109,7 @@ class ShiftedCams(Mechanism):
         return None if first == second else self._cams.opposite
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Where the branch with the other sign of theta_2 reaches the stiffness."""
+        """See `Mechanism.other_preload`: the branch with the other sign of theta_2."""
         return self._cams.opposite_reaches(tau_e, stiffness)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:

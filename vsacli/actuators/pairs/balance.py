@@ -149,7 +149,7 @@ By trial with pairs of every law: between a tenth and a half the number of steps
 more of it more samples end in bracketing."""
 
 QUARTIC_COEFFICIENT, MAX_SQUARED_ARGUMENT = 0.025, 3.0
-"""How much faster than as cosh springs stiffen, and up to which square of its argument.
+"""Coefficient and bound of the quartic that makes springs stiffen faster than cosh.
 
 By trial with pairs of every law: without it, more steps are taken and more samples end in bracketing."""
 

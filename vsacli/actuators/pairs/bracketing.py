@@ -63,7 +63,7 @@ def bracketed_root(
 def _next_share(
     x_1: FloatArray, f_1: FloatArray, x_2: FloatArray, f_2: FloatArray, x_3: FloatArray, f_3: FloatArray
 ) -> FloatArray:
-    """Where between x_1 and x_2 to look next: by the parabola through three points if it is monotone."""
+    """Return the next point between x_1 and x_2: by the parabola through three points if it is monotone."""
     with np.errstate(all="ignore"):
         xi, phi = (x_1 - x_2) / (x_3 - x_2), (f_1 - f_2) / (f_3 - f_2)
         monotone = (phi * phi < xi) & ((1 - phi) * (1 - phi) < 1 - xi)

@@ -81,7 +81,7 @@ def _end(state: PairState) -> End:
 
 
 def _endless(balance: Balance, tau_e: FloatArray) -> End:
-    """What the springs come close to while the preload grows without end."""
+    """Return the limit of the springs for a preload that grows without end."""
     phi_1 = balance.first.domain[LARGEST_PRELOAD]
     phi_2 = balance.second.domain[1 - LARGEST_PRELOAD]
     return End(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
@@ -99,7 +99,7 @@ def _at_end(
     otherwise: Values,
     wanted: Callable[[PairState], Values],
 ) -> Values:
-    """What is wanted of the springs where the preload ends; arrays (samples,).
+    """Return values of the springs at the end of the preload; arrays (samples,).
 
     Args:
         balance: the springs.

@@ -26,7 +26,7 @@ from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 from vsacli.compute.rounding import OfRounding
 
 CUSP_SLOPE_RATIO = 30.0
-"""By how much the slope at the end of a stretch exceeds the mean if that end is a cusp.
+"""Smallest ratio of the slope at the end of a stretch to its mean at a cusp.
 
 It does a billion times or more, or some thousand times where rounding hides how the curve begins."""
 
@@ -74,7 +74,7 @@ def outermost_folds(balance: Balance) -> FoldPoints:
 
 
 def _cells(first: SpringLaw, second: SpringLaw) -> _Cells:
-    """Those of negative torques, from the pair turned around, and of positive ones."""
+    """Return the cells of negative torques, from the pair turned around, and of positive ones."""
     above = _positive_cells(first, second)
     below = _positive_cells(Mirrored(law=second), Mirrored(law=first))
     turned = np.where(below.curve == NONE, NONE, below.curve + above.curve.max() + 1)
@@ -86,7 +86,7 @@ def _cells(first: SpringLaw, second: SpringLaw) -> _Cells:
 
 
 def _positive_cells(first: SpringLaw, second: SpringLaw) -> _Cells:
-    """Those of positive tau_e."""
+    """Return the cells of positive tau_e."""
     curves = list(critical_curves(first, second))
     knots = np.unique(np.concatenate([[0.0], *(curve.tau_e for curve in curves)]))
     middle = np.append((knots[:-1] + knots[1:]) / 2, np.inf)
@@ -144,7 +144,7 @@ def _row(balance: Balance, cells: _Cells) -> FoldPoints:
 
 
 def _cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
-    """1 where a stretch begins or ends with a slope that is vertical beside its mean, else 0."""
+    """Return 1 where a stretch begins or ends with a slope far above its mean, else 0."""
     ends = np.unique(last)
     begins = np.append(0, ends[:-1] + 1)
     chord = (phi[:, ends] - phi[:, begins]) / (tau_e[ends] - tau_e[begins])
@@ -208,7 +208,7 @@ class FoldMap(NamedTuple):
 
 
 class _Cubic(NamedTuple):
-    """Where in a cell to evaluate Hermite's cubics.
+    """Arguments of Hermite's cubics in a cell.
 
     Attributes:
         x: share of the cell, or its root, counted from the cusp, if an end is one.
@@ -242,7 +242,7 @@ def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
 
 
 def _kept(points: FoldPoints) -> IndexArray:
-    """As few of the points as there can be with cubics between them that are close to the others."""
+    """Return the fewest points between which cubics are close to the others."""
     farthest = _farthest(points).tolist()
     kept = [0]
     while kept[-1] + 1 < len(farthest):
@@ -251,7 +251,7 @@ def _kept(points: FoldPoints) -> IndexArray:
 
 
 def _farthest(points: FoldPoints) -> IndexArray:
-    """How far from each point a cubic may go, found for all of them at once by steps that are halved."""
+    """Return how far a cubic from each point may extend, for all at once by halved steps."""
     start = np.arange(points.tau_e.size)
     reached = np.minimum(start + 1, points.last)
     step = 1 << int((points.last - start).max()).bit_length()
@@ -307,7 +307,7 @@ def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -
 
 
 def _cubic(points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray) -> _Cubic:
-    """Where in cells from points to others further points are."""
+    """Return the places of further points in cells from points to others."""
     width = points.tau_e[end] - points.tau_e[start]
     share = (points.tau_e[at] - points.tau_e[start]) / width
     return _Cubic.of(share, width, (points.cusp[start], points.cusp[end]))

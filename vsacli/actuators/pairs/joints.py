@@ -55,7 +55,7 @@ class PairElasticity(Elasticity):
         self._springs = SpringRows(pairs)
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return each spring pulls the link and its motor alike."""
+        """Return the torques: each spring pulls the link and its motor equally."""
         tau = self._springs.torque(phi)
         return Torques(tau[..., 0] + tau[..., 1], tau)
 
@@ -77,7 +77,7 @@ class CoupledPairs(PairElasticity):
         self._coupling = coupling
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return the link does not feel the coupling, the motors feel it in opposite directions."""
+        """Return the torques with those of the coupling, which act on the motors in opposite directions."""
         tau_e, tau_spring = super().torques(phi)
         return Torques(tau_e, tau_spring + self._between(phi))
 

@@ -70,7 +70,7 @@ class PreloadedPair:
         return next(word for word in PRELOADS if word != self.preload)
 
     def opposite_reaches(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
-        """Where the other preload reaches a stiffness, (samples,)."""
+        """Return where the other preload attains a stiffness, (samples,)."""
         if self.opposite is None:
             return np.zeros(tau_e.shape, dtype=bool)
         other = replace(self, preload=self.opposite)

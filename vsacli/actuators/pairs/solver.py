@@ -24,7 +24,7 @@ ERROR_RTOL = OfRounding(1e-17)
 """Relative error after a step that is none: the estimate may be some hundred times too small."""
 
 MAX_DOUBLINGS = 1000
-"""From about the demand on, a preload torque leaves the range of numbers before."""
+"""Doublings of a preload, from about the demand on: its torque leaves the range of doubles before."""
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ class StateTrajectory(NamedTuple):
 def continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
 ) -> StateTrajectory:
-    """Return the controller acts at every instant, on the true state."""
+    """Return the states of a run whose controller acts at every instant, on the true state."""
     time, states, ending = integrator.over(times, start)
     demand = loop.controller.torque(time, loop.packing.unpack(states))
     return StateTrajectory(time, states, demand, ending, integrator.effort)
@@ -76,7 +76,7 @@ def sampled(
     start: FloatArray,
     readings: Readings | None = None,
 ) -> StateTrajectory:
-    """Return the controller acts at the times, on measured positions, and its torques are held in between.
+    """Return the states of a run whose controller holds torques between the times, from measured positions.
 
     What is measured are the readings of sensors, or the true positions.
     """

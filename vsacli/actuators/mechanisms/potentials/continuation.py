@@ -25,7 +25,7 @@ LEAST_STEP = OfRounding(1e-13, power=0.9)
 """Length at which a step is none."""
 
 LEAST_COSINE = 0.95
-"""Of the angle by which the level curve may turn in a step."""
+"""Smallest cosine of the angle by which the level curve may turn in a step."""
 
 LEAST_SHARE = 0.25
 """Part of the stiffness, and of the sine, that a step must leave; so it passes no zero."""
@@ -75,13 +75,13 @@ class Spot(NamedTuple):
 
     @property
     def sine(self) -> FloatArray:
-        """Of the angle from the torque's gradient to that of the stiffness: zero where A is singular."""
+        """Sine of the angle from the torque's gradient to that of the stiffness: zero where A is singular."""
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
         return determinant / (self.steepness * length(self.stiffness_1, self.stiffness_2))
 
     @property
     def slope(self) -> FloatArray:
-        """Of the stiffness along the level curve."""
+        """Slope of the stiffness along the level curve."""
         return (self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1) / self.steepness
 
     @property
@@ -104,7 +104,7 @@ class Spot(NamedTuple):
 
 
 def length(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Of a vector; `numpy.hypot` takes ten times as long to spare numbers that no joint has."""
+    """Return the length of a vector; `numpy.hypot` takes ten times as long to avoid overflow."""
     return np.sqrt(a * a + b * b)
 
 
@@ -144,7 +144,7 @@ class LevelCurves:
         return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
 
     def onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
-        """Where the level curve of a torque close by is, and the stiffness there, to first order."""
+        """Return the point on the level curve of a torque close by, with its stiffness, to first order."""
         share = (tau_e - spot.tau_e) / (spot.steepness * spot.steepness)
         by_torque = spot.stiffness_1 * spot.torque_1 + spot.stiffness_2 * spot.torque_2
         return spot._replace(
@@ -154,14 +154,14 @@ class LevelCurves:
         )
 
     def distance(self, spot: Spot) -> FloatArray:
-        """To the nearest end of a range, as a part of it; negative outside."""
+        """Return the distance to the nearest end of a range, as a share of it; negative outside."""
         phi, s = (
             (value - low) / width for value, low, width in zip(spot[:2], self._low, self._width, strict=True)
         )
         return np.minimum(np.minimum(phi, 1 - phi), np.minimum(s, 1 - s))
 
     def room(self, spot: Spot) -> FloatArray:
-        """How far a point is from all ends of the piece."""
+        """Return the distance of a point from all ends of the piece."""
         room: FloatArray = np.abs(spot.sine) * spot.stiffness
         for value, low, width in zip(spot[:2], self._low, self._width, strict=True):
             part = (value - low) / width
@@ -245,7 +245,7 @@ class Branch:
 
     @property
     def stiffest(self) -> Spot:
-        """Where the stiffness is largest under the torque of the start, arrays (1,)."""
+        """Return the largest stiffness under the torque of the start, arrays (1,)."""
         with np.errstate(all="ignore"):
             return self._followed(self.start.tau_e, np.zeros(1)).high
 
@@ -322,7 +322,7 @@ class Branch:
     def _walk(
         self, seed: Spot, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray
     ) -> Spot:
-        """Where the piece ends or meets the goal; direction 1 is that of growing, -1 of falling stiffness."""
+        """Return the end of the piece or the goal; direction 1 with growing, -1 with falling stiffness."""
 
         def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
             h, *values = state

@@ -42,7 +42,7 @@ GRID = 32
 """Places along each range at which the energy is looked at."""
 
 UNBOUNDED = 1e9
-"""Of the stiffness at the start, beyond which a stiffness is that of a pole."""
+"""Stiffness of a pole, relative to that at the start."""
 
 LEAST_START_SINE = 1e-6
 """Sine of the angle between the gradients of torque and stiffness at the start, relative to the ranges, below
@@ -62,7 +62,7 @@ class BranchStart:
 
 @dataclass(frozen=True)
 class PotentialRange:
-    """Where the potential holds."""
+    """The range of validity of a potential."""
 
     phi: tuple[float, float] = interval(units.POSITION, "deflection theta_1 - q")
     theta_2: tuple[float, float] = interval(units.POSITION, "position of motor 2")
@@ -110,17 +110,17 @@ class Potential(Mechanism):
 
     @property
     def deflection_range(self) -> tuple[float, float]:
-        """That of phi."""
+        """Range of phi."""
         return self.range.phi
 
     @property
     def setting_range(self) -> tuple[float, float]:
-        """That of theta_2."""
+        """Range of theta_2."""
         return self.range.theta_2
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Where the energy does not hold although it is said to."""
+        """Warnings of points at which the energy is invalid."""
         return (*self._gaps(), *self._poles())
 
     def _gaps(self) -> Iterator[str]:
@@ -139,14 +139,14 @@ class Potential(Mechanism):
             yield f"{what} {_place(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
 
     def _poles(self) -> Iterator[str]:
-        """Where the stiffness grows beyond all bounds on its way from the start."""
+        """Yield the places where the stiffness grows without bound on its way from the start."""
         stiffest = self._branch.stiffest
         if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
             place = _place(stiffest.phi[0], stiffest.s[0])
             yield f"the energy is no finite number {place}, where the stiffness grows beyond all bounds"
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """On the branch of the start."""
+        """See `Mechanism.solve`; on the branch of the start."""
         return self._branch.solve(tau_e, stiffness, q)
 
     def state(self, coordinates: FloatArray) -> PotentialState:
@@ -164,7 +164,7 @@ class Potential(Mechanism):
         return Branch(curves, self.start.theta_1, self.start.theta_2)
 
     def _problems(self) -> Iterator[FieldProblem]:
-        """What is wrong with the energy; and with the branch, once the rest is right."""
+        """Yield the problems of the energy; without any, those of the branch."""
         found = [*self._word_problems(), *self._range_problems()]
         yield from found or self._branch_problems()
 

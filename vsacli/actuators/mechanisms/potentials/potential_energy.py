@@ -63,7 +63,7 @@ class PotentialEnergy:
         self._row_functions: dict[Truncation, RowFunction] = {}
 
     def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
-        """Its derivatives over q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
+        """Return the derivatives by q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
 
         Numbers are computed by the program of the series: NumPy without it would take ten times as long, to
         find its way through the orders.
@@ -113,7 +113,7 @@ class Derivatives:
 
     @property
     def finite(self) -> BoolArray:
-        """Where all of them are finite."""
+        """Return where all of them are finite."""
         return np.asarray(np.isfinite(list(self._by_order.values())).all(axis=0))
 
     @property
@@ -168,11 +168,11 @@ class PotentialState(MechanismState):
         return self._all.rows
 
     def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """Of -U_q."""
+        """Return the rate of -U_q."""
         return -self._rate((0,), rates)
 
     def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """Of U_qq."""
+        """Return the rate of U_qq."""
         return self._rate((0, 0), rates)
 
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
@@ -180,7 +180,7 @@ class PotentialState(MechanismState):
         return self._curvature((0, 0), rates)
 
     def spring_rates(self, rates: FloatArray) -> FloatArray:
-        """Of the derivatives over theta_1 and theta_2."""
+        """Return the rates of the derivatives by theta_1 and theta_2."""
         return np.stack((self._rate((1,), rates), self._rate((2,), rates)), axis=-1)
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
@@ -203,7 +203,7 @@ class PotentialState(MechanismState):
         return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0]))
 
     def _curvature(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
-        """What is quadratic in the rates in the second time derivative of a derivative of the potential."""
+        """Return the terms quadratic in the rates of the second time derivative of a partial derivative."""
         return sum(
             (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0])
         )

@@ -16,7 +16,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.compute.control_flow import look_up
 
 PRETENSION, FOLD, PEAK, DOMAIN = range(4)
-"""What the branch ends at."""
+"""Kinds of ends of the branch."""
 
 
 class Cells(NamedTuple):
@@ -114,7 +114,7 @@ def map_branch(
 
 
 def _mirrored(lift: LiftOf) -> LiftOf:
-    """That of the cam turned around."""
+    """Return the lift of the cam turned around."""
     return lambda phi: lift(-phi).mirrored()
 
 
@@ -130,7 +130,7 @@ class _Nodes(NamedTuple):
     sign: FloatArray
 
     def mirrored(self) -> _Nodes:
-        """Those of the cam turned around."""
+        """Return the nodes of the cam turned around."""
         turned = self.take(slice(None, None, -1))
         return turned._replace(
             root=-turned.root, outer_slope=-turned.outer_slope, inner_slope=-turned.inner_slope
@@ -146,7 +146,7 @@ class _Nodes(NamedTuple):
         return joined.take(np.argsort(joined.root))
 
     def misses(self, middle: _Nodes) -> BoolArray:
-        """Where the branch ends differently within a cell, or cubics miss its ends in the middle."""
+        """Return where the branch ends differently within a cell, or cubics miss its ends in the middle."""
         differ: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
         width = np.diff(self.root)
         for values, slope, wanted in (
@@ -177,7 +177,7 @@ def _hermite(width: FloatArray, values: FloatArray, slopes: FloatArray) -> Float
 
 
 class _Curve:
-    """Where a function of deflection and torque is zero."""
+    """A curve on which a function of deflection and torque is zero."""
 
     def __init__(self, lift: LiftOf, function: Callable[[Lift], LinearInTorque]) -> None:
         self._lift, self._function = lift, function

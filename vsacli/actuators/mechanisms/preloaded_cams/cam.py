@@ -74,7 +74,7 @@ def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
 
 
 def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
-    """As many as the points call for, over deflections from rest."""
+    """Return the number of pieces that the points require, over deflections from rest."""
     counts = [pieces for pieces in PIECES if pieces <= most]
     return min(counts, key=lambda pieces: _fit(phi, lift, pieces).criterion)
 
@@ -88,7 +88,7 @@ class _Fit(NamedTuple):
 
 
 def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
-    """With so many pieces, over deflections from rest."""
+    """Return the fit with this number of pieces, over deflections from rest."""
     knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
     count = len(knots) - DEGREE - 1
     shapes = [spline_curve(knots, weights, DEGREE, _lift) for weights in np.eye(count)]
@@ -195,7 +195,7 @@ class Cam(PreloadedCam):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """How well the curve fits."""
+        """Warnings of a poor fit."""
         return misfit_warnings(self.profile, self._fitted.misfit)
 
     @property
@@ -205,12 +205,12 @@ class Cam(PreloadedCam):
 
     @property
     def rest(self) -> float:
-        """Where the fitted curve has its minimum."""
+        """Minimum of the fitted curve."""
         return self._fitted.rest
 
     @property
     def deflection_range(self) -> tuple[float, float]:
-        """That of the points."""
+        """Range of the points."""
         return float(self.profile.values[0, 0]), float(self.profile.values[-1, 0])
 
     def lift(self, from_rest: FloatArray) -> Lift:

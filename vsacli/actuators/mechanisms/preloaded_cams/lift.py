@@ -35,7 +35,7 @@ class LinearInTorque(NamedTuple):
         return self.a + self.b * tau_e
 
     def slope(self, tau_e: FloatArray) -> FloatArray:
-        """Its derivative over the deflection."""
+        """Return the derivative by the deflection."""
         return self.a_slope + self.b_slope * tau_e
 
 
@@ -57,7 +57,7 @@ class Lift(NamedTuple):
     l4: FloatArray
 
     def mirrored(self) -> Lift:
-        """That of the cam turned around, at the opposite deflection."""
+        """Return the lift of the cam turned around, at the opposite deflection."""
         return self._replace(l1=-self.l1, l3=-self.l3)
 
     def after(self, step: FloatArray) -> Lift:

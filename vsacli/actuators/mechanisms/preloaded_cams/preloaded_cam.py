@@ -66,12 +66,12 @@ class PreloadedCam(Mechanism):
         return low, high
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """On the branch of the largest pretension; see `Mechanism.solve`."""
+        """See `Mechanism.solve`; on the branch of the largest pretension."""
         found = _solver(self).solve(tau_e, stiffness)
         return found._replace(phi_1=self.rest + found.phi_1, phi_2=found.phi_2 / self.r)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """Those of k/2 (l + r s)^2."""
+        """Return the derivatives of k/2 (l + r s)^2."""
         k, r, lift = self.k, self.r, self.lift(phi - self.rest)
         compression = lift.l + r * s
         spring = lift.spring(k, r * s)
@@ -93,7 +93,7 @@ class PreloadedCam(Mechanism):
 
 @lru_cache(maxsize=1024)
 def _solver(cam: PreloadedCam) -> CamSolver:
-    """What solves a cam; equal ones have the same, with the map of the branch that is made once."""
+    """Return the solver of a cam; equal cams share one, with the map of the branch."""
     low, high = cam.deflection_range
     domain = low - cam.rest, high - cam.rest
     branch = map_branch(cam.lift, domain, cam.k, cam.pretension)

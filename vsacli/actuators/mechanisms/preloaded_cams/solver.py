@@ -64,7 +64,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class CamSolver:
-    """What solves a cam.
+    """The solver of a cam.
 
     Attributes:
         lift: over deflections from rest.
@@ -144,7 +144,7 @@ class CamSolver:
     def _corrected(
         self, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift, FloatArray], LinearInTorque]
     ) -> tuple[FloatArray, Lift]:
-        """Where a function is zero, by two Newton steps, and the lift there."""
+        """Return the zero of a function after two Newton steps, and the lift there."""
         lift = self.lift(phi)
         step = _newton_step(function(lift, phi), phi, tau_e)
         step = step + _newton_step(function(lift.after(step), phi + step), phi, tau_e)

@@ -57,7 +57,7 @@ class Sine:
         return np.arcsin(torque * (self.ratio / self.k)) / self.ratio
 
     def deflection_at(self, quotient: FloatArray) -> FloatArray:
-        """Where torque over stiffness, tan(ratio phi)/ratio, has a value."""
+        """Return the deflection at which torque over stiffness, tan(ratio phi)/ratio, has a value."""
         return np.arctan(self.ratio * quotient) / self.ratio
 
     def state(self, phi: FloatArray) -> SpringState:
@@ -126,7 +126,7 @@ class SineRatio(Mechanism):
         """The smallest and the largest K."""
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """Those of K(s) sin^2(phi)."""
+        """Return the derivatives of K(s) sin^2(phi)."""
         return ratio_partials(self.scale(s), *TURN.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002

@@ -195,7 +195,7 @@ class MeasuredScale(ScaleLaw):
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, ...]:
-        """Where each cubic begins, and its coefficients from the constant on, arrays (pieces,)."""
+        """Start of each cubic, and its coefficients from the constant on, arrays (pieces,)."""
         from scipy.interpolate import CubicSpline
 
         settings, scales = self.file.values.T

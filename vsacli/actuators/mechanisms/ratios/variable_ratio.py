@@ -33,7 +33,7 @@ ENDLESS = 1e3
 
 
 class _Limit(NamedTuple):
-    """How far the deflection goes to one side of rest on the branch.
+    """The end of the deflection to one side of rest on the branch.
 
     Attributes:
         phi: the last deflection, infinite if there is none.
@@ -91,12 +91,12 @@ class VariableRatio(Mechanism):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the torque."""
+        """Warnings of the torque."""
         return self.torque.warnings
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of scale and torque."""
+        """Files of scale and torque."""
         return (*self.scale.sources, *self.torque.sources)
 
     @property
@@ -106,11 +106,11 @@ class VariableRatio(Mechanism):
 
     @property
     def setting_range(self) -> tuple[float, float]:
-        """As given."""
+        """The given range."""
         return self.setting
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """Those of K w, with the energy w of the torque g."""
+        """Return the derivatives of K w, with the energy w of the torque g."""
         return ratio_partials(self.scale.at(s), *self.torque.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
@@ -151,7 +151,7 @@ class VariableRatio(Mechanism):
         return found - ratio, 1 - found * slope, bent
 
     def _end(self, tau_e: FloatArray, scale: float) -> _End:
-        """Where the branch has a scale, or ends before."""
+        """Return the end of the branch at a scale."""
         below, above = self._limits
         torque = tau_e / scale
         under, over = torque < below.torque, torque > above.torque
@@ -165,16 +165,16 @@ class VariableRatio(Mechanism):
 
     @cached_property
     def _limits(self) -> tuple[_Limit, _Limit]:
-        """To the negative and to the positive side."""
+        """Limits to the negative and to the positive side."""
         below, above = zip(self.torque.domain, self.torque.torque_range, strict=True)
         return _limit(self.torque, *below), _limit(self.torque, *above)
 
 
 def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
-    """How far the deflection goes to one side, which ends there with a torque."""
+    """Return the limit of the deflection to one side, which ends there with a torque."""
 
     def falling(phi: FloatArray) -> FloatArray:
-        """What is positive where the stiffness falls along the branch."""
+        """Return a function that is positive where the stiffness falls along the branch."""
         state = law.state(phi)
         return state.sigma * state.sigma - state.tau * state.zeta
 
