@@ -1,4 +1,4 @@
-"""What happens between the steps of a run: where margins and distances to limits are least.
+"""Minima of margins and of distances to limits between the samples of a run.
 
 A run computes a trajectory at its steps, but that is a function of time. Around each local minimum of a
 clearance that may come near its bound, the run is computed at further times, until the minimum is known. The
@@ -171,7 +171,7 @@ class Between:
                 self._least_between[number] = clearance, quantity.at(own.of_joint(quantity.number), least)
 
     def reports(self) -> list[dict[str, Worst]]:
-        """For each joint what comes nearer to its bound between the steps than at any step, by its kind."""
+        """Return for each joint the clearances that are lower between the samples than at any of them."""
         reports: list[dict[str, Worst]] = [{} for _ in range(self._joints)]
         nearest_last = sorted(self._least_between.items(), reverse=True, key=lambda entry: entry[1][0])
         for number, (clearance, worst) in nearest_last:  # of two motors the last one stays
@@ -253,7 +253,7 @@ class Between:
             yield part, clearances(self.quantities, block)
 
     def _parts(self, times: int) -> Iterator[slice]:
-        """So many times in blocks of the usual size."""
+        """Yield times in blocks of the usual size."""
         count = usual_block(self._joints)
         return (slice(start, start + count) for start in range(0, times, count))
 

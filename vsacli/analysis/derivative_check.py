@@ -41,7 +41,7 @@ LADDER_BOUND = 1e-8
 1 %. Where differences must be taken over short steps rounding leaves more, see `ROUNDING_GAIN`."""
 
 ROUNDING_GAIN = 30.0
-"""What rounding may leave of a difference over the step h, relative to the derivative, in eps T/h.
+"""Rounding of a difference over the step h relative to the derivative, in eps T/h.
 
 A time up to T is rounded by eps T/2, a value v by some eps v, so that a difference is off by
 eps (T v' + v)/h, which relative to the peak of v' is eps T/h, or a few times that, since v is hardly above
@@ -70,7 +70,7 @@ RUNGS = (
     Rung("stiffness", "dstiffness", "stiffness", 1),
     Rung("dstiffness", "ddstiffness", "stiffness", 2),
 )
-"""What is compared; the deflections by themselves, since the motion of the joint can hide them in theta, the
+"""Compared variables; the deflections too, since the motion of the joint can hide them in theta, and the
 stiffness where it is not commanded."""
 
 PROBES = 200
@@ -83,7 +83,7 @@ The smallest are for motions that leave the corridor within a thousandth of thei
 """
 
 FIRST_SCALES = STEP_SCALES[:2]
-"""Those that are tried first: for most motions the smaller ones only add rounding."""
+"""Scales tried first: for most motions the smaller ones only add rounding."""
 
 CLEAR = 1e-10
 """Error at which smaller steps are not tried any more, a hundredth of the bound."""
@@ -218,7 +218,7 @@ def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> F
 
 
 def _compared(actuator: Actuator, name: str) -> list[bool]:
-    """Which columns of a variable of joints or motors are computed, not commanded, at such an actuator."""
+    """Return which columns of a variable are computed, not commanded, at such an actuator."""
     commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
     return [False] if name in commanded else actuator.has(VARIABLES[name])
 

@@ -65,7 +65,7 @@ class FrictionPassages:
             self._passages[number] = every[fastest]
 
     def notes(self, trajectory: Trajectory, compute: Callable[[Motion], Block]) -> Iterator[str]:
-        """What the steps do not show, a sentence for each joint."""
+        """Yield a sentence for each joint on friction that the samples do not show."""
         for (index, joint, width), passages, peak in zip(
             self._joints, self._passages, self._peaks, strict=True
         ):
@@ -86,7 +86,7 @@ class FrictionPassages:
 
 
 def _times(trajectory: Trajectory, passages: FloatArray, index: int, width: float) -> FloatArray:
-    """When the velocity of a joint is at levels between -3 and 3 widths, within passages; by bisection."""
+    """Return when the velocity of a joint is at levels between -3 and 3 widths, by bisection."""
     early, late, before, after = np.repeat(passages, LEVELS, axis=0).T
     level = np.tile(width * np.linspace(-REACH, REACH, LEVELS), len(passages))
     level = np.clip(level, np.minimum(before, after), np.maximum(before, after))
@@ -131,7 +131,7 @@ class DryFriction(Stored):
 
     @property
     def jump(self) -> float:
-        """By how much its torque jumps where it turns back, N m (N)."""
+        """Jump of the torque where it turns back, N m (N)."""
         return self.highest - self.lowest
 
 
@@ -164,7 +164,7 @@ class DryFrictionSummary:
         self._steps += len(time)
 
     def report(self) -> DryFriction:
-        """What was found so far."""
+        """Return the findings so far."""
         start = self._steps if self._first_moving < 0 else self._first_moving
         end = self._steps - 1 - self._moving if self._moving >= 0 else 0
         return DryFriction(
@@ -189,7 +189,7 @@ def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
 
 
 def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterator[str]:
-    """From names and types of joints, each with a motor: a line on rest, and one on turning back."""
+    """Yield a line on rest and one on turning back, for named joints with a motor each."""
     resting = [entry for entry in found if entry[2].start + entry[2].between + entry[2].end]
     if resting:
         name, joint_type, most = max(resting, key=lambda entry: entry[2].jump)
@@ -209,7 +209,7 @@ def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterato
 
 
 def _rests(motors: Sequence[DryFriction]) -> Iterator[str]:
-    """When motors rest."""
+    """Yield when motors rest."""
     yield "at the start" if any(each.start for each in motors) else ""
     between = max(each.between for each in motors)
     yield f"up to {between} steps on the way" if between else ""

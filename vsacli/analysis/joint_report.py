@@ -1,4 +1,4 @@
-"""What a run found at one joint."""
+"""Findings of a run at one joint."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COUNTED = {
 """Kinds of trouble whose steps are counted, and the bits that make them."""
 
 UNKNOWN = (math.nan, math.nan)
-"""Of both motors, where a report was written before this was stated."""
+"""Values of both motors in reports written before these were stated."""
 
 
 DETERMINED = 0.1
@@ -52,7 +52,7 @@ class Worst(Stored):
 
 @dataclass(frozen=True)
 class Spread(Stored):
-    """How uncertain a variable of a joint is, away from the doubtful ends of the records.
+    """The uncertainty of a variable of a joint, away from the unreliable ends of recordings.
 
     Attributes:
         name: of the variable.
@@ -85,7 +85,7 @@ class Spread(Stored):
 
 @dataclass(frozen=True)
 class JointUncertainty(Stored):
-    """What recorded signals leave uncertain at a joint.
+    """The uncertainty of a joint that recorded signals leave.
 
     Attributes:
         variables: how uncertain the motor torque is, and each variable that was asked for.
@@ -103,7 +103,7 @@ class JointUncertainty(Stored):
 
     @property
     def undetermined(self) -> tuple[Spread, ...]:
-        """What was asked for and is not determined."""
+        """Requested variables that are not determined."""
         return tuple(
             spread for name, spread in self.variables.items() if name in self.asked and not spread.determined
         )
@@ -111,7 +111,7 @@ class JointUncertainty(Stored):
 
 @dataclass(frozen=True)
 class JointReport(Stored):
-    """What a run found at one joint; torques in N m (N), stiffness in N m/rad (N/m).
+    """The findings of a run at one joint; torques in N m (N), stiffness in N m/rad (N/m).
 
     Attributes:
         name: of the joint.
@@ -188,7 +188,7 @@ class JointReport(Stored):
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """From what `as_json` gave: no end of a corridor is NaN alone, so the upper is infinite."""
+        """Return a report from `as_json`: no upper end alone is NaN, so it is infinite."""
         joint = super().from_json(content, **further)
         lower, upper = joint.reachable
         if math.isnan(upper) and not math.isnan(lower):
@@ -198,7 +198,7 @@ class JointReport(Stored):
 
 @dataclass(frozen=True)
 class JointDrift(Stored):
-    """What became of the integrated deflections of a joint.
+    """The drift of the integrated deflections of a joint.
 
     Attributes:
         joint: its name.

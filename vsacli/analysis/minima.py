@@ -22,7 +22,7 @@ REACH = Flag.INFEASIBLE | Flag.SLACK | Flag.SINGULAR | Flag.NEAR_SINGULAR | Flag
 """Bits that concern a stiffness in its corridor."""
 
 MARGIN = "margin"
-"""What the clearance of a stiffness is called; that of a limit is called as its flag."""
+"""Name of the clearance of a stiffness; those of limits have the names of their flags."""
 
 
 class Bounded(NamedTuple):
@@ -91,19 +91,19 @@ ROUNDING = 1e-10
 """Differences that do not count: a tenth of the margin that is singular, or of the excess over a limit."""
 
 SHARES = np.array([1, 2]) / 3
-"""Where both halves of a bracket are computed, for functions that no parabola describes."""
+"""Places in both halves of a bracket, for functions that no parabola describes."""
 
 CLOSE = np.array([-0.01, 0.0, 0.01])
-"""Where else, about the lowest point of a parabola, in widths of the bracket: around a smooth minimum that
+"""Places about the lowest point of a parabola, in widths of the bracket: around a smooth minimum that
 becomes fifty times narrower, and its fall 2500 times smaller."""
 
 ROUNDS = 16
-"""At most: 3^-16 of a step is 2e-8 of it. Smooth minima take one or two, kinks and jumps more."""
+"""Most rounds: 3^-16 of a step is 2e-8 of it. Smooth minima take one or two, kinks and jumps more."""
 
 TINY = np.finfo(float).tiny
 
 Evaluate = Callable[[IndexArray, FloatArray], FloatArray]
-"""From functions by number, (n,), and times for each, (n, times), to values (n, times)."""
+"""Function from numbers of quantities, (n,), and times for each, (n, times), to values (n, times)."""
 
 
 class Known(NamedTuple):
@@ -130,15 +130,15 @@ class Known(NamedTuple):
         return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 
     def followed_by(self, time: FloatArray, value: FloatArray) -> Known:
-        """With those that come next."""
+        """Return these with the next ones."""
         return Known(self.first, np.append(self.time, time), np.hstack((self.value, value)))
 
     def opened(self) -> Known:
-        """With the first time once more, so that it has a neighbour on either side."""
+        """Return these with the first time twice, so that it has a neighbour on either side."""
         return Known(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
 
     def closed(self) -> Known:
-        """With the last time once more, a trifle higher: a minimum at the end of a fall is one."""
+        """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
         return self.followed_by(self.time[-1:], np.nextafter(self.value[:, -1:], np.inf))
 
 
@@ -157,7 +157,7 @@ class Brackets(NamedTuple):
 
     @property
     def fall(self) -> FloatArray:
-        """By how much a minimum may be lower than the middle, (n,).
+        """Bound of the fall of a minimum below the middle, (n,).
 
         A convex function lies above the lines through the middle and either end. An end at the time of the
         middle is taken for one as far away, and as high, as the other.
@@ -173,7 +173,7 @@ class Brackets(NamedTuple):
 
     @property
     def unknown(self) -> BoolArray:
-        """Whose minimum may be lower than the middle by more than `KNOWN`, (n,).
+        """Brackets whose minimum may be lower than the middle by more than `KNOWN`, (n,).
 
         Where a value does not exist nothing is looked for.
         """
@@ -183,7 +183,7 @@ class Brackets(NamedTuple):
 
     @property
     def lowest_of_parabola(self) -> FloatArray:
-        """When the parabola through the three is lowest, (n, 1); the middle if it has no lowest point."""
+        """Time of the minimum of the parabola through the three, (n, 1); the middle without one."""
         (left, middle, right), (at_left, at_middle, at_right) = (
             np.hsplit(array, 3) for array in (self.time, self.value)
         )

@@ -15,7 +15,7 @@ from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "doubtful", "self_check_failed")
-"""From best to worst; the worst that applies wins."""
+"""Verdicts from best to worst; the worst that applies wins."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Report(Stored):
 
     @property
     def deflections(self) -> str:
-        """How the deflections were found: as the "root" of (14) at each step, or by "integrate"."""
+        """Method for the deflections: the "root" of (14) at each sample, or "integrate"."""
         return "integrate" if self.drifts else "root"
 
     def as_text(self) -> ReportText:
@@ -99,7 +99,7 @@ class Report(Stored):
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """From what `as_json` gave, as a result file holds it.
+        """Return the report from `as_json`, as result files hold it.
 
         Raises:
             LookupError, TypeError, AttributeError, ValueError: it is no such report.

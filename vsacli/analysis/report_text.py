@@ -15,7 +15,7 @@ from vsacli.dynamics.energy import JointEnergy
 
 
 def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
-    """From names, types and energies of joints: sums, if all have them, and the joints with the most."""
+    """Yield sums of energy, if all joints have them, and the joints with the most."""
     energies = [energy for _, _, energy in joints]
     if not any(math.isnan(energy.spent) for energy in energies):
         spent, recovered = (
@@ -34,7 +34,7 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
 
 
 def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
-    """What friction and windings take, of a robot whose file says so."""
+    """Yield the losses by friction and in windings, if the robot file has them."""
     taken = {
         "friction and damping take {} J": [energy.dissipated for energy in energies],
         "the windings turn {} J into heat": [energy.copper_loss for energy in energies],
@@ -72,7 +72,7 @@ def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterato
 
 
 def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
-    """What was run at the left, the verdict in capitals at the right."""
+    """Return robot and trajectory at the left, the verdict in capitals at the right."""
     words = verdict.upper().replace("_", " ")
     if verdict in TROUBLE:
         concerned = sum(any(map(joint.shows, TROUBLE)) for joint in joints)
@@ -103,13 +103,13 @@ def _row(joint: JointReport) -> tuple[str, ...]:
 
 
 def kind_of(joint: JointReport) -> type[Actuator]:
-    """Of its actuator."""
+    """Return the kind of the actuator."""
     kind: type[Actuator] = ACTUATORS[joint.actuator]
     return kind
 
 
 def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
-    """Of a pair of numbers those of the motors that the joint has."""
+    """Return the values of a pair for the motors that the joint has."""
     return pair[: kind_of(joint).motor_count]
 
 
@@ -147,7 +147,7 @@ def apart(value: float, bound: float) -> tuple[str, str]:
 
 
 def _rounded(value: float, digits: int) -> str:
-    """To so many significant digits, or to all those before the point."""
+    """Return a number with this many significant digits, or all those before the point."""
     return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
@@ -157,7 +157,7 @@ def count(steps: int) -> str:
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Where the motors are at the first step, which of them move, and the largest step of a torque there."""
+    """Yield the initial motor positions, which motors move, and the largest torque step."""
     yield _all(
         "start motors at: ", joints, [_positions(joint, joint.start_theta, "first") for joint in joints]
     )
@@ -170,7 +170,7 @@ def start(joints: Sequence[JointReport]) -> Iterator[str]:
 
 
 def end(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Where the motors are at the last step, and which of them still move; nothing if it was not computed."""
+    """Yield the final motor positions, and which motors still move; nothing if not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
     yield _all("end motors at: ", joints, [_positions(joint, joint.end_theta, "last") for joint in joints])
@@ -210,7 +210,7 @@ def _signed(values: Iterable[float]) -> str:
 
 
 def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
-    """From when on deflections could not be integrated."""
+    """Yield from when on deflections could not be integrated."""
     infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
     for drift in drifts:
         if drift.stop is not None:
@@ -220,7 +220,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
 
 
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
-    """How far integrated deflections drifted, if they were."""
+    """Yield the drift of integrated deflections, if there are any."""
     if drifts:
         yield by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
 
@@ -232,7 +232,7 @@ def _drift_of(drift: JointDrift) -> str:
 
 
 def by_joint(label: str, entries: Sequence[str]) -> str:
-    """What is to be said of each joint, a few to a line."""
+    """Return an entry for each joint, a few to a line."""
     lines = [
         ", ".join(entries[first : first + JOINTS_PER_LINE])
         for first in range(0, len(entries), JOINTS_PER_LINE)
@@ -241,7 +241,7 @@ def by_joint(label: str, entries: Sequence[str]) -> str:
 
 
 def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
-    """What is to be said of joints, by number; where they are many, those alike are named together."""
+    """Return entries of joints by number; equal ones of many joints are listed together."""
     alike: dict[str, list[int]] = {}
     for number, words in said.items():
         alike.setdefault(words, []).append(number)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Shown:
-    """How a result looks in a terminal and in a notebook: what was run, its verdict, a line a joint."""
+    """The display of a result in a terminal and in a notebook: run, verdict, a line for each joint."""
 
     report: Report
 

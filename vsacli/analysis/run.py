@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from vsacli.dynamics.internal_motion import InternalMotions
 
 DEFLECTIONS = ("root", "integrate")
-"""How deflections are found: as the root of (14) at each step, or from that of the first step by (19)."""
+"""Methods for deflections: the root of (14) at each sample, or integration of (19) from the first root."""
 
 
 class Run:
@@ -136,7 +136,7 @@ class Run:
         return block_of(self._kernel, motion, engine, integrated=integrated, internal=internal)
 
     def _judged(self, block: Block) -> Block:
-        """With the limits that are exceeded beyond what recorded signals leave uncertain."""
+        """Return the block with flags of limits exceeded beyond the uncertainty of recorded signals."""
         return block if self._uncertainty is None else self._uncertainty.judged(block)
 
     def _merged(self, block: Block) -> Block:
@@ -169,7 +169,7 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What to remember of how it computes, to repeat it: engine and options."""
+        """Values needed to repeat the run: engine and options."""
         options = {
             "stop_on_infeasible": self._stop_on_infeasible,
             "near_singular": self._near_singular,
@@ -207,7 +207,7 @@ class Run:
         return [None] * len(self._summaries) if self._uncertainty is None else self._uncertainty.report()
 
     def _internal_stops(self) -> Iterator[str]:
-        """Where motions inside damped transmissions end before the trajectory does."""
+        """Yield where motions inside damped transmissions end before the trajectory does."""
         for index, stop in self._internal.stops.items() if self._internal is not None else ():
             joint = self.robot.joint_names[index]
             when = f"cannot go on beyond t = {time_text(stop.time)}"
@@ -278,7 +278,7 @@ def _integrated(
 
 
 def _internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions | None:
-    """What moves inside damped transmissions; None if there are none."""
+    """Return the motions inside damped transmissions; None if there are none."""
     if not any(joint.damper_at("transmission") for joint in robot.joints):
         return None
     from vsacli.dynamics.internal_motion import internal_motions
@@ -289,7 +289,7 @@ def _internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions |
 def _uncertainty(
     robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
 ) -> RunUncertainty | None:
-    """What keeps account of it; None if nothing comes from fits of records."""
+    """Return the uncertainty of the run; None if no signal was recorded."""
     if not trajectory.estimates:
         return None
     from vsacli.analysis.run_uncertainty import RunUncertainty, judged_variables

@@ -1,4 +1,4 @@
-"""What recorded signals leave uncertain in a run: deviations, limits judged by them, shares."""
+"""Uncertainty of a run by its recorded signals: deviations, limits judged by them, shares."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 SMALLEST_SHARE = 0.01
-"""Of the largest torque of any joint against which smaller ones are measured: what a joint at rest carries
+"""Share of the largest torque of any joint that smaller ones are compared with: torques of a resting joint
 may be nothing but noise."""
 
 WITHIN = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
@@ -104,7 +104,7 @@ class RunUncertainty:
         return block
 
     def _count_steps(self, block: Block, deviations: FloatArray) -> None:
-        """Those that a change of the margin by its uncertainty would make feasible, or regular."""
+        """Count samples that the uncertainty of the margin could make feasible, or regular."""
         gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
         near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
         for kind, bit in WITHIN.items():
@@ -127,7 +127,7 @@ class RunUncertainty:
         block.flags[:, index] &= ~(seen & ~exceeded)  # others are of what lies between the steps
 
     def report(self) -> list[JointUncertainty]:
-        """What was found so far, of each joint."""
+        """Return the findings so far, for each joint."""
         types = np.array(self._robot.joint_types)
         spreads = [spread for name, powers in self._powers.items() for spread in powers.spreads(name, types)]
         return [
@@ -170,7 +170,7 @@ class _Powers:
         self._largest = np.maximum(self._largest, np.max(deviations, axis=0, where=exists, initial=0.0))
 
     def spreads(self, name: str, types: AnyArray) -> Iterator[tuple[int, Spread]]:
-        """With the indices of the joints that have the variable; types of joints are (joints,)."""
+        """Yield the spread and index of the joints that have the variable; types of joints are (joints,)."""
         with np.errstate(invalid="ignore"):
             size, rms = np.sqrt([self._values / self._count, self._deviations / self._count])
         for index, joint_type in enumerate(types):

@@ -23,7 +23,7 @@ REACH = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "near_singula
 
 
 class JointSummary:
-    """What there is to report of one joint; `add` blocks in order, then ask for the `report`."""
+    """The summary of one joint; `add` blocks in order, then call `report`."""
 
     def __init__(self, joint: Joint, index: int) -> None:
         self._joint = joint
@@ -98,7 +98,7 @@ class JointSummary:
         *,
         complete: bool,
     ) -> JointReport:
-        """What was found so far, besides what is given; at least one block must have been added.
+        """Return the report of the joint; at least one block must have been added.
 
         Args:
             energy: of the joint.
@@ -208,7 +208,7 @@ class JointSummary:
                 self._keep(excess.size, worst)
 
     def _torque_step(self, block: Block) -> FloatArray:
-        """Of motors behind springs, whose torques do not jump."""
+        """Return the torque step of motors behind springs, whose torques do not jump."""
         if not self._joint.actuator.sprung:
             return np.full(len(MOTORS), np.nan)
         step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
@@ -220,7 +220,7 @@ class JointSummary:
 
 
 class DriftSummary:
-    """How far integrated deflections of one joint drift from the root of (14).
+    """The drift of the integrated deflections of one joint from the root of (14).
 
     `add` blocks in order, then ask for the `report`.
     """
@@ -243,7 +243,7 @@ class DriftSummary:
                 self._largest, self._time = float(drift[step]), float(block.time[step])
 
     def report(self) -> JointDrift:
-        """What was found so far."""
+        """Return the drift so far."""
         unit = VARIABLES["phi"].quantity.unit(self._joint.type)
         return JointDrift(self._joint.name, self._largest, self._time, unit, self._stop)
 

@@ -15,7 +15,7 @@ DIFFERENT_PEAK = 1.1
 
 
 def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
-    """How uncertain the motor torques of recorded motions are, and what that means for the rest."""
+    """Yield the uncertainty of motor torques of recorded motions, and its consequences."""
     found = [(joint, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
     for joint, uncertainty in found:
         yield from (f"{joint.name}: {sentence}" for sentence in _sentences(joint, uncertainty))
@@ -53,7 +53,7 @@ def _spread(name: str, spread: Spread) -> str:
 
 
 def undetermined_text(spread: Spread) -> str:
-    """That a record does not determine a variable, and by how much it may be wrong."""
+    """Return that a recording does not determine a variable, and its possible error."""
     what = f"{spread.name} is not determined by the record"
     if math.isnan(spread.bound):
         return f"{what}, since a signal that it depends on is not"
@@ -91,7 +91,7 @@ def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
 
 
 def _told(joints: Sequence[JointReport], kind: str) -> Sequence[JointReport]:
-    """Those of the joints that have a kind of trouble with the most steps, or farthest beyond their limit."""
+    """Return the joints with the most samples of a kind of trouble, or farthest beyond their limit."""
     if len(joints) <= MOST_TOLD + 1:
         return joints
 
@@ -182,7 +182,7 @@ def _limit(joint: JointReport, worst: Worst) -> str:
 
 
 def excess(worst: Worst) -> str:
-    """By how much a limit is exceeded, and where."""
+    """Return by how much a limit is exceeded, and where."""
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"

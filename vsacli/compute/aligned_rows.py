@@ -23,6 +23,6 @@ def aligned_rows(rows: int, samples: int, dtype: type[np.generic] = np.float64) 
 
 
 def address(array: AnyArray) -> int:
-    """Of its first entry."""
+    """Return the address of its first entry."""
     found: int = array.__array_interface__["data"][0]
     return found

@@ -42,7 +42,7 @@ def where_needed(mask: BoolArray, function: Function, arguments: Values, otherwi
 
 
 def look_up(tables: Sequence[FloatArray], index: IndexArray) -> Values:
-    """What each of several tables of constants, (count,), has at indices of any shape."""
+    """Return the entries of several tables of constants, (count,), at indices of any shape."""
     result: Values = look_up_on(index, tables)
     return result
 
@@ -94,7 +94,7 @@ class Keyed:
     function: Callable[..., Any] = field(compare=False)
 
     def __call__(self, *arguments: Any) -> Any:
-        """What the function computes."""
+        """Return the values of the function."""
         return self.function(*arguments)
 
 

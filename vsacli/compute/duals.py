@@ -38,7 +38,7 @@ class Dual(NDArrayOperatorsMixin):
 
     @classmethod
     def of(cls, value: Any, derivatives: FloatArray) -> Dual:
-        """From the derivatives in all directions, (directions, *shape of the values)."""
+        """Return a dual from the derivatives in all directions, (directions, *shape of the values)."""
         return cls(value, {direction: row for direction, row in enumerate(derivatives) if row.any()})
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
@@ -92,30 +92,30 @@ class Dual(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the values."""
+        """Shape of the values."""
         return np.shape(self.value)
 
     @property
     def ndim(self) -> int:
-        """Of the values."""
+        """Dimensions of the values."""
         return np.ndim(self.value)
 
     @property
     def size(self) -> int:
-        """Of the values."""
+        """Size of the values."""
         return np.size(self.value)
 
     @property
     def T(self) -> Dual:  # noqa: N802  (NumPy's name)
-        """As of an array."""
+        """Transpose."""
         return self._arranged(np.transpose)
 
     def sum(self, axis: int) -> Dual:
-        """As of an array."""
+        """Return the sum along an axis."""
         return self._arranged(lambda array: np.sum(array, axis=axis))
 
     def _arranged(self, function: Callable[[FloatArray], FloatArray]) -> Dual:
-        """What entries become that are chosen, moved or added up."""
+        """Return the dual whose entries are chosen, moved or added up."""
         tangents = {at: function(_spread(each, self.shape)) for at, each in self.tangents.items()}
         return Dual(function(self.value), tangents)
 
@@ -186,7 +186,7 @@ def _total(first: Tangents, second: Tangents) -> Tangents:
 
 
 def _scaled(tangents: Tangents, factor: Scalar) -> Tangents:
-    """By an array, or by a constant that folds."""
+    """Return tangents times an array, or times a constant that folds."""
     if type(factor) is not int:
         return {direction: tangent * factor for direction, tangent in tangents.items()}
     if factor == 1:

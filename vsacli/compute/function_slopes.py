@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 Slopes = Callable[..., Sequence[Callable[[], Any]]]
-"""From the result and the operands of a function: its derivative by each operand, computed if needed."""
+"""Function from result and operands of a function to its derivatives by each operand, computed if needed."""
 
 SLOPES: Mapping[np.ufunc, Slopes] = {
     np.divide: lambda r, _a, b: (lambda: 1.0 / b, lambda: -r / b),

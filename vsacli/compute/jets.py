@@ -18,7 +18,7 @@ import numpy as np
 from vsacli.compute.vector import Scalar, add, mul, sub
 
 Order = tuple[int, ...]
-"""How often a function is differentiated over each variable."""
+"""Number of differentiations by each variable."""
 
 Terms = Mapping[Order, Scalar]
 
@@ -27,7 +27,7 @@ MOST_FACTORS = 1000
 
 
 class Truncation:
-    """Which derivatives jets hold; with each also those of fewer differentiations.
+    """The set of derivatives that jets hold, closed under fewer differentiations.
 
     Attributes:
         variables: number of variables.
@@ -153,7 +153,7 @@ def _is_zero(term: Scalar) -> bool:
 
 
 def _whole_power(base: Jet, exponent: int) -> Jet:
-    """By squaring, so that it holds at zero too."""
+    """Return a whole power by squaring, which is valid at zero too."""
     result, square = base * 0 + 1, base
     while exponent:
         if exponent % 2:
@@ -205,7 +205,7 @@ def _cosine(value: Scalar) -> Iterator[Scalar]:
 
 
 def _tangent(value: Scalar) -> Iterator[Scalar]:
-    """From tan' = 1 + tan^2."""
+    """Yield the series of tan by tan' = 1 + tan^2."""
     known = [np.tan(value)]
     for number in count(1):
         yield known[-1]

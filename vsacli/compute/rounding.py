@@ -25,7 +25,7 @@ class OfRounding(float):
     power: float
 
     def __new__(cls, value: float, power: float = 1.0) -> Self:
-        """From the tolerance for double precision."""
+        """Return a tolerance from that for double precision."""
         new = super().__new__(cls, value)
         new.power = power
         return new

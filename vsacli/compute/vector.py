@@ -173,5 +173,5 @@ class Matrix(NamedTuple):
         return Vector(self.x.dot(v), self.y.dot(v), self.z.dot(v))
 
     def transposed(self) -> Matrix:
-        """Its transpose, which is the inverse of a rotation."""
+        """Transpose, the inverse of a rotation."""
         return Matrix(*(Vector(*column) for column in zip(self.x, self.y, self.z, strict=True)))

@@ -25,7 +25,7 @@ from vsacli.trajectory.motion import Motion
 
 
 class LinkMotion(NamedTuple):
-    """What the state says about the links, each ([samples,] joints).
+    """The motion of the links at a state, each ([samples,] joints).
 
     The stiffness of an elastic joint is that of its spring.
     """
@@ -96,7 +96,7 @@ class Decoupling:
         wrench: Wrench | None,
         commanded: Mapping[str, FloatArray] = MappingProxyType({}),
     ) -> LinkMotion:
-        """What the state says about the links, under a wrench and the damping that is commanded."""
+        """Return the motion of the links at a state, under a wrench and commanded damping."""
         return self._link_motion(q, dq, self._plant.drivetrain.state(q, theta, dq, dtheta), wrench, commanded)
 
     def _link_motion(

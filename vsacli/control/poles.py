@@ -106,7 +106,7 @@ def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], 
 
 
 def _counted(name: str, poles: Poles, order: int, integral: bool) -> Poles:
-    """As many poles as the error has; a single one as often as needed."""
+    """Return as many poles as the error has states; a single one repeated."""
     count = order + integral
     if len(poles) == 1:
         return poles * count

@@ -1,4 +1,4 @@
-"""Who a trajectory is for: the joints of a robot, and by which signals each can be commanded."""
+"""The joints of a robot as a trajectory sees them: which signals can command each."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class CommandedJoints:
 
     @classmethod
     def of(cls, robot: Robot) -> Self:
-        """Those of a robot."""
+        """Return the joints of a robot."""
         exempt = {
             key: {
                 joint.name: joint.uncommanded(signal) for joint in robot.joints if key not in joint.commanded
@@ -59,7 +59,7 @@ class CommandedJoints:
 
 
 def takers(signal: Signal, joint: str = "joint") -> str:
-    """What kind of joint takes a signal, from the word for one or several."""
+    """Return words for the joints that take a signal, from the word for one or several."""
     if signal.device is not None:
         return f"{joint} with a {signal.device}"
     kinds = (kind for kind, actuator in ACTUATORS.items() if signal.key in actuator.commanded)

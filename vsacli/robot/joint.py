@@ -56,7 +56,7 @@ class DenavitHartenberg:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame lies in another, as the `origin` of URDF: its origin there, then fixed-axis rotations."""
+    """The pose of a frame in another, as the `origin` of URDF: position, then fixed-axis rotations."""
 
     xyz: tuple[float, float, float] = vector(
         3, units.LENGTH, "position of its origin", default=(0.0, 0.0, 0.0)
@@ -103,7 +103,7 @@ class Inertia:
         return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
 
     def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, though it can be computed with."""
+        """Yield warnings of values that are hardly meant."""
         low, middle, high = self.principal_moments
         if high == 0:
             yield NO_INERTIA
@@ -125,7 +125,7 @@ class Link:
         check_fields(self)
 
     def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, though it can be computed with."""
+        """Yield warnings of values that are hardly meant."""
         if self.mass == 0:
             yield NO_MASS
         yield from self.inertia.warnings()
@@ -189,12 +189,12 @@ class Joint:
         return ACTUATORS.name_of(type(self.actuator))
 
     def damper_at(self, location: str) -> Damper | None:
-        """Its damper if that is there."""
+        """Return its damper if that is there."""
         return self.damper if self.damper is not None and self.damper.location == location else None
 
     @property
     def damper_start(self) -> float | None:
-        """Where the transmission of a damped one starts, if that is said."""
+        """Initial position of a damped transmission, if given."""
         return None if self.damper is None else self.damper.start
 
     @property
@@ -214,7 +214,7 @@ class Joint:
         return self.actuator.uncommanded.get(signal.key, f"its actuator takes no {signal.key}")
 
     def has(self, variable: Variable) -> list[bool]:
-        """Which columns of a result variable it has: of motors 1 and 2, or of the joint."""
+        """Return which columns of a result variable it has: of motors 1 and 2, or of the joint."""
         if variable.requires in OF_ANY_ROBOT:
             return self.actuator.has(variable)
         of_kind = self.actuator.has(variable._replace(requires=None))
@@ -230,7 +230,7 @@ class Joint:
         return any((self.friction, *(motor.friction for motor in self.actuator.motors)))
 
     def _friction_problems(self) -> Iterator[FieldProblem]:
-        """What keeps its friction from being differentiated twice, as part of the elastic torque."""
+        """Yield the problems of friction that cannot be differentiated twice in the elastic torque."""
         if self.friction is None:
             return
         backward, forward = self.friction.coulomb
@@ -253,7 +253,7 @@ class Joint:
             yield FieldProblem(("friction", "coulomb"), reason)
 
     def warnings(self, *, massless: bool = False) -> Iterator[str]:
-        """What may not be what was meant, of link and springs; if no link has a mass, nothing on that."""
+        """Yield warnings on link and springs; on no link if none has a mass."""
         told = (NO_MASS, NO_INERTIA) if massless else ()
         of_link = (warning for warning in self.link.warnings() if warning not in told)
         yield from (f"link of joint {self.name}: {warning}" for warning in of_link)

@@ -1,4 +1,4 @@
-"""Where the frames of a robot lie, and how they move: forward kinematics by its rows, and the Jacobian."""
+"""Forward kinematics of the frames of a robot, and the Jacobian."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 class Row(Protocol):
-    """What a joint has to do with where frames lie."""
+    """The part of a joint that determines its frame."""
 
     @property
     def dh(self) -> DenavitHartenberg:
-        """Its Denavit-Hartenberg row."""
+        """Denavit-Hartenberg row."""
 
     @property
     def is_revolute(self) -> bool:
@@ -31,7 +31,7 @@ class Row(Protocol):
 
 
 class Geometry(Protocol):
-    """What of a robot says where its frames lie."""
+    """The part of a robot that determines its frames."""
 
     @property
     def base(self) -> Pose:
@@ -43,7 +43,7 @@ class Geometry(Protocol):
 
     @property
     def joints(self) -> Sequence[Row]:
-        """From the base to the tip."""
+        """Joints from the base to the tip."""
 
 
 class Frame(NamedTuple):

@@ -100,7 +100,7 @@ class Robot:
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:
-        """What drives each joint."""
+        """Actuator of each joint."""
         return tuple(joint.actuator for joint in self.joints)
 
     def has(self, variable: Variable) -> bool:
@@ -123,7 +123,7 @@ class Robot:
 
     @property
     def facts(self) -> Facts:
-        """What is known of it to tell numbers that are hardly what was meant."""
+        """Facts about the robot for rules on plausible numbers."""
         from vsacli.documents.record_values import numbers
         from vsacli.robot.plausibility.facts import Facts
 
@@ -131,7 +131,7 @@ class Robot:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What may not be what was meant, one sentence each."""
+        """Sentences on values that are hardly meant."""
         return tuple(map(str, self.located_warnings))
 
     @property

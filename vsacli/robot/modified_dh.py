@@ -20,7 +20,7 @@ from vsacli.robot.kinematics import rotation_matrix
 from vsacli.robot.model import Robot
 
 AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
-"""In place of the row that would follow the last one: nothing moves its frame."""
+"""Stands for the row that would follow the last one: nothing moves its frame."""
 
 
 def as_standard(robot: Robot) -> Robot:

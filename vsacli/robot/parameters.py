@@ -54,12 +54,12 @@ class Parameter(NamedTuple):
 
     @property
     def part(self) -> str:
-        """What of a joint it belongs to, e.g. `dh`; of the robot, `gravity`, `base` or `tool`."""
+        """Part of a joint it belongs to, e.g. `dh`; of the robot, `gravity`, `base` or `tool`."""
         return str(self.path[0] if self.joint is None else self.path[2])
 
     @property
     def unit(self) -> str:
-        """Its SI unit."""
+        """SI unit."""
         return self.quantity.unit(self.joint_type)
 
 
@@ -134,7 +134,7 @@ def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> 
 def _in_list(
     entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Scalar]]]
 ) -> tuple[Any, ...]:
-    """Of a pair whose sides are one, a path goes on without a number: it changes both."""
+    """Return a list with an entry replaced; without a number a path changes both sides of equal pairs."""
     both = [
         ((word, *path), scalar)
         for word, deeper in inside.items()

@@ -1,4 +1,4 @@
-"""What devices of the joints do along a trajectory: as commanded, or by themselves."""
+"""Devices of the joints along a trajectory: commanded, or at their uncommanded value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SEEN = 1000
 """Times at which damping is looked at, beside all breakpoints and its dips: whether there is any."""
 
 NEWTON_STEPS = 4
-"""From a thousandth of the motion to a dip's bottom."""
+"""Newton steps from a thousandth of the motion to the bottom of a dip."""
 
 VANISHING = 1e-12
 """Share of the largest damping that counts as none: what rounding leaves of a dip to zero."""
@@ -61,7 +61,7 @@ def _damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[Float
 
 
 def _dips(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
-    """Where the damping is least between the times, by Newton's method on its rate."""
+    """Return where the damping is smallest between the times, by Newton's method on its rate."""
     before = np.flatnonzero(np.diff(np.sign(_damping(trajectory, time, joint)[1])) > 0)
     dips = time[before]
     for _ in range(NEWTON_STEPS):

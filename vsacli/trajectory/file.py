@@ -74,7 +74,7 @@ class TrajectoryFile:
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
-        """What is declared of each signal, if anything is."""
+        """Declaration of each signal, where there is one."""
         signals = (POSITION, *COMMANDED.values(), WRENCH)
         found = {signal: getattr(self, signal.key) for signal in signals}
         return {signal: declaration for signal, declaration in found.items() if declaration is not None}
@@ -96,7 +96,7 @@ class TrajectoryFile:
         return next((duration for duration in durations if duration is not None), None)
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps the formulas from lasting so long, in s."""
+        """Yield why the formulas cannot last this long, in s."""
         for signal, formula in self.formulas.items():
             yield from (problem.inside(signal.key) for problem in formula.problems_over(duration))
 
@@ -295,7 +295,7 @@ def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str)
 
 
 def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
-    """By the keys of their signals, over times as declared."""
+    """Return the profiles by the keys of their signals, over times as declared."""
     first, last = times.span
     formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}

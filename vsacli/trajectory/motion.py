@@ -33,7 +33,7 @@ class Motion:
 
     @classmethod
     def of(cls, time: FloatArray, arrays: Mapping[str, FloatArray], wrench: Wrench | None = None) -> Motion:
-        """From arrays of the joints by the names of result variables; others are passed over."""
+        """Return the motion from arrays of the joints by names of result variables; others are ignored."""
         q, dq, ddq, d3q, d4q = (arrays[name] for name in POSITION.names)
         commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         return cls(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)

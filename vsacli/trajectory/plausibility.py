@@ -61,14 +61,14 @@ FAST = ("fast motions of revolute joints", "fast motions of prismatic joints")
 
 
 def implausible(facts: Facts, source: Source) -> tuple[Problem, ...]:
-    """What the rules find, with the lines of the trajectory file."""
+    """Return the findings of the rules, with the lines of the trajectory file."""
     known = strange_of_robot(facts.robot.facts, facts.robot.sources)
     return findings(TRAJECTORY_RULES, facts, Written(source), known)
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What the rules know of a trajectory.
+    """The facts on a trajectory that rules use.
 
     Attributes:
         robot: that is to execute it.
@@ -84,7 +84,7 @@ class Facts:
 
     @cached_property
     def sizes(self) -> BodySizes:
-        """Of the robot."""
+        """Sizes of the robot."""
         return BodySizes(self.robot.joints)
 
     @cached_property
@@ -94,12 +94,12 @@ class Facts:
 
     @cached_property
     def corridors(self) -> list[Corridor | None]:
-        """What stiffness each joint can have at rest; None if it takes none."""
+        """Attainable stiffness of each joint at rest; None if it takes none."""
         return [corridor(joint) for joint in self.robot.joints]
 
     @property
     def revolute(self) -> BoolArray:
-        """Which joints are, (joints,)."""
+        """Joints that are revolute, (joints,)."""
         return np.array([joint.is_revolute for joint in self.robot.joints])
 
     @property
@@ -109,7 +109,7 @@ class Facts:
 
     @property
     def duration(self) -> float:
-        """From the first step to the last, s."""
+        """Time from the first sample to the last, s."""
         first, last = self.times.span
         return last - first
 

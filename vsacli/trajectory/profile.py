@@ -26,7 +26,7 @@ class Profile(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How they were understood, where that is not obvious."""
+        """Notes on the interpretation of the samples, where that is not obvious."""
 
     @property
     def breakpoints(self) -> FloatArray:
@@ -68,7 +68,7 @@ class Continued:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How they were understood, where that is not obvious."""
+        """Notes on the interpretation, where that is not obvious."""
         return self.profile.notes
 
     @property
@@ -101,7 +101,7 @@ class Continued:
 
 @dataclass(frozen=True)
 class WrenchProfile:
-    """What the environment exerts on the end effector, over time.
+    """The force and moment of the environment on the end effector, over time.
 
     Attributes:
         profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.

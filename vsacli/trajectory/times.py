@@ -22,7 +22,7 @@ class Times(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How the times were understood, where that is not obvious."""
+        """Notes on the interpretation of the times, where that is not obvious."""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -39,7 +39,7 @@ class Times(Protocol):
         """Return the same times, counted from the first."""
 
     def stretched(self, factor: float) -> Times:
-        """Return the times of the same motion made slower by a factor, from the same first time on."""
+        """Return the times of the same motion, slower by a factor."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class UniformTimes:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The rate, if the duration does not hold a whole number of steps at the rate asked for."""
+        """Notes on the interpretation of the times, where that is not obvious."""
         rate = self.steps / self.duration
         if math.isclose(rate, self.rate, rel_tol=1e-9):
             return ()
@@ -137,7 +137,7 @@ class RecordedTimes:
         return RecordedTimes(self.time - self.time[0], self.notes)
 
     def stretched(self, factor: float) -> RecordedTimes:
-        """As many steps, further apart."""
+        """Return as many samples, further apart."""
         return RecordedTimes(stretch(self.time, self.time[0], factor), self.notes)
 
 
@@ -167,7 +167,7 @@ class ResampledTimes:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """As of `UniformTimes`."""
+        """See `UniformTimes.notes`."""
         return self._elapsed.notes
 
     @property

@@ -244,7 +244,7 @@ class Trajectory:
 
     @property
     def fits(self) -> tuple[dict[str, Any], ...]:
-        """What is known of the splines that its steps come from, see `SampledProfile.summary`."""
+        """Facts on the splines behind the samples; see `SampledProfile.summary`."""
         return tuple(estimate.summary() for estimate in self.estimates.values())
 
     @property

@@ -1,4 +1,4 @@
-"""Who carries out a computation on rows of samples: NumPy, or code from a C compiler."""
+"""Backends of computations on rows of samples: NumPy, or code from a C compiler."""
 
 from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
 from vsacli.compute.engine.engines import Engine, Kernel, samples_per_pass

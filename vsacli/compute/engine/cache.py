@@ -19,7 +19,7 @@ LIBRARY = "program.so"
 CHECKSUM = "program.sha256"
 
 MOST_BYTES = 100_000_000
-"""Of all libraries together, those of some hundred robots; beyond it the ones longest unused go."""
+"""Bytes of all libraries together, those of some hundred robots; the longest unused ones go first."""
 
 
 class CacheError(VsacliError):
@@ -158,13 +158,13 @@ def open_cache() -> Cache:
 
 
 def _cache_folder() -> Path:
-    """That of the XDG base directory specification, where a relative path does not count."""
+    """Return the folder of the XDG base directory specification; a relative path there does not count."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (base if base.is_absolute() else Path.home() / ".cache") / "vsacli"
 
 
 def key_of(*parts: str) -> str:
-    """What a library is stored under: a digest of all that it depends on."""
+    """Return the key of a library: a digest of all that it depends on."""
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 

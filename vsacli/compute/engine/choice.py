@@ -1,4 +1,4 @@
-"""Which engine is worth its while."""
+"""The choice of the backend."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
 
 NUMPY_SECONDS = 0.3e-9
-"""What NumPy takes for an operation on a sample: 0.22 to 0.31 ns in traced programs of the shipped robots,
-some more where loops run until the last sample is done."""
+"""Seconds of NumPy for an operation on a sample: 0.22 to 0.31 ns in traced programs of the bundled robots,
+more where loops run until the last sample is done."""
 
 NUMPY_CALL_SAMPLES = 3_000
 """Samples in whose time NumPy sees to a call: 0.9 us, which counts in the short blocks of long chains."""
@@ -61,7 +61,7 @@ class Choice(NamedTuple):
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What to remember of it: `engine` as it may be asked for, `compiler`, `threads`."""
+        """Values that tell how it was computed: `engine`, `compiler`, `threads`."""
         name = "c" if self.compiler else "numpy"
         return {"engine": name, "compiler": self.compiler, "threads": str(self.threads)}
 
@@ -179,7 +179,7 @@ def compiled_as_asked() -> Iterator[None]:
 
 
 def in_usual_blocks(samples: int, inputs: int) -> float:
-    """How many samples would keep NumPy busy as long if it took as many at a time as of few inputs."""
+    """Return the samples that would take NumPy as long in the blocks of few inputs."""
     calls, fewest = (NUMPY_CALL_SAMPLES / size for size in (samples_per_pass(inputs), SAMPLES_PER_PASS))
     return samples * (1 + calls) / (1 + fewest)
 
@@ -199,5 +199,5 @@ def _counted(threads: int) -> str:
 
 
 def processors() -> int:
-    """Those that this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

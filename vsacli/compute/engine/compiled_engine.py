@@ -1,4 +1,4 @@
-"""From a kernel to machine code: traced, compiled unless it was before, loaded."""
+"""The backend of compiled code: a kernel is traced, compiled unless cached, and loaded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.program import NESTED
 
 USUAL_ITERATIONS = 5
-"""How often a loop is usually repeated."""
+"""Usual iterations of a loop."""
 
 
 class CompiledEngine:
@@ -48,14 +48,14 @@ class CompiledEngine:
         return self._loaded[kernel]
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
-        """As of `Engine`."""
+        """See `Engine.run`."""
         self.prepare(kernel)
         return self._loaded[kernel].library(rows, self._threads)
 
 
 @lru_cache(maxsize=32)
 def kernel_code(kernel: Kernel) -> Code:
-    """What to compile for a kernel.
+    """Return the code of a kernel to be compiled.
 
     Raises:
         NotImplementedError: it cannot be recorded.
@@ -69,7 +69,7 @@ def kernel_code(kernel: Kernel) -> Code:
 
 
 def operation_count(program: Program, iterations: int = 1) -> int:
-    """How many operations a program has, those of loops counted as often as they are repeated."""
+    """Return the operations of a program, those of loops once for each iteration."""
     return sum(_weight(symbol, iterations) for symbol in program.operations)
 
 

@@ -118,7 +118,7 @@ def _spoken(command: tuple[str, ...]) -> str:
 
 
 def _output(compiler: tuple[str, ...], *arguments: str, kept: Path | None = None) -> str:
-    """What a compiler prints; what it keeps for another time, as zig does, goes into a folder `kept`."""
+    """Return the output of a compiler; files it caches, as zig does, go into the folder `kept`."""
     environment = None if kept is None else {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(kept)}
     name = f"C compiler {_spoken(compiler)!r}"
     try:
@@ -182,7 +182,7 @@ class Library:
 
 @cache
 def _load_vector_functions() -> None:
-    """Those of glibc, to which a compiler that brings its own C library does not link; others have none."""
+    """Load those of glibc, to which compilers with a C library of their own do not link."""
     with suppress(OSError):
         ctypes.CDLL("libmvec.so.1", mode=ctypes.RTLD_GLOBAL)
 
@@ -198,6 +198,6 @@ if hasattr(os, "register_at_fork"):
 
 
 def _parts(samples: int, count: int) -> list[tuple[int, int]]:
-    """From where to where each thread computes; whole vectors, but for the last."""
+    """Return start and end of the part of each thread; whole vectors, but for the last."""
     ends = [DOUBLES_PER_VECTOR * (samples * number // count // DOUBLES_PER_VECTOR) for number in range(count)]
     return list(pairwise([*ends, samples]))

@@ -1,4 +1,4 @@
-"""What is computed on rows of samples, and the engines of NumPy that carry it out."""
+"""Kernels, which compute on rows of samples, and the NumPy backends that run them."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Kernel(Hashable, Protocol):
 
     @property
     def inputs(self) -> int:
-        """How many rows it takes."""
+        """Number of input rows."""
 
     @property
     def outputs(self) -> int:
-        """How many rows it gives."""
+        """Number of output rows."""
 
     def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
         """Rows of results, (samples,), or constants in their place.
@@ -65,7 +65,7 @@ def passes(rows: Sequence[FloatArray]) -> Iterator[slice]:
 
 
 class Engine(Protocol):
-    """What carries out kernels."""
+    """A backend that runs kernels."""
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """Return the kernel's outputs, (outputs, samples), from its inputs, contiguous rows (samples,)."""
@@ -75,7 +75,7 @@ class NumPyEngine:
     """The kernel itself, on a number of samples at a time."""
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
-        """As of `Engine`."""
+        """See `Engine.run`."""
         keep_freed_memory()
         outputs = np.empty((kernel.outputs, len(rows[0])))
         with subnormals_as_zero():
@@ -107,7 +107,7 @@ class TracedEngine:
         self._workspaces: dict[RowFunction | CallingRowFunction, RowSpace] = {}
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
-        """As of `Engine`."""
+        """See `Engine.run`."""
         function = _row_function(kernel)
         if function is None:
             return NumPyEngine().run(kernel, rows)
@@ -134,7 +134,7 @@ def _row_function(kernel: Kernel) -> RowFunction | CallingRowFunction | None:
 
 
 def kernel_program(kernel: Kernel) -> Program:
-    """What a kernel does to one sample, by calls if it is long.
+    """Return the program of a kernel for one sample, with calls if it is long.
 
     Raises:
         NotImplementedError: as of `trace`.

@@ -1,4 +1,4 @@
-"""From C text to a loaded library: the one that is in the cache, or compiled now."""
+"""Libraries from C text: loaded from the cache, or compiled now."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError
 COMPILER_START_SECONDS = 0.25
 COMPILER_SECONDS_PER_OPERATION = 4.5e-5
 COMPILER_SECONDS_PER_SQUARE = 1.7e-8
-"""What the compiler takes to start, for each operation, and for the square of those of one function: gcc 12
-takes 0.3 s for 1,700 in one function, 0.8 s for 4,700, 1.4 s for 7,000, 4.6 s for 15,000."""
+"""Seconds of the compiler: to start, for each operation, and for the square of those of one function.
+
+gcc 12 takes 0.3 s for 1,700 in one function, 0.8 s for 4,700, 1.4 s for 7,000, 4.6 s for 15,000.
+"""
 
 LONG_SECONDS = 5.0
-"""From which on the user is told before."""
+"""Seconds from which on the user is told before."""
 
 _Opened = TypeVar("_Opened")
 
@@ -39,7 +41,7 @@ class Code(NamedTuple):
 
     @property
     def compiling_seconds(self) -> float:
-        """What the compiler takes, about."""
+        """Estimated seconds of the compiler."""
         linear, squares = sum(self.functions), sum(count**2 for count in self.functions)
         needed = COMPILER_SECONDS_PER_OPERATION * linear + COMPILER_SECONDS_PER_SQUARE * squares
         return COMPILER_START_SECONDS + needed
@@ -109,7 +111,7 @@ def _announce(code: Code, tell: Tell) -> None:
 
 
 _loaded: dict[str, Loaded[Any]] = {}
-"""What this process has loaded, by its key."""
+"""Libraries loaded by this process, by key."""
 
 
 def _open_cache(tell: Tell) -> Cache | None:

@@ -20,7 +20,7 @@ Cells = npt.NDArray[np.object_]
 def apply_ufunc(
     tape: Tape, ufunc: np.ufunc, method: str, operands: Sequence[Cells], options: Mapping[str, Any]
 ) -> Any:
-    """What `ufunc(*operands)`, or `ufunc.reduce(operand, axis=...)`, leaves: symbols and constants."""
+    """Return the symbols and constants of `ufunc(*operands)`, or of `ufunc.reduce(operand, axis=...)`."""
     if ufunc is np.matmul:
         return _matmul(tape, *operands)
     if method == "reduce":
@@ -81,7 +81,7 @@ def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
 
 
 def _power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
-    """By products where the exponent is a small whole number, or 1.5."""
+    """Return a power, by products where the exponent is a small whole number, or 1.5."""
     if exponent == 1.5:
         return tape.emit("multiply", base, tape.emit("sqrt", base))
     if exponent not in (2, 3, 4):
@@ -238,26 +238,26 @@ class TracedArray(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """As of an array."""
+        """Shape."""
         return self.cells.shape
 
     @property
     def ndim(self) -> int:
-        """As of an array."""
+        """Dimensions."""
         return self.cells.ndim
 
     @property
     def size(self) -> int:
-        """As of an array."""
+        """Size."""
         return self.cells.size
 
     @property
     def T(self) -> TracedArray:  # noqa: N802  (NumPy's name)
-        """As of an array."""
+        """Transpose."""
         return TracedArray(self.tape, self.cells.T)
 
     def astype(self, dtype: npt.DTypeLike) -> TracedArray:
-        """As of an array; truth values become the lowest bit of an unsigned integer."""
+        """Return the array with another type; truth values become the lowest bit of an unsigned integer."""
         wanted = np.dtype(dtype).kind
         return TracedArray(
             self.tape, np.vectorize(lambda cell: self._cast(cell, wanted), otypes=[object])(self.cells)
@@ -273,19 +273,19 @@ class TracedArray(NDArrayOperatorsMixin):
         return _CASTS[wanted](cell)
 
     def copy(self) -> TracedArray:
-        """As of an array."""
+        """Return a copy."""
         return TracedArray(self.tape, self.cells.copy())
 
     def sum(self, axis: int | None = None) -> TracedArray:
-        """As of an array."""
+        """Return the sum along an axis, or of all entries."""
         return TracedArray(self.tape, np.sum(self.cells, axis=axis))
 
     def ravel(self) -> TracedArray:
-        """As of an array."""
+        """Return the entries as one row."""
         return TracedArray(self.tape, self.cells.ravel())
 
     def reshape(self, *shape: int) -> TracedArray:
-        """As of an array."""
+        """Return the array in another shape."""
         return TracedArray(self.tape, self.cells.reshape(*shape))
 
 

@@ -53,7 +53,7 @@ REAL_TYPES = ("double", "float")
 """Types of C for real numbers."""
 
 Names = Mapping[int, str]
-"""What inputs of a program are called, by index."""
+"""Names of the inputs of a program, by index."""
 
 
 class ConstantArray(NamedTuple):
@@ -71,14 +71,14 @@ class ConstantArray(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where a table is."""
+    """The place of a table."""
 
     array: ConstantArray
     offset: int
 
     @property
     def pointer(self) -> str:
-        """Its first entry, as an expression of C."""
+        """Expression of C for its first entry."""
         return f"{self.array.name} + {self.offset}" if self.offset else self.array.name
 
 
@@ -112,7 +112,7 @@ class Tables:
         ]
 
     def place(self, table: Table) -> Place:
-        """Where a table is."""
+        """Return the place of a table."""
         number, offset = self._places[table]
         return Place(self.arrays[number], offset)
 
@@ -130,7 +130,7 @@ def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple
 
 
 class Dialect(NamedTuple):
-    """How values and operations are written in C, as `Writer` asks for them.
+    """The notation of values and operations in C, for `Writer`.
 
     Attributes:
         types: C type of each kind of value.

@@ -48,7 +48,7 @@ class Subroutines:
 
 
 def _bodies(program: Program) -> Iterator[Program]:
-    """Those of subroutines, the inner ones first."""
+    """Yield the bodies of subroutines, the inner ones first."""
     for symbol in program.operations:
         if symbol.operation in NESTED:
             nested = symbol.operands[0]
@@ -58,7 +58,7 @@ def _bodies(program: Program) -> Iterator[Program]:
 
 
 def _key(program: Program) -> Hashable:
-    """What is the same of programs that do the same in the same order."""
+    """Return a key that is equal for programs that do the same in the same order."""
     operations = tuple(
         (symbol.index, symbol.operation, symbol.kind, *map(_operand_key, symbol.operands))
         for symbol in program.operations
@@ -79,7 +79,7 @@ def _operand_key(operand: Any) -> Hashable:
 
 
 VALUES, CONSTANTS, PLACES = "values", "constants", "places"
-"""What a function calls the workspace, its constants, and the places of its arguments and results."""
+"""Names in a function of the workspace, its constants, and the places of arguments and results."""
 
 
 class _Function(NamedTuple):
@@ -127,7 +127,7 @@ class CallingCode:
             yield from self._definition(function, qualifiers)
 
     def statements(self) -> Iterator[str]:
-        """What computes the outputs in the workspace from the inputs there."""
+        """Yield the statements that compute the outputs in the workspace from the inputs there."""
         return iter(self._statements)
 
     def value(self, symbol: Symbol, place: str | int) -> str:
@@ -169,7 +169,7 @@ class CallingCode:
         yield "}"
 
     def _sources(self, function: _Function) -> dict[int, str]:
-        """Where the inputs of a body come from."""
+        """Return the sources of the inputs of a body."""
         sources, values, constants = {}, 0, 0
         for symbol, constant in zip(function.body.inputs, function.constant, strict=True):
             if constant:

@@ -101,8 +101,8 @@ def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int)
 
 
 Place = tuple[int, ...]
-"""Where a constant stands in a program: numbers of the operation and of the operand; or, in a loop or branch,
-number of that operation, and the place in its body."""
+"""Place of a constant in a program: numbers of operation and operand; in a loop or conditional, the number
+of that operation and the place in its body."""
 
 Constants = dict[Place, float]
 
@@ -252,7 +252,7 @@ class Workspace:
                 self._last_use.pop(kept.index, None)
 
     def results(self, call: Symbol) -> list[Symbol]:
-        """What the next call gives, in the order of the outputs of its body, with places from now on."""
+        """Return the results of the next call, by outputs of its body, and give them places."""
         order = {number: place for place, number in enumerate(call.operands[0].numbers)}
         items = sorted(self._items[call.index], key=lambda item: order[item.operands[1]])
         for item in items:

@@ -15,7 +15,7 @@ from vsacli.compute.vector import Scalar
 
 
 class Kind(enum.Enum):
-    """What a value is: a floating-point number, a truth value, a field of bits, or an index of a table."""
+    """The kind of a value: floating-point number, truth value, field of bits, or index of a table."""
 
     REAL = enum.auto()
     TRUTH = enum.auto()
@@ -31,7 +31,7 @@ class Table:
 
 
 class Emitter(Protocol):
-    """What the operators of symbols add operations to: a tape."""
+    """The receiver of operations on symbols: a tape."""
 
     def emit(self, operation: str, *operands: Any) -> Operand:
         """Return the result of an operation on symbols and constants."""
@@ -101,7 +101,7 @@ class Symbol:
 
 
 Operand: TypeAlias = Symbol | float | int | bool
-"""What an operation acts on: a symbol or a constant."""
+"""Operand of an operation: a symbol or a constant."""
 
 
 class Program(NamedTuple):
@@ -209,7 +209,7 @@ def kind_of(operand: Any) -> Kind:
 
 
 def kinds_of_operands(symbol: Symbol) -> list[Kind]:
-    """As what each operand counts, which decides on how a constant there is written."""
+    """Return the kind of each operand, which decides on the notation of a constant."""
     if symbol.operation == "where":
         return [Kind.TRUTH, symbol.kind, symbol.kind]
     if symbol.operation == "bits":
@@ -253,7 +253,7 @@ def _kind_of_number(operation: str, operands: Sequence[Any]) -> Kind:
 
 
 def _common_kind(operands: Sequence[Any]) -> Kind:
-    """That of the symbols; constants adapt."""
+    """Return the kind of the symbols; constants adapt."""
     kinds = {operand.kind for operand in operands if isinstance(operand, Symbol)}
     kinds = kinds or set(map(kind_of, operands))
     if len(kinds) > 1:

@@ -23,7 +23,7 @@ from vsacli.compute.tracing.program import LOGICAL, Program, Symbol, Table, tabl
 _CHOICES = {"where": "{1} if {0} else {2}", "take": "{0}[{1}]", "negative": "-{0}"}
 
 NumberFunction = Callable[[Sequence[float]], list[float]]
-"""From the inputs of a program to its outputs.
+"""Function from the inputs of a program to its outputs.
 
 Raises ArithmeticError or ValueError where Python has an error in place of NaN or infinity."""
 
@@ -44,7 +44,7 @@ _ON_NUMBERS: dict[str, Any] = {
     "nan": math.nan,
     "inf": math.inf,
 }
-"""What NumPy's functions are on plain numbers."""
+"""Equivalents of NumPy's functions on plain numbers."""
 
 
 def function_text(program: Program, name: str, arguments: Mapping[str, int]) -> str:

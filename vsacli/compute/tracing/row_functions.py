@@ -64,7 +64,7 @@ class RowFunction:
 
 
 class _RowAllocation:
-    """Which row each value of a program lies in while it is live, as a compiler allocates registers.
+    """The row of each value of a program while it is live, as a compiler allocates registers.
 
     Attributes:
         counts: how many rows there are of each kind.
@@ -152,7 +152,7 @@ class _RowAllocation:
 
 
 def _kind_of_constant(constant: float | int | bool, wanted: Kind) -> Kind:
-    """That of the operation, but for comparisons: they find truth values for numbers."""
+    """Return the kind of the operation; comparisons have truth values for numbers."""
     return wanted if wanted is Kind.BITS else kind_of(constant)
 
 

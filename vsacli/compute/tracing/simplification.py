@@ -111,7 +111,7 @@ _RULES: dict[str, Callable[..., Operand | None]] = {
 
 
 Shortened = dict[tuple[int, frozenset[int]], Program]
-"""What is left of programs that are called, by their identity and the places of the outputs that are read."""
+"""Remaining programs of calls, by their identity and the places of the outputs that are read."""
 
 
 def without_dead_code(
@@ -195,7 +195,7 @@ def _call(symbol: Symbol, wanted: set[int], shortened: Shortened) -> Symbol:
 
 
 def _places(numbers: Sequence[int], wanted: Iterable[int]) -> set[int]:
-    """Where results are among those that an earlier elimination has left, by their numbers."""
+    """Return the places of results among those left by an earlier elimination."""
     return {numbers.index(number) for number in wanted}
 
 

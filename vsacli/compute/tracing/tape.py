@@ -86,17 +86,17 @@ class Tape:
     def emit_branch(
         self, truth: Operand, body: Program, arguments: Sequence[Operand], otherwise: Sequence[Operand]
     ) -> list[Symbol]:
-        """What a program returns where a truth value holds, and the other values elsewhere."""
+        """Add a program where a truth value holds, and other values elsewhere; return the results."""
         branch = Branch(body, tuple(range(len(otherwise))))
         return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
     def emit_call(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
-        """What a program returns that was traced on a tape of its own."""
+        """Add a call of a program traced on a tape of its own; return its results."""
         call = Call(body, tuple(range(len(body.outputs))))
         return self._emit_nested("call", body.outputs, (call, *arguments))
 
     def emit_subroutine(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
-        """What a program returns that may be computed elsewhere, too."""
+        """Add a call of a program that other places may share; return its results."""
         return self._emit_nested("subroutine", body.outputs, (Subroutine(body), *arguments))
 
     def _emit_nested(
@@ -119,7 +119,7 @@ class Tape:
         return symbol
 
     def program(self, outputs: Sequence[Operand]) -> Program:
-        """What computes these outputs from the inputs, without dead code; calls are all there is.
+        """Return the program from the inputs to these outputs, without dead code and with calls.
 
         The tape ends with it: symbols know their tape, so whatever that keeps would stay as long as they do.
         """
@@ -137,7 +137,7 @@ def _python_number(operand: Any) -> Any:
 
 
 def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
-    """What common subexpressions share: operands, constants to the digit, integers apart from floats."""
+    """Return a key of common subexpressions: operands, constants to the digit, integers apart from floats."""
     names = [
         operand.index
         if isinstance(operand, Symbol)

@@ -27,7 +27,7 @@ from vsacli.compute.tracing.tape import Tape
 Function = Callable[..., Any]
 
 LEAST_OPERATIONS = 15
-"""Of a subroutine that makes code shorter: to pass arguments and results takes as much as some five."""
+"""Operations from which a subroutine shortens code: passing arguments and results costs some five."""
 
 
 @repeat_on.register(TracedArray)
@@ -177,7 +177,7 @@ def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) 
 
 
 class _Called(NamedTuple):
-    """What has been called.
+    """A function that has been called.
 
     Attributes:
         body: its program.
@@ -191,7 +191,7 @@ class _Called(NamedTuple):
 
 
 def _recorded(function: Function, form: Any, kinds: Sequence[Kind], *, short: bool) -> _Called:
-    """What a function does with arguments of a form."""
+    """Return the program of a function for arguments of a form."""
     tape = Tape(short=short)
     inputs = {tape.input(kind): number for number, kind in enumerate(kinds)}
     found: dict[Symbol, int] = {}
@@ -201,7 +201,7 @@ def _recorded(function: Function, form: Any, kinds: Sequence[Kind], *, short: bo
 
 
 def _form(tree: Any, found: dict[Symbol, int]) -> Any:
-    """What arguments or a result are but for their symbols, which are found and numbered."""
+    """Return the form of arguments or a result without its symbols, which are collected."""
     if isinstance(tree, TracedArray):
         return _Array(tree.shape, tuple(_form(cell, found) for cell in tree.cells.flat))
     if isinstance(tree, Symbol):

@@ -1,4 +1,4 @@
-"""What a generated function costs at the very most: operations and constants, counted in its program."""
+"""Worst-case cost of a generated function: operations and constants, counted in its program."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, Subrou
 from vsacli.control.codegen.scalar import BYTES, scalar_dialect
 
 BYTES_OF_PLACE = 4
-"""Of an int."""
+"""Bytes of an int."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Cost:
 
 
 def worst_cost(program: Program) -> Cost:
-    """What a call costs at most."""
+    """Return the worst-case cost of a call."""
     return sum(map(_of_operation, program.operations), Cost(0, 0, 0))
 
 
@@ -49,7 +49,7 @@ def table_bytes(programs: Iterable[Program], precision: str) -> int:
 
 
 def _bytes_of_calls(program: Program, precision: str) -> int:
-    """Of the constants that calls are given, and of the places of what they read and write."""
+    """Return the bytes of constants passed to calls, and of the places of their inputs and outputs."""
     calls = [symbol.operands for symbol in program.operations if symbol.operation == "call"]
     places = sum(len(call.numbers) for call, *_ in calls)
     places += sum(isinstance(operand, Symbol) for _, *given in calls for operand in given)

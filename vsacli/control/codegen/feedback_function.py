@@ -132,7 +132,7 @@ class _Law:
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 
     def _flags(self, index: int, values: Arrays, singular: Any) -> Any:
-        """What is wrong with a joint: no torque, or a limit that state or torque break."""
+        """Return the flags of a joint: no torque, or a limit broken by state or torque."""
         joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
         there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
         flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))

@@ -1,4 +1,4 @@
-"""What a generated function takes and gives: one declaration for header, source and self-test."""
+"""Inputs and outputs of a generated function, declared once for header, source and self-test."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Array:
 
     @property
     def entries(self) -> Iterator[str]:
-        """Each entry as written in C, e.g. `theta[0][1]`."""
+        """Yield the entries as written in C, e.g. `theta[0][1]`."""
         for index in product(*map(range, self.shape)):
             yield self.name + "".join(f"[{number}]" for number in index)
 
@@ -61,12 +61,12 @@ class Structure:
 
     @property
     def entries(self) -> Iterator[str]:
-        """Each entry of each array as written in C."""
+        """Yield the entries of all arrays as written in C."""
         return (entry for array in self.arrays for entry in array.entries)
 
     @property
     def layout(self) -> RowLayout:
-        """Where the entries of each array stand among all entries."""
+        """Places of the entries of each array among all entries."""
         return RowLayout({array.name: array.shape for array in self.arrays})
 
 
@@ -106,7 +106,7 @@ class Function:
 
     @cached_property
     def program(self) -> Program:
-        """What the function does to one sample.
+        """Return the program of the function for one sample.
 
         Raises:
             NotImplementedError: it has no evaluation in a bounded number of operations, or one of too many.

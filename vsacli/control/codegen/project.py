@@ -107,7 +107,7 @@ def generate(
 def _functions(
     robot: Robot, wrench: str | None, chosen: Sequence[Parameter]
 ) -> tuple[list[Function], list[str]]:
-    """Those that there are, and why there are not more.
+    """Return the possible functions, and the reasons for missing ones.
 
     The last one grows with the third power of the number of joints, so it is looked at if the others were not
     too long.
@@ -158,7 +158,7 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
 
 
 def prefix_of(robot: Robot) -> str:
-    """What the names in C begin with: the robot's, in lower case, of letters that C allows."""
+    """Return the prefix of names in C: the robot's name in lower case, in letters that C allows."""
     name = re.sub(r"\W+", "_", robot.name.lower(), flags=re.ASCII).strip("_")
     return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
 

@@ -43,7 +43,7 @@ def command_structure(robot: Robot) -> Structure:
 
 
 def wrench_structure(frame: str) -> Structure:
-    """What the environment exerts on the end effector."""
+    """Return the structure of the wrench of the environment on the end effector."""
     meaning = (
         "Wrench that the environment exerts on the end effector: force and moment about the origin of the "
         f"tool frame, along the axes of the {frame.replace('_', ' ')} frame."
@@ -81,7 +81,7 @@ def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
 
 
 def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Function:
-    """(36)-(74); what moves inside damped transmissions goes in and, with its rates, comes out.
+    """Return inverse dynamics (36)-(74); internal motions are inputs and, with rates, outputs.
 
     Args:
         robot: the robot.
@@ -133,7 +133,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
 
 
 def internal_structure(robot: Robot) -> Structure:
-    """What moves inside damped transmissions: a state that whoever calls keeps."""
+    """Return the structure of motions inside damped transmissions: a state kept by the caller."""
     meaning = (
         "State inside transmissions with a damper, whose damping must be positive; other joints do not "
         "count. Start it where the springs carry the joint alone."

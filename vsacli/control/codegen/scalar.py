@@ -68,7 +68,7 @@ _SMALLER_TYPES = {
 """Types of constants, and which values they hold."""
 
 BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
-"""Of an entry of each type."""
+"""Bytes of an entry of each type."""
 
 
 def scalar_dialect(precision: str) -> Dialect:

@@ -29,7 +29,7 @@ SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness"
 """Half-widths of what is drawn, SI units; 1 for further signals."""
 
 MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
-"""By how much the measured state misses the command."""
+"""Differences of the measured state from the command."""
 
 POLE = -20.0
 
@@ -41,7 +41,7 @@ Arrays = dict[str, FloatArray]
 
 
 class Comparison(NamedTuple):
-    """How the self-test compares an array.
+    """The comparison of an array in the self-test.
 
     Attributes:
         scale: what differences are relative to; 0 if there may be none, as of flags.
@@ -56,7 +56,7 @@ class Reference:
     """Inputs and results of the generated functions of a robot."""
 
     def __init__(self, robot: Robot, chosen: Sequence[Parameter] = ()) -> None:
-        """Of functions that take the chosen numbers as an argument, if they take any."""
+        """Take functions with the chosen parameters as an argument, if there are any."""
         self._robot = robot
         self._rng = np.random.default_rng(1)
         self._results: dict[str, Arrays] = {}

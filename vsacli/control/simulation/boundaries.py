@@ -34,7 +34,7 @@ class Boundary(ABC):
 
     @abstractmethod
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What must stay positive, one number for each of `joints`, at positions of joints and motors."""
+        """Return a number for each of `joints` that must stay positive, at positions of joints and motors."""
 
     def distance(self, vector: FloatArray) -> FloatArray:
         """Return the smallest distance, at most 1; one that is not defined any more lies beyond."""
@@ -52,7 +52,7 @@ class Boundary(ABC):
 
 
 class Singularity(Boundary):
-    """Where the decoupling matrix of a joint becomes singular."""
+    """The boundary at which the decoupling matrix of a joint becomes singular."""
 
     reason = "its decoupling matrix became singular"
     flag = Flag.SINGULAR
@@ -73,7 +73,7 @@ class Singularity(Boundary):
 
 
 class SpringRange(Boundary):
-    """Where a spring leaves the range of its law: a tendon goes slack, a table ends."""
+    """The boundary at which a spring leaves its domain: a tendon goes slack, a table ends."""
 
     reason = "a spring left the range of its law"
     flag = Flag.INFEASIBLE
@@ -91,7 +91,7 @@ class SpringRange(Boundary):
 
 
 def boundaries(loop: ClosedLoop, start: FloatArray) -> Iterator[Boundary]:
-    """Those that a robot can reach; `start` is the first state vector."""
+    """Yield the boundaries that a robot can reach; `start` is the first state vector."""
     drivetrain = loop.plant.drivetrain
     if drivetrain.chosen.size:
         yield Singularity(loop, start)

@@ -32,7 +32,7 @@ class Phase(NamedTuple):
 
 
 class Packing:
-    """How a `Phase` lies in a vector.
+    """The layout of a `Phase` in a vector.
 
     Attributes:
         entries: of the vector.
@@ -82,7 +82,7 @@ class Controller(Protocol):
         """
 
     def error_rates(self, time: float, phase: Phase) -> Integral:
-        """What the integrals of the errors grow by per second."""
+        """Return the rates of the integrals of the errors."""
 
 
 _NO_TORQUES = "what is commanded from here on cannot be executed, so there are no torques to apply"
@@ -191,7 +191,7 @@ class ClosedLoop:
         self.held.set(torques)
 
     def applied(self, demand: FloatArray) -> FloatArray:
-        """What the motors give of the torques asked of them."""
+        """Return the torques that the motors give for those commanded."""
         limit = self.plant.drivetrain.max_torque
         return np.clip(demand, -limit, limit)
 
@@ -205,6 +205,6 @@ class ClosedLoop:
     def response(
         self, time: float | FloatArray, phase: Phase, demand: FloatArray, slip: FloatArray | None = None
     ) -> Response:
-        """What torques asked of the motors lead to; `slip` as of `Plant.accelerations`."""
+        """Return the response to commanded motor torques; `slip` as in `Plant.accelerations`."""
         wrench, damping = self.reference.wrench(time), self.reference.damping(time)
         return self.plant.accelerations(*phase[:4], self.applied(demand), wrench, damping, slip)

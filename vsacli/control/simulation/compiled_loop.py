@@ -97,7 +97,7 @@ _ARGUMENTS: dict[str, list[Any]] = {
         c_void_p,
     ],
 }
-"""Of the functions of loop.c, behind the loop itself."""
+"""Arguments of the functions of loop.c after the loop itself."""
 
 
 class _Table(Structure):
@@ -165,13 +165,13 @@ class CompiledLoop:
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
-        """What a controller that holds its torques asks for, (motors,), in a state."""
+        """Return the torques held by a controller, (motors,), that it commands in a state."""
         given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
         self._demand(time, address(given), address(asked))
         return asked
 
     def distance(self, vector: FloatArray) -> float:
-        """To the nearest boundary, at most 1."""
+        """Return the distance to the nearest boundary, at most 1."""
         given = np.ascontiguousarray(vector)
         self._to_boundaries(address(given), address(self._distances))
         return float(self._distances.min(initial=1.0))

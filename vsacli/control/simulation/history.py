@@ -47,7 +47,7 @@ class RateFilter:
 
 
 class StateTrajectory(NamedTuple):
-    """How a run went: times (samples,), states (samples, entries), torques asked for (samples, motors).
+    """A run: times (samples,), states (samples, entries), commanded torques (samples, motors).
 
     `held` says whether the torques stay the same from step to step.
     """
@@ -103,7 +103,7 @@ def sampled(
 
 
 class History(Block):
-    """What happened, (samples, joints[, 2]); see `SIMULATION_VARIABLES`.
+    """Variables of a simulation, (samples, joints[, 2]); see `SIMULATION_VARIABLES`.
 
     NaN where a joint does not have the variable: motor 2 of an elastic joint, the stiffness of a rigid one.
     """
@@ -182,7 +182,7 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
 
 
 def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
-    """Of motors up to each step, (samples, ...); the torque is held between steps, or linear."""
+    """Return the work of motors up to each sample, (samples, ...); torques held or linear in between."""
     given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
     return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
 

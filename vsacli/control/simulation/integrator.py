@@ -20,18 +20,20 @@ from vsacli.control.simulation.sliding import Sliding, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
 EXPLICIT = "DOP853"
-"""Of order 8: motors and links oscillate on their springs, and mostly nothing is stiff."""
+"""Method of order 8: motors and links oscillate on their springs, and mostly nothing is stiff."""
 
 IMPLICIT = "Radau"
-"""Of order 5, L-stable: springs like steel and fast poles do not shorten its steps. With a joint of
-1e9 N m/rad it was a hundred times as accurate as BDF and LSODA at the same tolerances, and with one of 1e6
-it took a tenth of their evaluations, since these are not stable for oscillations."""
+"""L-stable method of order 5: springs like steel and fast poles do not shorten its steps.
+
+With a joint of 1e9 N m/rad it was a hundred times as accurate as BDF and LSODA at the same tolerances, and
+with one of 1e6 it took a tenth of their evaluations, since these are not stable for oscillations.
+"""
 
 SMALLEST_RTOL = 1e-13
 """Below, rounding alone exceeds the bound."""
 
 LARGEST_TOLERANCE = 1e-3
-"""With it, the example of the paper ends 4e-4 rad off; with 0.1 it was off by 0.3 rad on its way."""
+"""Largest tolerance: with it, the example of the paper ends 4e-4 rad off; with 0.1 it deviated by 0.3 rad."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Method(Stored):
 
 
 class Effort(NamedTuple):
-    """What a run took: methods, evaluations of the equations of motion, and its budget of these.
+    """The effort of a run: methods, evaluations of the equations of motion, and their budget.
 
     The provenance says what evaluated them: `engine`, `compiler` and `threads`.
     """
@@ -100,7 +102,7 @@ class Integrator:
 
     @property
     def effort(self) -> Effort:
-        """Of the run so far."""
+        """Effort of the run so far."""
         budget, by = self._budget, self.equations.provenance
         return Effort(tuple(self._methods), budget.used, budget.limit, by)
 

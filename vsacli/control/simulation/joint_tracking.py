@@ -1,4 +1,4 @@
-"""What a simulation found at one joint: its deviations from the command, its limits and energy, its goal."""
+"""Tracking of one joint in a simulation: deviations from the command, limits, energy, goal."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class GoalTolerance:
 
     @classmethod
     def from_text(cls, written: str) -> GoalTolerance:
-        """As typed: `2%` of each joint's range beside the usual absolute part, or `0.01`, in rad (m), alone.
+        """Return the tolerance of a text: `2%` of each joint's range plus an absolute part, or rad (m).
 
         Raises:
             InputError: it is neither, or out of range.
@@ -63,7 +63,7 @@ class GoalTolerance:
         return cls(share=number / 100) if text.endswith("%") else cls(0.0, number)
 
     def of(self, commanded_range: float) -> float:
-        """Of a joint commanded over a range, rad (m)."""
+        """Return the tolerance of a joint commanded over a range, rad (m)."""
         return self.share * commanded_range + self.absolute
 
 
@@ -75,7 +75,7 @@ STIFFNESS_SHARE = 0.01
 
 @dataclass(frozen=True)
 class Deviation(Stored):
-    """Of an actual value from the command: the largest, when (s), and the last; NaN if there is none."""
+    """The deviation of an actual value from the command: largest, time (s), last; NaN without any."""
 
     peak: float
     time: float
@@ -83,7 +83,7 @@ class Deviation(Stored):
 
     @classmethod
     def of(cls, time: FloatArray, error: FloatArray) -> Deviation:
-        """From errors, (samples,), at times."""
+        """Return the deviation of errors, (samples,), at times."""
         if np.isnan(error).all():
             return cls(np.nan, np.nan, np.nan)
         worst = int(np.nanargmax(np.abs(error)))
@@ -92,7 +92,7 @@ class Deviation(Stored):
 
 @dataclass(frozen=True)
 class JointTracking(Stored):
-    """What a simulation found at one joint.
+    """The findings of a simulation at one joint.
 
     Attributes:
         name: of the joint.
@@ -133,7 +133,7 @@ class JointTracking(Stored):
 
 
 def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tuple[JointTracking, ...]:
-    """What a history says about each joint."""
+    """Return the findings of a history at each joint."""
     energies = enumerate(_energies(robot, history))
     return tuple(_tracking(robot.joints[index], index, history, energy, goal) for index, energy in energies)
 
@@ -195,7 +195,7 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
 
 
 def _checked(variable: str) -> str:
-    """Where the values lie that a limit bounds: of the torque what is asked for, else what was."""
+    """Return the variable that a limit bounds: the commanded torque, else the actual value."""
     return variable if variable == "tau_motor" else actual(variable)
 
 
@@ -222,7 +222,7 @@ def _number(value: float) -> str:
 
 
 def limit_sentence(joint: JointTracking, worst: Worst) -> str:
-    """By how much a joint exceeds a limit, and when."""
+    """Return by how much a joint exceeds a limit, and when."""
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     relation = "below" if worst.value < worst.bound else "above"
     return (
@@ -232,7 +232,7 @@ def limit_sentence(joint: JointTracking, worst: Worst) -> str:
 
 
 def end_sentence(joint: JointTracking) -> str:
-    """How far off a joint ends that strayed."""
+    """Return how far off target a joint ends."""
     unit = POSITION.unit(joint.type)
     return (
         f"{joint.name}: at the end q is {joint.q.final:.3g} {unit} off the command, "

@@ -27,7 +27,7 @@ class Recorded(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """What a closed loop does at an instant.
+    """The recorded closed loop at an instant.
 
     Attributes:
         rates: time derivative of the state vector.
@@ -41,7 +41,7 @@ class Recording(NamedTuple):
 
     @property
     def entries(self) -> int:
-        """Of a state vector."""
+        """Entries of a state vector."""
         return len(self.rates.program.outputs)
 
 

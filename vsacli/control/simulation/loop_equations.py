@@ -27,7 +27,7 @@ from vsacli.control.simulation.loop_code import Recorded, Recording, loop_code, 
 
 
 class Equations:
-    """What is integrated, and where that ends.
+    """The integrated equations, with the boundaries of the run.
 
     Args:
         loop: a robot under its controller.
@@ -40,26 +40,26 @@ class Equations:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What to remember of what computes: `engine`, as it may be asked for, `compiler`, `threads`."""
+        """Values that tell how it was computed: `engine`, `compiler`, `threads`."""
         return {"engine": "numpy", "compiler": "", "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """Time derivatives of state vectors (..., entries) at a time; each state counts."""
+        """See `Equations`; where a number is not finite the text is evaluated."""
         self.budget.used += vectors.size // vectors.shape[-1]
         return self.loop.derivative(time, vectors)
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
-        """What a controller that holds its torques asks for, (motors,), in a state that it takes for true."""
+        """Return the held torques that a controller commands in a state, (motors,)."""
         return self.loop.controller_torque(time, vector)
 
     def stages(
         self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
     ) -> FloatArray | None:
-        """Return several stages of a step (see `CompiledLoop.stages`); None to compute them one by one."""
+        """See `Equations.stages`."""
         return None
 
     def distance(self, vector: FloatArray) -> float:
-        """From a state to the nearest boundary, at most 1."""
+        """Return the distance of a state from the nearest boundary, at most 1."""
         return min((float(each.distance(vector)) for each in self.boundaries), default=1.0)
 
 
@@ -113,17 +113,17 @@ RECORD_FROM = 50
 three joints, 30 to 130 ms with seven, where an evaluation of the text takes 0.1 to 0.3 ms."""
 
 NUMBER_SECONDS = 4e-8
-"""What Python takes for an operation on plain numbers."""
+"""Seconds of an operation of Python on plain numbers."""
 
 TEXT_SECONDS = 2e-4
-"""What NumPy takes for the text of an evaluation."""
+"""Seconds of an evaluation of the text by NumPy."""
 
 LOOK_SECONDS = 0.02
-"""What it takes to see whether there is compiled code."""
+"""Seconds to see whether there is compiled code."""
 
 
 class Computing(NamedTuple):
-    """What evaluates equations of motion.
+    """The backend of the equations of motion.
 
     Attributes:
         engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
@@ -169,13 +169,13 @@ class RecordedEquations(Equations):
 
     @property
     def provenance(self) -> dict[str, str]:
-        """As of `Equations`: what computed last."""
+        """See `Equations.provenance`; of the last computation."""
         if self._compiled is None:
             return super().provenance
         return {"engine": "c", "compiler": self._compiler, "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """As of `Equations`; where a number is not finite the text has its say."""
+        """See `Equations`; where a number is not finite the text is evaluated."""
         self._improve()
         rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
         if rates is None:
@@ -184,14 +184,14 @@ class RecordedEquations(Equations):
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
-        """As of `Equations`."""
+        """See `Equations.torques`."""
         asked = _finite(self._compiled.torques if self._compiled else self._law, time, vector)
         return super().torques(time, vector) if asked is None else asked
 
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
     ) -> FloatArray | None:
-        """As of `Equations`."""
+        """See `Equations.stages`."""
         self._improve()
         if self._compiled is None:
             return None
@@ -202,7 +202,7 @@ class RecordedEquations(Equations):
         return state
 
     def distance(self, vector: FloatArray) -> float:
-        """As of `Equations`."""
+        """See `Equations.distance`."""
         return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
 
     def _improve(self) -> None:
@@ -228,7 +228,7 @@ class RecordedEquations(Equations):
                     self._load(recording, code, numbers, lambda _code: True)
 
     def _seconds(self, recording: Recording) -> float:
-        """What an evaluation takes before there is compiled code."""
+        """Return the seconds of an evaluation before there is compiled code."""
         operations = len(recording.rates.program.operations)
         return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
 
@@ -254,7 +254,7 @@ class RecordedEquations(Equations):
 def _finite(
     function: Callable[[float, FloatArray], FloatArray] | None, time: float, vectors: FloatArray
 ) -> FloatArray | None:
-    """What a function finds in states at a time; None if there is none, or a number is not finite."""
+    """Return the values of a function at states; None without it, or if a number is not finite."""
     if function is not None:
         with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
             found = function(time, vectors)

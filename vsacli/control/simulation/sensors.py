@@ -22,7 +22,7 @@ MOST_BITS = 48
 
 @dataclass(frozen=True)
 class Sensors:
-    """How well positions and torques are measured.
+    """The accuracy of measured positions and torques.
 
     Attributes:
         position: standard deviation of the positions of joints and motors, joint side of the gear, rad (m).
@@ -51,7 +51,7 @@ class Sensors:
 
 
 class Readings:
-    """What the sensors of a robot say at each sample of a run.
+    """The readings of the sensors of a robot at each sample of a run.
 
     The noise is drawn once: a controller that samples positions knows the numbers that are recorded.
 
@@ -83,7 +83,7 @@ class Readings:
             ]
 
     def positions(self, truth: Phase, rows: int | slice) -> tuple[FloatArray, FloatArray]:
-        """Of joints (..., joints) and of all motors (..., motors), at these samples of a run."""
+        """Return readings of joints (..., joints) and of all motors (..., motors) at these samples."""
         theta = self._drivetrain.of_all(truth.q, truth.theta)
         return (
             _rounded(truth.q + self._q[rows], self._q_step),
@@ -91,7 +91,7 @@ class Readings:
         )
 
     def phase(self, truth: Phase, sample: int) -> Phase:
-        """What a controller takes for the state at a sample; velocities are the true ones."""
+        """Return the state that a controller reads at a sample; velocities are the true ones."""
         q, theta = self.positions(truth, sample)
         return truth._replace(q=q, theta=theta[self._drivetrain.sprung])
 
@@ -105,7 +105,7 @@ class Readings:
 
 
 def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
-    """What an encoder divides into steps, joint side of the gear, rad (m).
+    """Return the range that an encoder divides into steps, joint side of the gear, rad (m).
 
     That is a turn of a joint, or of the shaft of a motor whose gear ratio is known.
     """
@@ -122,6 +122,6 @@ def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
 
 
 def _rounded(values: FloatArray, step: FloatArray) -> FloatArray:
-    """To multiples of a step, unless that is zero."""
+    """Return values rounded to multiples of a step, unless that is zero."""
     whole = np.where(step > 0, step, 1.0)
     return np.where(step > 0, whole * np.round(values / whole), values)

@@ -39,7 +39,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class InitialError:
-    """How far from the command a run starts: actual minus commanded, for all joints or one number each.
+    """The difference of the initial state from the command, for all joints or for each.
 
     Attributes:
         q: of the position, rad (m).
@@ -93,7 +93,7 @@ Measured = Literal["state", "positions"]
 
 @dataclass(frozen=True, repr=False)
 class Simulation:
-    """What happened, the report on it, and what computed it: `engine`, `compiler` and `threads`."""
+    """A simulation: variables, report, and how it was computed: `engine`, `compiler`, `threads`."""
 
     history: History
     report: SimulationReport
@@ -249,7 +249,7 @@ def check_measured(measured: Measured, gains: Gains | None) -> None:
 
 
 def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
-    """For which joints a recorded motion leaves open what is commanded: a run along it would be doubtful."""
+    """Yield the joints whose command a recorded motion does not determine, which makes a run unreliable."""
     if trajectory.estimates:
         run = Run(robot, trajectory)
         deque(run, maxlen=0)

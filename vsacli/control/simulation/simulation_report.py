@@ -28,7 +28,7 @@ from vsacli.control.simulation.joint_tracking import (
 )
 
 VERDICTS = ("ok", "over_limit", "strayed", "singular", "infeasible", INCOMPLETE, DIVERGED)
-"""From best to worst; the worst that applies wins."""
+"""Verdicts from best to worst; the worst that applies wins."""
 
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
@@ -50,7 +50,7 @@ def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending
 
 @dataclass(frozen=True)
 class LargestError(Published):
-    """Where q was furthest from the command, measured by what its joint may be off at the end.
+    """The largest error of q relative to the tolerance of its joint at the end.
 
     Attributes:
         joint: its name.
@@ -150,7 +150,7 @@ class SimulationReport(Stored):
         return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
 
     def _loss(self) -> Iterator[str]:
-        """What measuring positions alone costs."""
+        """Yield the loss of accuracy by sensors of positions."""
         for joint, ideal in zip(self.joints, self.with_full_state, strict=False):
             unit = POSITION.unit(joint.type)
             yield (
@@ -159,7 +159,7 @@ class SimulationReport(Stored):
             )
 
     def _effort(self) -> Iterator[str]:
-        """How it was integrated."""
+        """Yield the method and effort of the integration."""
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)

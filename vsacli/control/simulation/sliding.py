@@ -76,7 +76,7 @@ class Sliding:
         return state
 
     def distances(self, time: float, vector: FloatArray) -> FloatArray:
-        """Of each motor, (motors,): what falls to zero at its next switch.
+        """Return for each motor, (motors,), a distance that falls to zero at its next switch.
 
         All switches ask for it in the same state, one after the other.
         """
@@ -116,7 +116,7 @@ class Sliding:
             self._loop.slip = slip
 
     def _friction(self, time: float, vector: FloatArray) -> FloatArray:
-        """Of all motors, (motors,); of what none is held by, nothing needs to be known."""
+        """Return the friction of all motors, (motors,); arbitrary where none is held."""
         if not np.any(self._slip[self._laws.sharp] == 0):
             return self._laws.offset
         loop, phase = self._loop, self._loop.packing.unpack(vector)
@@ -126,6 +126,6 @@ class Sliding:
 
 
 def sliding(loop: ClosedLoop) -> Sliding | None:
-    """Of a robot with sharp friction; None if it has none."""
+    """Return the friction of a robot with sharp laws; None if it has none."""
     laws = loop.plant.drivetrain.friction
     return None if laws is None or not laws.sharp.any() else Sliding(loop, laws)

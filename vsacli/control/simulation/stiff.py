@@ -15,7 +15,7 @@ from vsacli.robot.model import Robot
 
 _EPSILON = float(np.finfo(np.float64).eps)
 _RELATIVE_STEP = math.sqrt(_EPSILON)
-"""Of forward differences: where truncation and rounding are alike."""
+"""Step of forward differences, where truncation and rounding are equal."""
 
 
 def jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArray:
@@ -31,7 +31,7 @@ def jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArra
 
 
 def rounding(matrix: FloatArray, vector: FloatArray) -> FloatArray:
-    """What rounding of the state may change a function by, (values,), from its Jacobian (values, entries)."""
+    """Return the effect of a rounded state on a function, (values,), from its Jacobian (values, entries)."""
     changes: FloatArray = _EPSILON * (np.abs(matrix) @ np.maximum(np.abs(vector), 1.0))
     return changes
 

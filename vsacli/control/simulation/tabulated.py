@@ -35,13 +35,13 @@ class Table:
 
     @classmethod
     def of(cls, function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> Table:
-        """Of a function of time; see `tabulate`."""
+        """Return the table of a function of time; see `tabulate`."""
         polynomial = tabulate(function, breakpoints)
         return cls(polynomial.x, np.moveaxis(polynomial.c, 1, 0))
 
     @property
     def columns(self) -> int:
-        """How many there are."""
+        """Number of columns."""
         return int(self.coefficients.shape[2])
 
     @cached_property
@@ -71,7 +71,7 @@ class Constant(Table):
         super().__init__(np.array([0.0, 1.0]), values[None, None].copy())
 
     def set(self, values: FloatArray) -> None:
-        """From now on."""
+        """Set the values from now on."""
         self.coefficients[0, 0] = values
 
     def _at(self, _time: float | FloatArray) -> FloatArray:
@@ -94,7 +94,7 @@ class Instant:
         self.tables: dict[Table, FloatArray] = {}
 
     def columns_of(self, table: Table) -> FloatArray:
-        """What a table has at this time."""
+        """Return the values of a table at this time."""
         if table not in self.tables:
             self.tables[table] = self._inputs(table.columns)
         return self.tables[table]
@@ -115,13 +115,13 @@ GAIN = 4.0
 nothing where the error is noise of the function itself."""
 
 HALVINGS = 10
-"""To where the function ends, say, within a thousandth of a first cell."""
+"""Bisections to the end of a function, to a thousandth of a first cell."""
 
 _NODES = (1 - np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))) / 2
 """Chebyshev's, in shares of a cell."""
 
 _PROBES = np.array([0.002, 0.5, 0.998])
-"""Where a polynomial through these nodes errs most."""
+"""Points at which a polynomial through these nodes errs most."""
 
 _TO_POWERS = np.linalg.inv(np.vander(_NODES))
 """Values at the nodes to coefficients of powers, the highest first."""
@@ -188,7 +188,7 @@ def _misfit(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -> FloatArr
 
 
 def _coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
-    """Of powers of the time elapsed in the cell, (cells, powers, columns)."""
+    """Return the coefficients of powers of the time elapsed in the cell, (cells, powers, columns)."""
     scale = lengths[:, None, None] ** -np.arange(DEGREE, -1.0, -1.0)[:, None]
     return np.asarray(np.einsum("pn,cnk->cpk", _TO_POWERS, nodes) * scale, dtype=np.float64)
 
@@ -198,7 +198,7 @@ def _halved(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatA
 
 
 class Reference:
-    """What a trajectory commands, and the wrench that acts meanwhile, as functions of time.
+    """Commands of a trajectory and the wrench, as functions of time.
 
     A time gives arrays (joints,), times (samples,) give arrays (samples, joints).
 

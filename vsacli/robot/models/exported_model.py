@@ -1,4 +1,4 @@
-"""What every exported model has: its text and notes, its XML, and what is drawn of the links."""
+"""Common parts of exported models: text and notes, XML, and shapes of the links."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def arm_length(robot: Robot) -> float:
 
 
 def rod_radius(robot: Robot) -> float:
-    """Of the rods from origin to origin, m."""
+    """Return the radius of the rods from origin to origin, m."""
     return THICKNESS_SHARE * arm_length(robot) / len(robot.joints)
 
 

@@ -37,7 +37,8 @@ from vsacli.robot.models.mjcf_drives import (
 from vsacli.robot.models.passive_forces import check_friction, forces_text, forces_words
 
 LOWEST_VERSION = "3.7"
-"""Of MuJoCo: the first with springs whose torque is a polynomial; tried with 3.5, 3.6, 3.7 and 4.0."""
+"""Lowest version of MuJoCo: the first with springs whose torque is a polynomial; tried with 3.5, 3.6, 3.7
+and 4.0."""
 
 TIME_STEP = 1e-3
 """s. With torques that are known at each stage, the motion of the shipped 3R is 4e-13 rad off with it."""

@@ -139,7 +139,7 @@ DRAWN = 0.005
 LEVER_COLOUR = (0.8, 0.4, 0.2, 1)
 
 GHOST: dict[str, Value] = {"contype": 0, "conaffinity": 0, "mass": 0}
-"""What is drawn and nothing else."""
+"""Attributes of a shape that is only drawn."""
 
 HIDDEN = 4
 """Group of what a viewer does not show unless asked: the spring is drawn along the pulley, too, a metre for a
@@ -181,14 +181,14 @@ def add_lever_spring(tendons: Element, joint: Joint, spring: LeverSpring, setter
 
 
 POLYNOMIAL_TERMS = 3
-"""Of a spring's torque in MuJoCo: phi, phi^2 as it stands, phi^3."""
+"""Terms of a spring's torque in MuJoCo: phi, phi^2 as it stands, phi^3."""
 
 SLACK = (-1e6, 0.0)
 """Lengths of a tendon at which it does not pull."""
 
 
 class Sections(NamedTuple):
-    """Where the parts of a drive go."""
+    """Sections of the file for the parts of a drive."""
 
     world: Element
     tendons: Element
@@ -220,7 +220,7 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
 
 
 def _drive_directly(body: Element, joint: Joint, rotors: Sequence[Rotor]) -> None:
-    """By a motor whose rotor is a part of the joint."""
+    """Add a motor whose rotor is a part of the joint."""
     (moving,), (rotor,) = body.findall("joint"), rotors
     add(moving, armature=rotor.inertia, damping=joint.damping + rotor.motor.damping)
 

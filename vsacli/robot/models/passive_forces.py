@@ -76,7 +76,7 @@ def check_friction(robot: Robot) -> None:
 
 
 def forces_words(robot: Robot) -> str:
-    """What the file has forces of, empty if there is none."""
+    """Return words for the forces in the file, "" without any."""
     springs = [joint.name for joint in robot.joints if not has_springs_of(joint)]
     friction = [joint.name for joint in robot.joints if joint.has_friction]
     parts = {"springs": springs, "friction": friction}
@@ -106,7 +106,7 @@ def forces_text(robot: Robot) -> str | None:
 
 
 def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
-    """Where there is dry friction, in words, and what it is."""
+    """Yield each dry friction with words for its place."""
     if joint.friction is not None:
         yield f"joint {joint.name}: its friction", joint.friction
     for number, motor in enumerate(joint.actuator.motors, 1):
@@ -132,7 +132,7 @@ def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
 
 
 def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
-    """On the coordinates of a joint: what springs exert, less friction."""
+    """Return the torques of springs less friction on the coordinates of a joint."""
     forces = [np.zeros_like(position) for position in positions]
     if not has_springs_of(joint):
         elements = joint.actuator.spring_elements
@@ -147,7 +147,7 @@ def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]
 
 
 def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
-    """What springs exert, each by its weights; those that only pull go slack."""
+    """Return the torques of springs by their weights; those that only pull go slack."""
     forces = [np.zeros_like(position) for position in positions]
     for spring in elements:
         weights = (spring.joint, *spring.motors)
@@ -160,7 +160,7 @@ def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) ->
 
 
 def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
-    """What the springs of a joint exert that are known by their potential alone."""
+    """Return the torques of springs of a joint that are known by their potential alone."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))
     against = (torques.tau_spring[..., side] for side in range(len(joint.actuator.motors)))

@@ -28,7 +28,7 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2, what most readers of a URDF take."""
 
 NO_LIMIT = 1e9
-"""In place of a limit that URDF asks for and the robot does not have; `import-urdf` takes it for none."""
+"""Stands for a limit that URDF requires and the robot does not have; `import-urdf` takes it for none."""
 
 
 def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
@@ -115,7 +115,7 @@ def _add_drive(moving: Element, joint: Joint) -> None:
 
 
 def _left_out(robot: Robot) -> Iterator[str]:
-    """What URDF has no place for, sentences."""
+    """Yield sentences on parts without a place in URDF."""
     yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
     if robot.gravity != STANDARD_GRAVITY:
         gravity = ", ".join(f"{each:g}" for each in robot.gravity)

@@ -18,7 +18,7 @@ ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
 def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:
-    """What the rules find, with lines of the robot file: the first of the sources, if there is one."""
+    """Return the findings of the rules, with lines of the robot file: the first of the sources."""
     return findings(ROBOT_RULES, facts, _written(sources))
 
 
@@ -32,7 +32,7 @@ def _written(sources: Sequence[Source]) -> Written | None:
 
 
 def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
-    """Where a robot file says what stands at a path of the robot: modified rows are made standard ones.
+    """Return the path in the robot file for a path of the robot; modified rows become standard ones.
 
     The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.
     """

@@ -27,10 +27,10 @@ RPM = Slip("rpm", math.pi / 30)
 MILLIMETRES = Slip("mm", 1e-3)
 CENTIMETRES = Slip("cm", 1e-2)
 GRAMS = Slip("g", 1e-3, power=2.5)
-"""At a given inertia, the density of the sphere goes with the mass to the power of 5/2, ..."""
+"""Slip of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
 
 INERTIA_POWER = -1.5
-"""... and at a given mass with the inertia to this power."""
+"""Power of the inertia in the density of the sphere, at a given mass."""
 
 UNITS_OF_INERTIA = {"kg mm^2": 1e-6, "kg cm^2": 1e-4, "g cm^2": 1e-7, "g mm^2": 1e-9}
 SLIPS_OF_DENSITY = (

@@ -49,12 +49,12 @@ class _Driven(NamedTuple):
 
     @property
     def torque(self) -> float:
-        """Its largest torque behind the gear."""
+        """Largest torque behind the gear."""
         return _bounded(self.behind.max_torque)
 
     @property
     def link_inertia(self) -> float:
-        """Of the link alone about its joint."""
+        """Inertia of the link alone about its joint."""
         return float(self.facts.sizes.inertias[self.number])
 
     @property
@@ -64,12 +64,12 @@ class _Driven(NamedTuple):
 
     @property
     def load(self) -> float:
-        """What the weight of the stretched arm can ask of the joint."""
+        """Largest torque of the weight of the stretched arm at the joint."""
         return float(self.facts.sizes.loads[self.number]) if any(self.facts.gravity) else math.nan
 
     @property
     def velocity(self) -> float:
-        """Its largest velocity behind the gear."""
+        """Largest velocity behind the gear."""
         return _bounded(self.behind.max_velocity)
 
     def unit(self, name: str) -> str:
@@ -146,7 +146,7 @@ def _damping(number: int, joint: Joint, size: float) -> Measured:
 
 
 def _braking(facts: Facts) -> Iterator[Measured]:
-    """What damping takes at the largest velocity of the joint, over the largest torque; 0 without a limit."""
+    """Yield the torque of damping at the largest velocity, over the largest torque; 0 without a limit."""
     for driven in _all_motors(facts):
         joint, motor = driven.joint, driven.behind
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))

@@ -1,4 +1,4 @@
-"""How large and heavy a robot is: the measures against which single numbers of its file are held."""
+"""Size and weight of a robot: the measures that single numbers of its file are compared with."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SPHERE = 0.4
 
 @dataclass(frozen=True)
 class Facts:
-    """What the rules know of a robot.
+    """The facts on a robot that rules use.
 
     Attributes:
         joints: from the base to the tip.
@@ -43,7 +43,7 @@ class Facts:
 
     @cached_property
     def sizes(self) -> BodySizes:
-        """Of the robot."""
+        """Sizes of the robot."""
         return BodySizes(self.joints)
 
     @property
@@ -117,12 +117,12 @@ class BodySizes:
 
     @property
     def extent(self) -> float:
-        """Of the robot, m: its reach, or the radius of a link that is larger."""
+        """Size of the robot, m: its reach, or the radius of a link that is larger."""
         return max(self.reach, float(np.max(self.gyrations)))
 
     @property
     def weight(self) -> float:
-        """Of all links, N."""
+        """Weight of all links, N."""
         return WEIGHT_PER_MASS * self.mass
 
     def scale(self, joint: Joint) -> float:
@@ -137,7 +137,7 @@ def _from_tip(values: FloatArray) -> FloatArray:
 
 
 def _com_distance(joint: Joint) -> float:
-    """Of the centre of mass from frame i-1, in which it lies at Tz(d) Tx(a) Rx(alpha) com, whatever theta."""
+    """Return the distance of the centre of mass from frame i-1, in which it is Tz(d) Tx(a) Rx(alpha) com."""
     x, y, z = joint.link.com
     c, s = math.cos(joint.dh.alpha), math.sin(joint.dh.alpha)
     return math.hypot(joint.dh.a + x, c * y - s * z, joint.dh.d + s * y + c * z)

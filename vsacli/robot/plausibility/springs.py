@@ -20,7 +20,7 @@ from vsacli.robot.plausibility.facts import Facts, joint_path, ratio, written_on
 
 HALF_TURN = math.pi
 SMALL_SHARE = 0.003
-"""Of half a turn: half a degree."""
+"""Small angle as a share of half a turn: half a degree."""
 
 TOO_SOFT = (
     Slip("N m/deg", 180 / math.pi, instead_of="N m/rad"),
@@ -46,7 +46,7 @@ class Corridor(NamedTuple):
 
 
 def corridor(joint: Joint) -> Corridor | None:
-    """That of a joint; None if its stiffness cannot be commanded."""
+    """Return the attainable range of a joint; None if its stiffness is not commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return None
     solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))

@@ -101,12 +101,12 @@ class Conversion:
             yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, one sentence each."""
+        """Yield sentences on values that are hardly meant."""
         yield from (warning for held in self.chain.held for warning in held.warnings())
         yield from self.robot.warnings
 
     def notes(self) -> Iterator[str]:
-        """What was left out or changed, one sentence each."""
+        """Yield sentences on parts left out or changed."""
         joints = [joint.urdf for joint in self.chain.joints]
         yield from _held("below the base", self.chain.held_below)
         yield from _held("beside the chain, their links lumped", self.chain.held_beside)
@@ -117,7 +117,7 @@ class Conversion:
             yield f"{what} left out: {', '.join(joint.name for joint in joints if what in joint.left_out)}"
 
     def _of_motors(self) -> Iterator[str]:
-        """What becomes of effort limits and gears, which are those of a single motor."""
+        """Yield notes on effort limits and gears, which are those of a single motor."""
         joints = [joint.urdf for joint in self.chain.joints]
         known = {
             "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
@@ -130,7 +130,7 @@ class Conversion:
 
 
 def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
-    """Which joints stand at zero, and which elsewhere."""
+    """Yield the joints held at zero, and those held elsewhere."""
     at_zero = [joint.urdf.name for joint in joints if joint.position == 0]
     elsewhere = [str(joint) for joint in joints if joint.position != 0]
     if at_zero:
@@ -220,7 +220,7 @@ def _robot(
 
 
 def _description(path: str, chain: SerialChain) -> str:
-    """Where the robot comes from, and which joints stand elsewhere than at zero without following others."""
+    """Return the origin of the robot, and the joints held elsewhere than at zero."""
     held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
     origin = f"converted from {one_line(os.path.basename(path))}, from link {chain.base} to link {chain.tip}"
     return f"{origin}{''.join(held)}"
@@ -244,7 +244,7 @@ def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actu
 
 
 def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
-    """What each joint carries, in its Denavit-Hartenberg frame.
+    """Return the links that each joint carries, in its Denavit-Hartenberg frame.
 
     Raises:
         InputError: no body has such an inertia.

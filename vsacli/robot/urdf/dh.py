@@ -138,7 +138,7 @@ def _normal_is_far(first: Axis, second: Axis) -> bool:
 
 
 def _feet(first: Axis, second: Axis) -> tuple[float, float]:
-    """Where the common normal of two axes meets each, as distance along it from its point."""
+    """Return where the common normal of two axes meets each, as distance along it from its point."""
     across = second.point - first.point
     normal = np.cross(first.direction, second.direction)
     scaled = normal / (normal @ normal)

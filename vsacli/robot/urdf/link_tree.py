@@ -121,7 +121,7 @@ class UrdfLimit:
 
 @dataclass(frozen=True)
 class Mimic:
-    """How a joint follows another: to `multiplier` times the position of joint `leader`, plus `offset`."""
+    """The relation of a joint to its leader: `multiplier` times the position of `leader`, plus `offset`."""
 
     leader: str
     multiplier: float = 1.0
@@ -164,7 +164,7 @@ class UrdfJoint:
         return quantity.unit("revolute" if self.is_revolute else "prismatic")
 
     def motions(self, positions: FloatArray) -> FloatArray:
-        """How its child moves at positions (samples,), (samples, 4, 4); by Rodrigues' formula if it turns."""
+        """Return the motion of its child at positions (samples,), (samples, 4, 4), by Rodrigues' formula."""
         poses = np.tile(np.eye(4), (len(positions), 1, 1))
         if not self.is_revolute:
             poses[:, :3, 3] = np.outer(positions, self.axis)

@@ -20,7 +20,7 @@ from vsacli.robot.joint import DenavitHartenberg, Link
 from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint
 
 DEFLECTION = {True: 0.1, False: 0.01}
-"""By how much the largest load deflects the springs of a revolute (rad) and of a prismatic (m) joint."""
+"""Deflection of springs by the largest load, at revolute (rad) and prismatic (m) joints."""
 
 SLOW = {True: 1.0, False: 0.2}
 """Velocity of a slow motion, rad/s and m/s, which the springs carry the damping of; that of wrists in URDF
@@ -34,13 +34,13 @@ MOTOR_SHARE = 0.5
 after the Panda, the UR5 and the LWR it is 0.1 to 0.9; it grows towards their wrists."""
 
 DIGITS = 2
-"""To which the constants are rounded; they are made up, and should look so."""
+"""Digits of the constants, which are made up and should look so."""
 
 LEAST_TORQUE, LEAST_INERTIA = 1e-9, 1e-12
 """N m and kg m^2 (N and kg); a joint that carries less carries nothing."""
 
 UNLOADED = PlaceholderConstants(motor_inertia=1.0, stiffness=1000.0, spring=(400.0, 2000.0))
-"""Of a joint that carries nothing, as in a file without masses."""
+"""Constants of a joint without load, as in a file without masses."""
 
 
 class Placeholders(NamedTuple):
@@ -61,7 +61,7 @@ class Placeholders(NamedTuple):
     spring: tuple[float, float] | None = None
 
     def constants(self, joint: ChainJoint, load: JointLoad) -> PlaceholderConstants:
-        """Those of a joint with what it carries, its effort limit, and its gear."""
+        """Return the constants of a joint from its load, its effort limit, and its gear."""
         gear = joint.urdf.gear_ratio if ACTUATORS[self.actuator].motor_count == 1 else None
         own = load.constants(DEFLECTION[joint.is_revolute], gear or 1.0)
         return PlaceholderConstants(
@@ -73,7 +73,7 @@ class Placeholders(NamedTuple):
         )
 
     def origin(self, field: str, joint: ChainJoint, load: JointLoad) -> str:
-        """Where the numbers in a field of its actuator come from, a clause."""
+        """Return the source of the numbers in a field of its actuator, a clause."""
         sized = {"motor": self.motor_inertia, "stiffness": self.stiffness, "spring": self.spring}
         if not load.is_there or sized.get(field, ()) is not None:
             return "not from the URDF"
@@ -85,7 +85,7 @@ class Placeholders(NamedTuple):
 
 
 class JointLoad(NamedTuple):
-    """What a joint carries at most.
+    """The largest load of a joint.
 
     Attributes:
         torque: of weight and damping, N m (N).
@@ -136,7 +136,7 @@ class _Masses(NamedTuple):
         return _Masses(self.mass, self.first + self.mass * distance, second)
 
     def joined(self, link: Link, distance: float) -> _Masses:
-        """With a link whose centre of mass has this distance."""
+        """Return the masses with a further link whose centre of mass has this distance."""
         own = link.mass * distance
         moment = max(float(link.inertia.principal_moments[-1]), 0.0)
         return _Masses(self.mass + link.mass, self.first + own, self.second + own * distance + moment)
@@ -145,7 +145,7 @@ class _Masses(NamedTuple):
 def joint_loads(
     joints: Sequence[ChainJoint], rows: Sequence[DenavitHartenberg], links: Sequence[Link]
 ) -> list[JointLoad]:
-    """What each joint carries at most, in any configuration within the limits of prismatic joints.
+    """Return the largest load of each joint over all configurations.
 
     Args:
         joints: from the base.

@@ -41,7 +41,7 @@ SPRINGS = ("springStiffness", "springReference")
 
 
 class Beside(NamedTuple):
-    """What is said beside joints, by their names.
+    """Statements outside of joints, by the names of joints.
 
     Attributes:
         gear_ratios: motion of the only motor over that of the joint.
@@ -103,7 +103,7 @@ def _reduction(transmission: Element, problems: Problems) -> float:
 
 
 MACRO = re.compile(r"\$\{|\$\((anon|arg|dirname|env|eval|find|optenv)\b")
-"""How an expression of xacro begins; names may hold other signs, as a shell's."""
+"""Beginning of an xacro expression; names may hold other signs, as a shell's."""
 
 MESH = "filename"
 """Attribute that names a mesh, which nobody opens here."""
@@ -168,7 +168,7 @@ def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[s
 
 
 def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
-    """Each joint must have two links that exist, and no link two parents."""
+    """Check that each joint has two existing links, and no link two parents."""
     parents: dict[str, UrdfJoint] = {}
     for joint in joints.values():
         for end in dict.fromkeys((joint.parent, joint.child)):
@@ -261,7 +261,7 @@ class _Reader:
         )
 
     def _left_out(self, joint: Element) -> Iterator[str]:
-        """What is not taken over: a robot file has no place for it, or the URDF does not say which."""
+        """Yield the parts not taken over: without a place in a robot file, or ambiguous in the URDF."""
         for dynamics in joint.all("dynamics"):
             if self._non_negative(dynamics, "friction", 0.0):
                 yield "dry friction"

@@ -79,7 +79,7 @@ def _link_lines(link: Link) -> Iterator[str]:
 
 
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
-    """Where the numbers in a field of an actuator come from, and what the URDF knows of a motor."""
+    """Return the source of the numbers in a field of an actuator, with facts of the URDF on a motor."""
     joint, load = conversion.chain.joints[index], conversion.loads[index]
     origin = conversion.placeholders.origin(field, joint, load)
     known = " and ".join(_known(joint.urdf))
@@ -89,7 +89,7 @@ def _origin_of(field: str, conversion: Conversion, index: int) -> str:
 
 
 def _known(joint: UrdfJoint) -> Iterator[str]:
-    """What a URDF says of the only motor of a joint."""
+    """Yield the statements of a URDF on the only motor of a joint."""
     if joint.limit.effort:
         yield f"an effort limit of {_number(joint.limit.effort)} {joint.unit(TORQUE)} (joint side)"
     if joint.gear_ratio:

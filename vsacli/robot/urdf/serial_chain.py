@@ -57,7 +57,7 @@ class HeldJoint(NamedTuple):
         return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit()}{following}"
 
     def warnings(self) -> Iterator[str]:
-        """That it may not stand where it should, and how to mend that."""
+        """Yield the warning that it may stand at another place, with a fix."""
         mimic, limit = self.urdf.mimic, self.urdf.limit.position
         if mimic is not None and not self.follows and self.position == _resting(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
@@ -102,7 +102,7 @@ def held_joints(
 
 
 def _resting(joint: UrdfJoint) -> float:
-    """Where a joint stands if nobody says where: as if what it follows, but is not there, stood at zero."""
+    """Return the position of a joint nobody states: as if its missing leader stood at zero."""
     return 0.0 if joint.mimic is None else joint.mimic.offset
 
 

@@ -16,7 +16,7 @@ from vsacli.robot.urdf.link_tree import Urdf, UrdfJoint
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 MAX_BYTES = 10_000_000
-"""As large as a URDF may be: pairs of links that may touch make most of an SRDF."""
+"""Largest file, as for a URDF: pairs of links that may touch make most of an SRDF."""
 
 
 class Ends(NamedTuple):

@@ -29,7 +29,7 @@ class Element:
         return "".join(self.texts).strip()
 
     def everything(self) -> Iterator[Element]:
-        """Itself and all below it."""
+        """Yield the element and all below it."""
         yield self
         for child in self.children:
             yield from child.everything()

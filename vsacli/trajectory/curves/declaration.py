@@ -47,7 +47,7 @@ _TIMES = ("not", "once", "twice", "three times", "four times")
 
 @dataclass(frozen=True)
 class Use:
-    """What something is declared for.
+    """The use of a declaration.
 
     Attributes:
         signal: what is declared.
@@ -59,7 +59,7 @@ class Use:
 
     @property
     def smoothness(self) -> int:
-        """How many continuous derivatives the signal must have."""
+        """Number of continuous derivatives that the signal must have."""
         return 2 if self.rigid else self.signal.orders - 1
 
     def one(self, role: str, **options: Any) -> Any:
@@ -83,7 +83,7 @@ class Use:
         return {"frame": choice(WRENCH_FRAMES, doc)}
 
     def degree(self, degrees: range) -> Check:
-        """Which of these degrees make it smooth enough if it begins and ends at rest."""
+        """Return the check for degrees smooth enough for a motion that begins and ends at rest."""
         signal = self.signal
         subject, vanishing = signal.key, "its rate"
         if signal is POSITION:
@@ -128,7 +128,7 @@ class Declaration(ABC):
 
     @classmethod
     def meaning(cls, _use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         return cls.__doc__ or ""
 
     @classmethod
@@ -141,7 +141,7 @@ class Declaration(ABC):
         check_fields(self, *self._problems())
 
     def _problems(self) -> Iterator[FieldProblem]:
-        """What is wrong with the record beyond its fields."""
+        """Yield the problems of the record beyond its fields."""
         return iter(())
 
 
@@ -197,21 +197,21 @@ class Recorded(Declaration):
 
     @property
     def chosen(self) -> FitChoice:
-        """What is said of the spline."""
+        """Choice of the spline."""
         from vsacli.trajectory.fits import FitChoice
 
         return FitChoice(self.fit, self.noise, self.bandwidth)
 
     @property
     def mapping(self) -> ColumnMapping:
-        """What is said of the columns of the file."""
+        """Mapping of the columns of the file."""
         from vsacli.documents.column_mapping import ColumnMapping
 
         return ColumnMapping(self.columns or {}, self.ignore or ())
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         columns = f"Samples from a CSV table with the columns {', '.join(WRENCH_AXES)}."
         return columns if use.signal is WRENCH else super().meaning(use)
 
@@ -221,7 +221,7 @@ class Formula(Declaration):
 
     @property
     def signal(self) -> Signal:
-        """What is declared."""
+        """Declared signal."""
         return self.use.signal
 
     @property
@@ -234,7 +234,7 @@ class Formula(Declaration):
         """Return the profile from the first to the last time of a span, in s."""
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps it from lasting so long, in s."""
+        """Yield why it cannot last this long, in s."""
         if self.lasts is not None and not same_time(self.lasts, duration):
             yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
             return
@@ -253,7 +253,7 @@ class Formula(Declaration):
         return iter(())
 
     def notes_over(self, _span: tuple[float, float], /) -> Iterator[str]:
-        """What follows from it over a span, in s, that the user did not give, in clauses."""
+        """Yield clauses on values over a span, in s, that the user did not give."""
         return iter(())
 
 

@@ -136,7 +136,7 @@ class Polynomial(Formula):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         if use.rigid:
             same = "The same for a robot whose joints are all rigid"
             return f"{same}: its torques do not depend on jerk and snap."
@@ -161,7 +161,7 @@ class Hold(Formula):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         if use.signal is POSITION:
             return "The robot stands still."
         return f"The same {use.signal.key} all the time."

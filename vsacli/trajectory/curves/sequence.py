@@ -45,7 +45,7 @@ class Part(Declaration):
         """Return the profile over a span, in s, after a part that ends here."""
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """What keeps it from being executed."""
+        """Yield the problems that prevent its execution."""
         return iter(())
 
 
@@ -99,7 +99,7 @@ class PolynomialPart(_Timed):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     @property
@@ -132,7 +132,7 @@ class _Standalone(Formula, Part):
         return self.over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """What keeps it from being executed."""
+        """Yield the problems that prevent its execution."""
         return self.problems_over(self.lasts)
 
 
@@ -150,7 +150,7 @@ class ViaPart(Via, _Standalone):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
 
     def _problems(self) -> Iterator[FieldProblem]:
@@ -210,7 +210,7 @@ class Sequence(Formula):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     def __post_init__(self) -> None:
@@ -261,7 +261,7 @@ class Sequence(Formula):
         return f"{remedy}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
 
     def _ends(self) -> FloatArray:
-        """Where the parts end, from the start of the first on, s; (parts+1,)."""
+        """Ends of the parts, from the start of the first on, s; (parts+1,)."""
         with np.errstate(over="ignore"):  # an infinite sum is refused
             return np.concatenate(([0.0], np.cumsum([part.lasts for part in self.parts])))
 
@@ -284,13 +284,13 @@ class Sequence(Formula):
             yield part, profile
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
-        """Those of the parts."""
+        """Yield the warnings of the parts."""
         for part, profile in self._placed(span):
             if isinstance(part, Formula):
                 yield from part.warnings_over(profile.span, joints)
 
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
-        """Those of the parts."""
+        """Yield the notes of the parts."""
         for part, profile in self._placed(span):
             if isinstance(part, Formula):
                 yield from part.notes_over(profile.span)

@@ -20,14 +20,14 @@ from vsacli.trajectory.curves.steps import stepwise
 from vsacli.trajectory.times import MAX_STEPS
 
 RAMP_DEGREE = 9
-"""Of the rise at both ends: its first four derivatives vanish there."""
+"""Degree of the rise at both ends: its first four derivatives vanish there."""
 
 SAMPLES_PER_PERIOD = 64
-"""Of the highest harmonic, where a lowest value is looked for, at least as many in a ramp: an extreme lies
-at most 0.12 % of the amplitudes beyond the samples about it."""
+"""Samples of the period of the highest harmonic, where a minimum is searched, at least as many in a ramp:
+an extreme lies at most 0.12 % of the amplitudes beyond adjacent samples."""
 
 HALVINGS = 40
-"""Of the time between two such samples, after which the value at the extreme is exact to rounding."""
+"""Bisections between two such samples, after which the extreme value is exact to rounding."""
 
 
 class Lowest(NamedTuple):
@@ -214,7 +214,7 @@ class SumOfSinusoids(Formula):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         if use.signal is POSITION:
             return super().meaning(use)
         positive = ", and must stay positive" if use.signal.positive else ""
@@ -242,7 +242,7 @@ class SumOfSinusoids(Formula):
         )
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps it from lasting so long, in s."""
+        """See `Formula.problems_over`."""
         if 2 * self.ramp > duration:
             message = f"must take at most half of the {duration:g} s, not {self.ramp:g} s"
             yield FieldProblem(("ramp",), message)
@@ -254,7 +254,7 @@ class SumOfSinusoids(Formula):
             yield from problems or self._not_positive(duration)
 
     def _not_positive(self, duration: float) -> Iterator[FieldProblem]:
-        """Where a signal that must stay positive does not."""
+        """Yield where a signal that must stay positive does not."""
         if not self.signal.positive:
             return
         lowest, when = self.over((0.0, duration)).lowest()

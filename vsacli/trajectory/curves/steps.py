@@ -28,7 +28,7 @@ PROBES = 101
 
 
 class Jump(NamedTuple):
-    """Where one part does not begin as the one before ends.
+    """A jump between the end of one part and the start of the next.
 
     Attributes:
         part: index of the later part.
@@ -69,7 +69,7 @@ class Chain(ClosedForm):
 
     @cached_property
     def breakpoints(self) -> FloatArray:
-        """Those of the parts."""
+        """Breakpoints of the parts."""
         return np.unique(np.concatenate([part.breakpoints for part in self.parts]))
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -183,7 +183,7 @@ class Steps(Formula):
                 yield FieldProblem(("times", index), f"{message}, {self.transition:g} s later")
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps it from lasting so long, in s."""
+        """See `Formula.problems_over`."""
         end = self.times[-1] + self.transition
         if not end <= duration * (1 + SAME_TIME):
             message = f"the last change ends at {end:.10g} s, the trajectory at {duration:.10g} s"

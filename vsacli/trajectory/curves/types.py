@@ -1,4 +1,4 @@
-"""What a trajectory file may declare: the types of each signal.
+"""Types of declarations in trajectory files, for each signal.
 
 A new type is a class like those in this folder, and its row in `TYPES`.
 """
@@ -24,7 +24,7 @@ TYPES = {
     "constant": ("vsacli.trajectory.curves.polynomial:Hold", _EVERY),
     "csv": ("vsacli.trajectory.curves.declaration:Recorded", _EVERY),
 }
-"""Each type with its home, and what it serves: the position, any commanded signal, the wrench."""
+"""Types of declarations, each with its home and its uses: position, any commanded signal, wrench."""
 
 
 class _Types(LazyRegistry):
@@ -40,7 +40,7 @@ class _Types(LazyRegistry):
 
 
 def declared_as(use: Use) -> OneOf:
-    """How a signal may be declared."""
+    """Return the possible declarations of a signal."""
     return OneOf(_Types(use))
 
 

@@ -72,7 +72,7 @@ class ViaPoints(ClosedForm):
 
     @cached_property
     def breakpoints(self) -> FloatArray:
-        """When the points are passed."""
+        """Times at which the points are passed."""
         first, last = self.span
         times = first + (last - first) * np.array(self.shares)
         times[-1] = last
@@ -80,7 +80,7 @@ class ViaPoints(ClosedForm):
 
     @cached_property
     def _given(self) -> BoolArray:
-        """Which components have values, (components,)."""
+        """Components with values, (components,)."""
         given: BoolArray = ~np.isnan(self.points[0])
         return given
 
@@ -161,7 +161,7 @@ class ViaPoints(ClosedForm):
 
 
 def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
-    """When points are passed, if nothing is said about it, as shares of the span, (points,).
+    """Return default times of passing points, as shares of the span, (points,).
 
     The way between two points counts by the square root of their distance (Lee, Computer-Aided Design 21,
     1989), so that near points are not passed in too short a time; along the whole way time passes as on the
@@ -259,7 +259,7 @@ class Via(Formula):
 
     @classmethod
     def meaning(cls, use: Use) -> str:
-        """What it does, for users."""
+        """Return the meaning for users."""
         if use.rigid:
             return "The same for a robot whose joints are all rigid."
         what = "A spline through points, from rest to rest"
@@ -312,7 +312,7 @@ class Via(Formula):
         )
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps it from lasting so long, in s."""
+        """See `Formula.problems_over`."""
         problems = list(super().problems_over(duration))
         yield from problems
         if problems or not self.signal.positive:
@@ -329,7 +329,7 @@ class Via(Formula):
             yield f"passes its via points at t = {_listed(self.over(span).breakpoints.tolist())} s"
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
-        """Where the spline goes far beyond its points."""
+        """Yield where the spline goes far beyond its points."""
         profile = self.over(span)
         for name, joint_type, points, *extremes in zip(
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True

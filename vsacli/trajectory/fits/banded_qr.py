@@ -51,7 +51,7 @@ class Factor(NamedTuple):
 
 
 def block_count(unknowns: int) -> int:
-    """How many blocks hold that many unknowns."""
+    """Return the number of blocks that hold this many unknowns."""
     return -(-unknowns // BLOCK)
 
 
@@ -102,7 +102,7 @@ def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: 
 
 
 class Posterior:
-    """What one estimation says about its unknowns, in units of the standard deviation of a data row."""
+    """The posterior of an estimation, in units of the standard deviation of a data row."""
 
     def __init__(self, diagonal: FloatArray, upper: FloatArray) -> None:
         """Invert a triangular factor of the inverse covariance.
@@ -142,7 +142,7 @@ class Posterior:
         return np.concatenate([near, far], axis=-1)
 
     def variances(self, blocks: FloatArray) -> FloatArray:
-        """Of what rows give, (blocks, rows), for rows as in `Rows.blocks`, or alike for all blocks."""
+        """Return variances of rows, (blocks, rows), for rows as in `Rows.blocks`, or equal for all blocks."""
         return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))
 
 

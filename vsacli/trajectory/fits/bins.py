@@ -13,11 +13,11 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import block_count, sort_rows
 
 BLOCK_SAMPLES = 65536
-"""That are held at a time: what fits into a cache is twice as fast."""
+"""Samples held at a time: a block that fits into a cache is twice as fast."""
 
 
 class Moments(NamedTuple):
-    """What equal bins of a record are averaged from: one pass over the samples serves all resolutions.
+    """Moments of fine bins, from which those of all resolutions are averaged.
 
     Attributes:
         start: of the record, s.
@@ -61,7 +61,7 @@ class Moments(NamedTuple):
 
     @property
     def halved(self) -> Moments:
-        """Those of half as many bins, twice as wide; their number must be even."""
+        """Return the moments of half as many bins, twice as wide; their number must be even."""
         powers = merged(self.powers[:, ::2], self.powers[:, 1::2])
         time, row = self.time[::2] + self.time[1::2], self.row[::2] + self.row[1::2]
         return Moments(self.start, 2 * self.width, powers, time, row)
@@ -156,12 +156,12 @@ class Bins:
 
     @property
     def coefficients(self) -> int:
-        """Of the spline."""
+        """Number of coefficients of the spline."""
         return self.spans + self.degree
 
     @property
     def knots(self) -> FloatArray:
-        """Of the spline: equally spaced, also beyond both ends."""
+        """Knots of the spline: equally spaced, also beyond both ends."""
         places = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
         return self.start + self.span * places
 
@@ -215,7 +215,7 @@ class Bins:
         return here.blocks, before.blocks, here.block, here.place
 
     def _noise_variance(self, correlation: float) -> float | None:
-        """Of a mean, if that of a sample is known; its noise is taken for a process of first order.
+        """Return the variance of a mean, if that of a sample is known, for noise of first order.
 
         Args:
             correlation: of two neighbouring means, from which that of samples follows; if negative, none.

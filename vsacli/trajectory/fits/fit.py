@@ -54,7 +54,7 @@ class Part:
 
     @property
     def doubtful(self) -> tuple[float, float]:
-        """How long after the start and before the end the derivatives are doubtful, s.
+        """Times after the start and before the end with unreliable derivatives, s.
 
         (degree + 1)/2 knot spans, beyond which noise passes into the highest derivative that is needed less
         than 1.4 times as much as anywhere inside; at the ends themselves it is up to 850 times.
@@ -96,7 +96,7 @@ class Part:
         return rows
 
     def posterior(self, time: FloatArray) -> Posterior | None:
-        """What the samples say of the coefficients; None if nothing can be said.
+        """Return the posterior of the coefficients; None if it cannot be stated.
 
         Args:
             time: (samples,) of the record, s.
@@ -124,7 +124,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What stands for the samples of a signal between them, and for its derivatives.
+    """The curves that replace the samples of a signal, with derivatives.
 
     Attributes:
         components: how many there are; those in no part have no values.
@@ -156,14 +156,14 @@ class Fit:
 
     @property
     def doubtful(self) -> tuple[float, float]:
-        """How long after the start and before the end the derivatives of any component are doubtful, s."""
+        """Times after the start and before the end with unreliable derivatives of any component, s."""
         stretches = [part.doubtful for part in self.parts] or [(0.0, 0.0)]
         starts, ends = zip(*stretches, strict=True)
         return max(starts), max(ends)
 
     @cached_property
     def exact(self) -> BoolArray:
-        """Which components' splines go through the samples, (components,); also those that have no values."""
+        """Components whose splines pass through the samples, (components,); also those without values."""
         exact = np.ones(self.components, dtype=bool)
         for part in self.parts:
             exact[part.members] = part.exact
@@ -182,7 +182,7 @@ class Fit:
         return replace(self, parts=parts, time=stretch(self.time, self.time[0], factor))
 
     def covariance(self, time: FloatArray) -> FloatArray:
-        """Posterior covariances of value and derivatives, shape (components, orders, orders, samples).
+        """Return covariances of value and derivatives at times, s: (members, orders, orders, samples).
 
         Orders go from the value to the highest derivative that the signal needs. Square roots of the diagonal
         are standard deviations; those of a smoothing spline count, beside noise, what its resolution leaves
@@ -206,11 +206,11 @@ class Fit:
 
     @cached_property
     def _posteriors(self) -> list[Posterior | None]:
-        """Of the coefficients of each part; None if nothing can be said of them."""
+        """Posteriors of the coefficients of each part; None where one cannot be stated."""
         return [part.posterior(self.time) for part in self.parts]
 
     def _units(self, part: Part, posterior: Posterior, time: FloatArray) -> FloatArray:
-        """Of the deviations of the posterior, (members, orders or 1, samples or 1)."""
+        """Return the units of the deviations of the posterior, (members, orders or 1, samples or 1)."""
         known = part.smoothing
         if part.smooth and known is not None:
             start, end = part.knots[[0, -1]]
@@ -306,7 +306,7 @@ class Unresolved:
         self._impulses: FloatArray = IMPULSES * np.sqrt(known.spread / SHORTEST_IMPULSE) * size
 
     def covariance(self, time: FloatArray) -> FloatArray:
-        """Of value and derivatives at any times of the span, s: (members, orders, orders, samples)."""
+        """Return covariances of value and derivatives at times, s: (members, orders, orders, samples)."""
         found = self._units[:, None, None, None] ** 2 * self._of_posterior(time)
         found[:, -1, -1] += self._impulses[:, None] ** 2
         return np.asarray(found)
@@ -317,7 +317,7 @@ class Unresolved:
 
 
 def unresolved(fit: Fit, orders: int) -> Iterator[Unresolved]:
-    """Those of a fit."""
+    """Yield the unresolved components of a fit."""
     for part in fit.parts:
         known = part.smoothing
         if known is not None and not known.resolved:

@@ -1,4 +1,4 @@
-"""What a report says about fits: where they are doubtful, which given derivatives do not follow from them."""
+"""Sentences of a report on fits: where they are unreliable, which given derivatives disagree with them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LISTED_LINES = 5
 def fit_sentences(
     value: str, fitted: Sequence[str], labels: Sequence[str], time: FloatArray, fit: Fit
 ) -> Iterator[str]:
-    """Which numbers come from splines, how far these are from the samples, and where they are doubtful.
+    """Yield which numbers come from splines, their distance from the samples, and unreliable ends.
 
     Args:
         value: name of the signal.
@@ -61,7 +61,7 @@ def fit_sentences(
 
 
 def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """What the record does not determine, by the smoothing splines of components."""
+    """Yield what recordings do not determine, by the smoothing splines of components."""
     for part in fit.parts:
         known = part.smoothing
         if known is None:
@@ -102,7 +102,7 @@ def _vibration(known: Smoothing) -> str:
 
 
 def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """How noise was understood: what is not judged, and what is mains hum.
+    """Yield how noise was understood: unjudged components, and mains hum.
 
     Args:
         value: name of the signal.
@@ -133,7 +133,7 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
 
 
 def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
-    """What is known of a fit, as JSON values.
+    """Return the facts on a fit, as JSON values.
 
     Args:
         value: name of the signal.

@@ -13,14 +13,17 @@ from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.selection import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, SMALLEST_SHARE
 
 SHARE = 0.05
-"""Of the root mean square of a derivative by which a given one may differ: measured ones do."""
+"""Share of the root mean square of a derivative by which a given one may differ: measured ones do."""
 
 DEVIATIONS = 10.0
 """Standard deviations by which the derivative of the fit itself may be wrong."""
 
 OUTLYING = 0.5
-"""Of the largest derivative of the fit, inside, by which a given sample is off if it is an outlier. It stands
-amid samples that are off by less than an eighth; what a spline makes of a jump is off on both sides."""
+"""Share of the largest derivative of the fit, inside, by which an outlier among given samples is off.
+
+It stands amid samples that are off by less than an eighth; the response of a spline to a jump is off on both
+sides.
+"""
 
 MOST_OUTLIERS = 10
 """More than that are no outliers: a derivative taken of an encoder's steps is like that all the time."""
@@ -32,7 +35,7 @@ FACTORS = {
     1000.0: "milli-units?",
     0.001: "are the values in milli-units?",
 }
-"""By how much a given derivative may be too large throughout, and what that hints at."""
+"""Factors by which a given derivative may be too large throughout, with the likely slip."""
 
 
 def mismatches(
@@ -81,7 +84,7 @@ def mismatches(
 
 
 def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolArray:
-    """Which components differ by more than what can be told, (components,)."""
+    """Return the components that differ significantly, (components,)."""
     size = _rms(rows[order])
     least = SMALLEST_SHARE * np.nanmax(size, initial=0.0)
     allowed = SHARE * np.maximum(size, least) + DEVIATIONS * _errors(fit, order)
@@ -133,7 +136,7 @@ def _outliers(given: FloatArray, expected: FloatArray) -> IndexArray:
 
 
 def _factor(given: FloatArray, expected: FloatArray) -> float | None:
-    """What the expected values are multiplied by throughout, if they are."""
+    """Return the factor of all expected values, if there is one."""
     power = float(expected @ expected)
     if power == 0:
         return None

@@ -14,18 +14,21 @@ if TYPE_CHECKING:
 
 
 PENALTY = 1.4
-"""What a coefficient costs in cross-validation. With 1 it now and then takes far too many knots (Kim & Gu,
-2004); twice as many mean 2^4.5 times the noise in a fourth derivative."""
+"""Weight of a coefficient in cross-validation.
+
+With 1 it now and then takes far too many knots (Kim & Gu, 2004); twice as many mean 2^4.5 times the noise in
+a fourth derivative.
+"""
 
 BLOCK_SAMPLES = 16384
 """Samples whose B-splines are held in memory at a time."""
 
 COARSE_RATIO = 4
-"""Of successive numbers of spans tried at first, over the whole range: the score may have several minima, one
-for each time scale of the motion."""
+"""Ratio of successive numbers of spans tried at first, over the whole range: the score may have several
+minima, one for each time scale of the motion."""
 
 FINE_RATIOS = (2.0, 2.0**0.5, 2.0**0.25)
-"""Of the numbers tried then on both sides of the best; the last is finer than the minimum is sharp."""
+"""Ratios of the numbers tried then on both sides of the best; the last is finer than the minimum is sharp."""
 
 
 def most_spans(samples: int, degree: int) -> int:
@@ -115,7 +118,7 @@ def _solve(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpli
 def normal_equations(
     time: FloatArray, rows: FloatArray, knots: FloatArray, degree: int
 ) -> tuple[FloatArray, FloatArray]:
-    """What determines the coefficients of the spline nearest to samples.
+    """Return the normal equations of the spline nearest to samples.
 
     Args:
         time: (samples,), s.
@@ -228,7 +231,7 @@ def of_derivatives(posterior: Posterior, basis: LocalBasis) -> FloatArray:
 
 
 def of_least_squares(time: FloatArray, knots: FloatArray, degree: int) -> Posterior:
-    """What samples with independent errors of deviation 1 say of the coefficients of a spline: (X'X)^-1.
+    """Return the posterior (X'X)^-1 of the coefficients from samples with independent errors of deviation 1.
 
     Args:
         time: (samples,), s.

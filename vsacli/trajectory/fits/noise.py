@@ -28,7 +28,7 @@ SLOW_GROWTH = 8.0
 4 rates it was 9 and more, mostly 2^8; of filtered noise at some stride below 5."""
 
 ROUNDING = 10 * np.finfo(float).eps
-"""Of the largest value; differences below are what arithmetic leaves."""
+"""Share of the largest value below which differences are rounding."""
 
 
 AT_REST = 1e-6
@@ -105,7 +105,7 @@ def _typical(time: FloatArray, rows: FloatArray, order: int, stride: int) -> Flo
 def _differences(
     time: FloatArray, rows: FloatArray, order: int, first: IndexArray, stride: int
 ) -> FloatArray:
-    """Of samples `stride` apart, the first of each given by its index, (components, differences)."""
+    """Return differences of samples `stride` apart, the first of each given, (components, differences)."""
     nodes = [time[first + i * stride] for i in range(order + 1)]
     span = nodes[-1] - nodes[0]
     weights = np.ones((order + 1, len(first)))
@@ -120,9 +120,12 @@ def _differences(
 
 
 LINE_RATIO = 100.0
-"""Of the power at a frequency to the median near it, from which on it is a line. White noise never reaches
-it. Of 40 records without lines none exceeded 10, with lines the least was 150; what a filter left of the
-rounding of an encoder, under a motion that is symmetric in time, reached 45."""
+"""Ratio of the power at a frequency to the median near it, from which on it is a line.
+
+White noise never reaches it. Of 40 recordings without lines none exceeded 10, with lines the least was 150;
+the remainder that a filter left of the rounding of an encoder, under a motion that is symmetric in time,
+reached 45.
+"""
 
 LEAST_EFFECT = 0.1
 """Share of the highest derivative that a line must have to count."""
@@ -138,7 +141,7 @@ FEW_NEIGHBOURS = 10
 """The same of frequencies that have fewer below them: a slow sine that a coarse spline leaves out."""
 
 BLOCK_FREQUENCIES = 16384
-"""Whose medians are taken at a time, to bound the memory."""
+"""Frequencies whose medians are taken at a time, to bound the memory."""
 
 LEAKAGE = 3
 """Frequencies beside a line that a Hann window leaks into."""
@@ -163,7 +166,8 @@ STEP_TOLERANCE = 0.01
 """Share of an encoder's step by which values may miss its multiples, as they were printed."""
 
 ROUNDING_RATIO = 1.5
-"""Of the power of a residual to that of rounding to an encoder's steps, up to which rounding is all of it."""
+"""Ratio of the power of a residual to that of rounding to an encoder's steps, up to which it is all
+rounding."""
 
 
 class Lines(NamedTuple):
@@ -182,7 +186,7 @@ class Lines(NamedTuple):
     resampled: float = 0.0
 
     def stretched(self, factor: float) -> Lines:
-        """Those of the same course, slower by a factor."""
+        """Return the lines of the same motion, slower by a factor."""
         hum = tuple(frequency / factor for frequency in self.hum)
         others = tuple(frequency / factor for frequency in self.others)
         return Lines(hum, others, self.share, self.resampled / factor)
@@ -285,7 +289,7 @@ def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
 
 
 def _mains(frequencies: FloatArray) -> BoolArray:
-    """Which are multiples of a frequency of mains."""
+    """Return the multiples of a mains frequency."""
     near = np.zeros(len(frequencies), dtype=bool)
     for mains in MAINS:
         harmonic = mains * np.round(frequencies / mains)

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 LEAST_PENALTY, LARGEST_PENALTY = 1e-8, 1e22
 
 LARGEST_STEP = 2.3
-"""Of the logarithm of a penalty: a decade. Without a limit the updates ran away on filtered noise."""
+"""Largest step of the logarithm of a penalty: a decade.
+
+Without a limit the updates ran away on filtered noise.
+"""
 
 KINK = 1e3
 """Ratio of penalties of neighbouring segments from which on motion starts or stops there. In a sweep the
@@ -32,7 +35,7 @@ ENDS = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """What is assumed of a record at one resolution.
+    """The model of a recording at one resolution.
 
     Attributes:
         bins: of the record.
@@ -53,7 +56,7 @@ class Model:
 
     @property
     def each_penalty(self) -> FloatArray:
-        """Of the segments, (segments,)."""
+        """Penalties of the segments, (segments,)."""
         return self.penalties[np.searchsorted(self._segment, np.arange(self.segments))]
 
     @cached_property
@@ -72,18 +75,18 @@ class Model:
 
     @cached_property
     def noise_variance(self) -> float:
-        """Of a whitened mean: as it is known of the record, or else what maximises the likelihood."""
+        """Variance of a whitened mean: known from the recording, or else of maximum likelihood."""
         known = self.whitened.variance
         return float(self._factor.rest[0]) / _freedom(self.bins) if known is None else known
 
     @cached_property
     def posterior(self) -> Posterior:
-        """Of the coefficients; its unit of variance is that of the noise."""
+        """Posterior of the coefficients; its unit of variance is that of the noise."""
         return Posterior(self._factor.diagonal[0], self._factor.upper[0])
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """Of the spline."""
+        """Coefficients of the spline."""
         return self.posterior.unknowns(self._factor.right[0])[: self.bins.coefficients]
 
     @property
@@ -95,7 +98,7 @@ class Model:
 
     @cached_property
     def freedoms(self) -> FloatArray:
-        """Of each difference of coefficients: 1 if the samples determine it, 0 if the prior does."""
+        """Freedom of each difference of coefficients: 1 if the samples determine it, 0 if the prior does."""
         certain = self.posterior.variances(self.bins.differences).ravel()[: len(self.penalties)]
         return np.clip(1 - certain * self.penalties, 0, 1)
 
@@ -106,7 +109,7 @@ class Model:
         return bins.span * bins.spans / (bins.degree + float(np.sum(self.freedoms)))
 
     def updated(self, step: float) -> Model:
-        """With the penalties that the found spline suggests.
+        """Return the model with the penalties that the found spline suggests.
 
         Args:
             step: share of the logarithmic step that is taken.
@@ -121,7 +124,7 @@ class Model:
 
     @cached_property
     def cautious(self) -> Posterior:
-        """Of the coefficients, where the ends of segments are uncertain by a segment.
+        """Posterior of the coefficients with the ends of segments uncertain by a segment.
 
         Each difference has the smallest penalty of its own and the neighbouring segments. Most of the error
         comes from ends of pauses that lie within a segment.
@@ -134,11 +137,11 @@ class Model:
         return Posterior(factor.diagonal[0], factor.upper[0])
 
     def stiffened(self, logarithm: float) -> Model:
-        """With all penalties multiplied by the exponential of a number."""
+        """Return the model with all penalties multiplied by the exponential of a number."""
         return Model(self.bins, self.correlation, self.penalties * np.exp(logarithm), self.segments)
 
     def variances(self, order: int, posterior: Posterior | None = None) -> FloatArray:
-        """Of a derivative in the middle of both bins of each span, in units of `noise_variance`, (2 spans,).
+        """Return the variances of a derivative in the middle of both bins of each span, (2 spans,).
 
         Args:
             order: of the derivative.
@@ -153,7 +156,7 @@ class Model:
 
     @property
     def kinks(self) -> BoolArray:
-        """Which `probes` lie in segments whose penalty is far from that of a neighbour."""
+        """Return which `probes` lie in segments with a penalty far from that of a neighbour."""
         far = np.abs(np.diff(np.log(self.each_penalty))) > np.log(KINK)
         segments: BoolArray = np.append(far, False) | np.append(False, far)
         return segments[segment_of(2 * self.bins.spans, self.segments)]
@@ -166,7 +169,7 @@ class Model:
 
     @property
     def inside(self) -> BoolArray:
-        """Which of them are away from the ends."""
+        """Return which of them are away from the ends."""
         share = np.linspace(0, 1, 2 * self.bins.spans)
         inside: BoolArray = (share > ENDS) & (share < 1 - ENDS)
         return inside
@@ -178,7 +181,7 @@ def segment_of(count: int, segments: int) -> IndexArray:
 
 
 class Evidence(NamedTuple):
-    """What the restricted likelihoods of several penalties follow from, for a record or a stretch of it.
+    """The evidence for several penalties, for a recording or a stretch of it.
 
     Attributes:
         rest: sum of squares that the splines leave, penalties included, (candidates,).
@@ -194,7 +197,7 @@ class Evidence(NamedTuple):
 
 
 def evidence(bins: Bins, whitened: Whitened, penalties: FloatArray, factor: Factor | None = None) -> Evidence:
-    """That of several penalties, (candidates, differences)."""
+    """Return the evidence for several penalties, (candidates, differences)."""
     factor = factor or _factors(bins, whitened, penalties)
     volume = factor.log_determinants - np.sum(np.log(penalties), axis=1) - whitened.log_scale
     return Evidence(factor.rest, volume, _freedom(bins), whitened.variance)
@@ -231,7 +234,7 @@ def _derivative_rows(places: FloatArray, degree: int, order: int) -> FloatArray:
 
 
 STEP = 2.4
-"""Of log t from one spline to the next: a sixth of the frequency with differences of order seven."""
+"""Step of log t from one spline to the next: a sixth of the frequency with differences of order seven."""
 
 
 BANDS = 4
@@ -256,7 +259,7 @@ class MotionPower(NamedTuple):
 
 
 def motion_power(model: Model, order: int, bands: int, weight: FloatArray) -> MotionPower:
-    """Of a derivative, below the cut-off of a spline.
+    """Return the power of a derivative below the cut-off of a spline.
 
     With the gain H = 1/(1 + t g) of a spline at a frequency and noise of density N the posterior variance is
     v = int N H, and int N H^2 = v + dv/dlog t. The prior expects motion of the density N / g at t = 1.

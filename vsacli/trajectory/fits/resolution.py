@@ -16,7 +16,7 @@ from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
 from vsacli.trajectory.fits.penalised import Model, deviances, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
-"""Of the noise of neighbouring means, tried at first."""
+"""Correlations of the noise of neighbouring means tried at first."""
 
 SMALL_CORRELATIONS = np.array([0.01, 0.03, 0.1])
 """Tried, too, if the noise of samples is known: that of means then depends on them."""
@@ -34,17 +34,18 @@ NEAR_CORRELATION = 1.2
 """Distance of inverse hyperbolic tangents within which correlations are tried around it."""
 
 MOST_SPANS_OF_GRID = 2048
-"""Of longer records stretches are tried, since only a start is sought: that saves half of the time."""
+"""Spans from which on stretches are tried instead, since only a start is needed: that saves half of the
+time."""
 
 STRETCHES = 8
 
 MOST_SEGMENTS = 64
 FEWEST_DIFFERENCES = 4
-"""In a segment."""
+"""Fewest differences in a segment."""
 
 UPDATES = 30
 LEAST_GAIN = 0.05
-"""Of twice the logarithm of the likelihood by which an update must improve to be followed by another."""
+"""Smallest gain of twice the log likelihood by which an update is followed by another."""
 
 
 def most_likely(bins: Bins, coarser: Model | None) -> Model:
@@ -74,13 +75,13 @@ class _Grid(NamedTuple):
     decades: FloatArray
 
     def penalties(self, differences: int) -> FloatArray:
-        """Of each difference of coefficients, (decades, differences)."""
+        """Return the penalties of each difference of coefficients, (decades, differences)."""
         each = self.shape[segment_of(differences, len(self.shape))]
         return np.asarray(10.0 ** (each + self.decades[:, None]))
 
 
 def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
-    """With one penalty throughout; of long records also with those of the coarser model."""
+    """Return grids with one penalty throughout; for long recordings also with those of the coarser model."""
     tried = CORRELATIONS if bins.noise is None else np.append(CORRELATIONS, SMALL_CORRELATIONS)
     level = np.zeros(1)
     if coarser is None:
@@ -96,7 +97,7 @@ def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
 
 
 def _best_of_grids(bins: Bins, grids: Sequence[_Grid]) -> Model:
-    """That of the largest likelihood; of long records by stretches far apart, as only a start is sought."""
+    """Return the model of largest likelihood; of long recordings by distant stretches, as a start."""
     differences = bins.coefficients - bins.degree
     spans = MOST_SPANS_OF_GRID // STRETCHES if _long(bins) else bins.spans
     firsts = np.linspace(0, bins.spans - spans, STRETCHES if _long(bins) else 1).astype(int).tolist()
@@ -136,7 +137,7 @@ def _improved(model: Model) -> Model:
 
 
 def _segmented(model: Model) -> Model:
-    """With twice as many segments as long as the likelihood gains, if need be after doubling twice.
+    """Return the model with twice as many segments as long as the likelihood gains.
 
     Each additional segment must gain more than its own parameter can by chance.
     """
@@ -150,7 +151,7 @@ def _segmented(model: Model) -> Model:
 
 
 def _recorrelated(model: Model) -> Model:
-    """With the most likely correlation of the noise near its own."""
+    """Return the model with the most likely correlation of the noise near its own."""
     centre = np.arctanh(model.correlation)
     candidates = np.clip(np.tanh(centre + FINER_CORRELATIONS), -0.6, 0.985)
     models = [Model(model.bins, each, model.penalties, model.segments) for each in candidates.tolist()]
@@ -158,7 +159,7 @@ def _recorrelated(model: Model) -> Model:
 
 
 FIRST_SPANS, FIRST_SPANS_SHORT = 32, 4
-"""Of the coarsest resolution; that of records of fewer than `SHORT` samples is coarser."""
+"""Spans of the coarsest resolution; fewer for recordings of fewer than `SHORT` samples."""
 
 SHORT = 256
 
@@ -195,12 +196,12 @@ PROBES = 16384
 """Samples, about, of which a residual is taken."""
 
 SPANS_PER_PERIOD = 4.0
-"""Of the highest frequency of a motion whose bandwidth is known: of a sine of that frequency the spline of
-degree 7 misses less than 1 % of the fourth derivative."""
+"""Spans per period of the highest frequency of a motion of known bandwidth: of a sine of that frequency
+the spline of degree 7 misses less than 1 % of the fourth derivative."""
 
 
 class KnownNoise(NamedTuple):
-    """What the user says of a component.
+    """Noise and bandwidth of a component as given by the user.
 
     Attributes:
         deviation: standard deviation of a sample's noise; None: it is estimated.
@@ -297,7 +298,7 @@ def _given(
 
 
 def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> list[Moments]:
-    """Of the resolutions that are tried, coarse to fine."""
+    """Return the moments of the tried resolutions, coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
     most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
@@ -341,7 +342,7 @@ def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
 
 
 def _deviation(model: Model, order: int) -> float:
-    """Of a derivative by the posterior, away from the ends; `calibration` has a better one."""
+    """Return the deviation of a derivative by the posterior, away from the ends; see `calibration`."""
     factor = np.where(model.kinks, KINK_CAUTION, 1.0)
     return float(np.sqrt(_mean_variance(model, factor * model.variances(order, model.cautious))))
 

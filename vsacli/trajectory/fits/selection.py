@@ -43,7 +43,7 @@ PASSING = 2.0
 
 
 class Record(NamedTuple):
-    """What was fitted.
+    """The fitted recording.
 
     Attributes:
         time: (samples,), s.
@@ -77,7 +77,7 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
 
 
 def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
-    """For components whose fit may follow noise: the same with what is known of it, or what stands instead.
+    """Yield parts whose fit may follow noise, with the judgement of them, or their replacements.
 
     Suspect are least squares, whose number of knots has a bias, and splines through noisy samples. A
     smoothing spline is the judge: the difference from it counts as a deviation.
@@ -97,7 +97,7 @@ def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part
 
 
 def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part | None:
-    """What stands for a component of a part; None if it needs no judge, or there is none."""
+    """Return the replacement of a component of a part; None if it needs no judge, or there is none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
     single = part.of_columns(np.array([column]))
@@ -199,7 +199,7 @@ METHODS = (LEAST_SQUARES, INTERPOLATE, SMOOTH)
 
 @dataclass(frozen=True)
 class FitChoice:
-    """What the user says of the spline for a signal.
+    """The choice of the spline of a signal by the user.
 
     Attributes:
         method: as in `fit_samples`.
@@ -217,7 +217,7 @@ class FitChoice:
         return None if self.noise is None else np.array(self.noise, dtype=np.float64)
 
     def stretched(self, factor: float) -> FitChoice:
-        """That of the same course, slower by a factor."""
+        """Return the choice for the same motion, slower by a factor."""
         return replace(self, bandwidth=None if self.bandwidth is None else self.bandwidth / factor)
 
 
@@ -225,12 +225,12 @@ AS_IT_ASKS_FOR = FitChoice()
 """Nothing is said: the noise of the samples decides."""
 
 INTERPOLATION_GAIN = {7: (1.0, 1.481, 4.628, 6.957, 37.415), 5: (1.0, 1.376, 4.798)}
-"""By degree, for each derivative k: standard deviation at the samples, times step^k, of a spline through
-equally spaced samples with independent noise of standard deviation 1."""
+"""Gain by degree for each derivative k: standard deviation at the samples, times step^k, of a spline
+through equally spaced samples with independent noise of standard deviation 1."""
 
 LEAST_SQUARES_GAIN = {7: (1.0, 1.823, 4.484, 12.11, 34.37), 5: (1.0, 1.829, 4.538)}
-"""By degree, for each derivative k: root mean square over a knot span, times span^k sqrt(samples in a span),
-of a least-squares spline near many such samples, far from its ends."""
+"""Gain by degree for each derivative k: root mean square over a knot span, times span^k sqrt(samples in a
+span), of a least-squares spline near many such samples, far from its ends."""
 
 
 FEWEST_JUDGED = 32

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 STEP = 0.35
-"""Of log t to both sides, between which derivatives by it are taken."""
+"""Step of log t to both sides, between which derivatives by it are taken."""
 
 KINK_VARIANCE = 2.5
 """Factor of the variance where motion starts or stops: there one difference of coefficients carries what the
@@ -27,7 +27,7 @@ penalty spreads over a segment. On 32 records from rest to rest errors were 0.7 
 this, deviations are 0.7 to 1.5 times the errors, all over a record; with twice as much up to 2.0."""
 
 LEAST_SHARE = 0.3
-"""Of the expected bias. Its measure is off by some 0.4 from record to record."""
+"""Smallest share of the expected bias. Its measure is off by some 0.4 from recording to recording."""
 
 
 FEW_SAMPLES = 2.0
@@ -72,7 +72,7 @@ def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
 
 
 def posterior_error(model: Model, order: int) -> float:
-    """Of a derivative, root mean square away from the ends, by the posterior alone."""
+    """Return the root mean square error of a derivative away from the ends, by the posterior alone."""
     variance = np.mean(model.variances(order, model.cautious)[model.inside]) * model.noise_variance
     return float((FEW_SAMPLES if model.segments > 1 else 1.0) * np.sqrt(variance))
 
@@ -97,7 +97,7 @@ with seven motions and twelve noises three with 0.077 were wrong by 10.0 to 10.4
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:
-    """What is known of a smoothing spline.
+    """The judgement of a smoothing spline.
 
     Attributes:
         deviations: standard deviation of the value and each derivative, root mean square away from the ends,
@@ -155,7 +155,7 @@ class Smoothing:
         return np.array([np.interp(place * steps - 0.5, np.arange(steps), row) for row in self.units])
 
     def stretched(self, factor: float) -> Smoothing:
-        """That of the same course, slower by a factor."""
+        """Return the judgement for the same motion, slower by a factor."""
         return replace(
             self,
             deviations=self.deviations / factor ** np.arange(len(self.deviations)),

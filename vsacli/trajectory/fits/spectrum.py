@@ -64,7 +64,7 @@ HIGH = 30.0
 were seen to rise by 6, and by 550 beyond the slowest lines."""
 
 LINE_RATIO = 30.0
-"""Of the power of a line to the medians near it, from which on it is motion."""
+"""Ratio of the power of a line to the medians near it, from which on it is motion."""
 
 TAPERED = 10
 """Share of a stretch at each end, one over this, where a window is too small to be undone."""
@@ -92,7 +92,7 @@ class FollowedNoise(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Its root mean square relative to that of the derivative without it."""
+        """Root mean square relative to that of the derivative without it."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
 
     def stretched(self, factor: float) -> FollowedNoise:

@@ -1,4 +1,4 @@
-"""Which column of a recorded trajectory is which quantity of which joint, and in which unit."""
+"""Assignment of the columns of a recorded trajectory to quantities of joints, with units."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
 
 Way = dict[str, dict[int, str]]
-"""For each quantity the names of its columns, by index of the joint (wrench axis)."""
+"""Names of the columns of each quantity, by index of the joint (wrench axis)."""
 
 _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
@@ -51,7 +51,7 @@ class Column:
 
 @dataclass(frozen=True)
 class ColumnLayout:
-    """Where quantities stand in a table.
+    """The places of quantities in a table.
 
     Attributes:
         time: the column of the times.
@@ -85,7 +85,7 @@ def column_layout(
     file: str,
     line: int = 1,
 ) -> ColumnLayout:
-    """Where the quantities stand in a table.
+    """Return the places of the quantities in a table.
 
     Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
     throughout. Those of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
@@ -132,7 +132,7 @@ def column_layout(
 def _layout(
     names: Sequence[str], columns: Mapping[str, Column], way: Way, of_signals: Mapping[str, Collection[str]]
 ) -> ColumnLayout:
-    """Where quantities stand, once all columns of the joints that take a signal are found."""
+    """Return the places of quantities, once all columns of the joints that take a signal are found."""
     return ColumnLayout(
         time=columns[TIME],
         quantities={
@@ -202,7 +202,7 @@ def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
 
 
 def _remedy(file: str) -> str:
-    """What to do about columns with other people's names."""
+    """Return the advice on columns with other people's names."""
     return (
         f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
         f" ignore: {REST} there leaves out those without use"
@@ -250,7 +250,7 @@ def _measured(
 
 
 def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:
-    """Of one column; the axes of a wrench are forces, then moments."""
+    """Return the unit of one column; the axes of a wrench are forces, then moments."""
     if name not in WRENCH.names:
         return quantity.unit(joint_types[index])
     return quantity.prismatic if WRENCH_AXES[index].startswith("f") else quantity.revolute

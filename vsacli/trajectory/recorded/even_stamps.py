@@ -81,7 +81,7 @@ def even_rate(stamps: FloatArray) -> float | None:
 
 
 def rounding_notes(stamps: FloatArray) -> tuple[str, ...]:
-    """That rounded stamps were taken for even ones, if they were."""
+    """Return the note that rounded stamps were taken for even ones, if they were."""
     elapsed = elapsed_times(stamps)
     off = float(np.abs(elapsed - (stamps - stamps[:1])).max(initial=0.0))
     if off == 0:

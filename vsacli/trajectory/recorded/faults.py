@@ -1,4 +1,4 @@
-"""What is wrong with a column of samples: outliers, frozen and saturated stretches, wrapped angles."""
+"""Faults of a column of samples: outliers, frozen and saturated stretches, wrapped angles."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from vsacli.trajectory.recorded.thresholds import (
 )
 
 END_WEIGHTS = np.append(1.0, -np.vander([0.0], 4) @ np.linalg.pinv(np.vander(np.arange(1.0, 11.0), 4)))
-"""Of a sample and the next ten, for the error of the prediction by a cubic through these."""
+"""Weights of a sample and the next ten, for the error of the prediction by a cubic through these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,12 @@ class Faults:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of faults."""
         return len(self.first)
 
     @property
     def worst(self) -> int:
-        """Which is the worst."""
+        """Index of the worst."""
         return int(np.argmax(self.sizes))
 
 
@@ -150,7 +150,7 @@ def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[Fl
 
 
 def held(values: FloatArray, grain: Grain) -> int:
-    """In how many rows each value stands; 1 if it is not always the same number."""
+    """Return the number of rows that repeat each value; 1 if it is not always the same."""
     changes = np.flatnonzero(values[1:] != values[:-1])
     rows = np.diff(changes)
     if len(rows) < HELD_CHANGES:
@@ -217,7 +217,7 @@ def saturated(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | No
 
 
 def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray:
-    """How much farther the motion would go that slows down towards an edge as it does before, seen from it.
+    """Return how much farther a motion would go that slows down towards an edge, seen from it.
 
     Steps s1 (cut short), s2, s3 away from the edge; slowing down by c = s3 - s2 a step, it would go on by
     s2^2 / (2 c) - s2/2 beyond the sample before the edge.
@@ -242,7 +242,7 @@ def wraps(values: FloatArray) -> Faults | None:
 
 
 def _noticeable(grain: Grain, samples: IndexArray) -> FloatArray:
-    """What is more than noise and steps of the numbers near samples."""
+    """Return the smallest change above noise and steps of the numbers near samples."""
     return np.maximum(NOISE_DEVIATIONS * grain.noise_at(samples), QUANTA * grain.quantum)
 
 

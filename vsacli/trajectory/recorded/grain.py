@@ -1,4 +1,4 @@
-"""How fine a column of samples is: the steps of its numbers, and the noise near each sample."""
+"""Resolution of a column of samples: the steps of its numbers, and the noise near each sample."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CHUNK = 1024 * BLOCK
 
 @dataclass(frozen=True, eq=False)
 class Grain:
-    """What changes of a column mean nothing.
+    """The meaningless changes of a column.
 
     Attributes:
         differences: (samples - 4,) divided differences of fourth order, scaled so that noise passes with its
@@ -45,7 +45,7 @@ class Grain:
 
     @classmethod
     def of(cls, time: FloatArray, values: FloatArray) -> Grain:
-        """Of a column with more than four samples, (samples,)."""
+        """Return the resolution of a column with more than four samples, (samples,)."""
         differences = _differences(time, values)
         whole = len(differences) // BLOCK * BLOCK
         rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]

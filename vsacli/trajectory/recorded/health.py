@@ -23,7 +23,7 @@ from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
 def health(
     stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()
 ) -> Iterator[SampleProblem]:
-    """What of a recording is hardly what was meant although it can be used.
+    """Yield findings of a usable recording that are hardly meant.
 
     Args:
         stamps: (samples,) in s, as recorded.
@@ -61,7 +61,7 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
 def column_faults(
     stamps: FloatArray, time: FloatArray, values: FloatArray, unit: str = "", *, angle: bool = False
 ) -> Iterator[tuple[int, str]]:
-    """Of each kind of fault of a column, (samples,), the first sample, and a sentence without a subject.
+    """Yield for each kind of fault of a column, (samples,), the first sample and a sentence without subject.
 
     Args:
         stamps: as recorded, s.
@@ -108,7 +108,7 @@ def column_faults(
 
 
 def _unit(quantity: Quantity, component: int, types: Sequence[str]) -> str:
-    """With a space before it; nothing where it is not known."""
+    """Return the unit with a space before it; "" where it is not known."""
     if isinstance(quantity, WrenchQuantity):
         return f" {quantity.of_axis(component)}"
     return f" {quantity.unit(types[component])}" if types else ""
@@ -119,7 +119,7 @@ def _write(unit: str) -> str:
 
 
 def _occasions(faults: Faults, stamps: FloatArray) -> str:
-    """When, or how often and when first."""
+    """Return when, or how often and when first."""
     when = f"at t = {time_text(float(stamps[faults.first[0]]))}"
     return when if faults.count == 1 else f"{faults.count} times, first {when}"
 

@@ -133,7 +133,7 @@ def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:
 
 
 def _coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> FloatArray:
-    """Of the powers of the share of a piece, (powers, components, pieces), from the rows at its ends."""
+    """Return coefficients of powers of the share of a piece, (powers, components, pieces), from its ends."""
     orders = len(left)
     scaled = left * width ** np.arange(orders)[:, None, None]
     lowest = orders - MATCHED

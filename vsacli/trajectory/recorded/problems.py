@@ -1,4 +1,4 @@
-"""What keeps recorded samples from being used."""
+"""Problems that keep recorded samples from being used."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SampleProblem:
 
 
 def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
-    """What keeps these times, (samples,) in s, from being those of a trajectory: at most one problem."""
+    """Yield the problem, if any, of times, (samples,) in s, that no trajectory can have."""
     finite, rising = np.isfinite(time), time[1:] > time[:-1]
     if not finite.all():
         sample = int(np.argmin(finite))
@@ -47,7 +47,7 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
 
 
 def value_problems(samples: Samples) -> Iterator[SampleProblem]:
-    """What keeps these values from being used: too few, or not finite, or not positive where they must be."""
+    """Yield the problems of values: too few, not finite, or not positive where they must be."""
     signal, degree = samples.signal, samples.signal.spline_degree
     name, count = signal.names[0], len(samples.time)
     if count <= degree:

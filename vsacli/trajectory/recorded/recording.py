@@ -39,7 +39,7 @@ MOST_NAMED = 5
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was read from a CSV file.
+    """The content of a CSV file.
 
     Attributes:
         times: the column `time`.
@@ -171,7 +171,7 @@ def _check_filled(table: Table) -> None:
 
 
 def _understood(table: Table) -> Iterator[str]:
-    """What was left out of the file, and off its times."""
+    """Yield the parts of the file that were left out, and shifts of its times."""
     if table.first_stamp is not None:
         yield f"times count from its first stamp, {table.first_stamp}"
     if table.kept is not None:

@@ -62,7 +62,7 @@ class Samples:
 
     @property
     def given(self) -> BoolArray:
-        """Which components have values, (components,)."""
+        """Components with values, (components,)."""
         absent: BoolArray = np.all(np.isnan(self.values), axis=1)
         return ~absent if self.signal.optional else np.ones_like(absent)
 
@@ -89,7 +89,7 @@ class Samples:
         return {name: rows for name, rows in pairs if rows is not None}
 
     def warnings(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
-        """Which numbers at the steps are estimates, and which given derivatives do not follow."""
+        """Yield which numbers at the samples are estimates, and which given derivatives disagree."""
         value, *names = self.signal.names
         yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
         if not resampled:
@@ -164,7 +164,7 @@ class SampledProfile:
 
     @property
     def signal(self) -> Signal:
-        """What is described."""
+        """Described signal."""
         return self.record.signal
 
     @property
@@ -174,7 +174,7 @@ class SampledProfile:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of noise is known to be none of motion, and the given derivatives if they play no part."""
+        """Notes on noise that is no motion, and on given derivatives without use."""
         record = self.record
         of_fit = tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
         given = [name for name in record.signal.names[1:] if name not in record.missing]
@@ -246,7 +246,7 @@ class SampledProfile:
         return value, *(derivatives if self.resampled else self.record.missing)
 
     def covariance(self, time: FloatArray) -> FloatArray:
-        """Of value and derivatives at any times of the span, (components, orders, orders, samples).
+        """Return covariances of value and derivatives at times, (components, orders, orders, samples).
 
         Zero for what is given; NaN for components of which nothing can be said, as where the spline follows a
         vibration that may be noise. Of those that are not `stated` it is no more than a bound.
@@ -263,7 +263,7 @@ class SampledProfile:
 
     @cached_property
     def stated(self) -> BoolArray:
-        """Of which components a standard deviation may be stated, (components,)."""
+        """Components with a standard deviation that may be stated, (components,)."""
         stated = np.ones(self.components, dtype=bool)
         for part in self.fit.parts:
             known = part.smoothing

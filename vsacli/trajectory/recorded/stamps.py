@@ -1,4 +1,4 @@
-"""What is wrong with the stamps of a recording: gaps, jitter, another unit than seconds."""
+"""Faults of the stamps of a recording: gaps, jitter, another unit than seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.trajectory.recorded.thresholds import (
 
 
 def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
-    """What of stamps, (samples,) in s and ascending, is hardly meant, in sentences."""
+    """Yield the faults of stamps, (samples,) in s and ascending, as sentences."""
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= usual <= LONGEST_STEP:

@@ -1,4 +1,4 @@
-"""From when on something in a recording is called a fault: one table, with reasons.
+"""Thresholds of the faults of recordings: one table, with reasons.
 
 "Clean records" are those of `tests/samples/clean_records.py`: sines, rest to rest with pauses, sweeps and
 velocity steps, with the noise of encoders, white or filtered. None of 640 gives a warning.
@@ -47,8 +47,11 @@ MOST_EVENTS = 500
 """Outliers looked at in a column; a millisecond each at most."""
 
 LEAST_SHARE = 0.5
-"""Of the events at least a third as large, what share must be outliers. When a joint creeps, each step of its
-encoder, filtered, is an event; one in fifty happens to look like an outlier."""
+"""Smallest share of outliers among the events at least a third as large.
+
+When a joint creeps, each step of its encoder, filtered, is an event; one in fifty happens to look like an
+outlier.
+"""
 
 END_SAMPLES = 32
 """Samples at an end whose predictions from the ten further inside tell how well the first one's should be."""
@@ -66,7 +69,7 @@ SPEED_SAMPLES = 4
 """Steps over which the speed before and after is taken."""
 
 JUMP_SHARE = (0.4, 2.5)
-"""What a jump after a frozen stretch is of the way that the speeds before and after it make."""
+"""Range of a jump after a frozen stretch, as a share of the path that the speeds before and after it make."""
 
 ABRUPT_SHARE = 0.7
 """Last step before a stop, in mean steps before it, that is no braking: a smooth motion has 0.2 or less."""
@@ -75,8 +78,10 @@ HELD_ROWS = 20
 """Rows at most over which a logger that is faster than its sensor repeats each value."""
 
 HELD_SHARE = 0.9
-"""Of the changes, what share must come after just so many rows. Those of an encoder at a steady speed do, but
-they are single steps of it."""
+"""Share of the changes that must come after just so many rows.
+
+Those of an encoder at a steady speed do, but they are single steps of it.
+"""
 
 HELD_CHANGES = 50
 """Changes below which the rows between them may agree by chance."""
@@ -85,7 +90,8 @@ SATURATED_STEPS = 3
 """Steps at the very largest or smallest value, entered and left as if the motion went on."""
 
 WRAP_TOLERANCE = 0.5
-"""How near to 2 pi, rad, a jump is one of a wrapped angle; its neighbours must be smaller than this."""
+"""Largest distance from 2 pi, rad, of the jump of a wrapped angle; its neighbours must be smaller than
+this."""
 
 LARGEST_ANGLE = 6.6
 """Positions, rad, beyond which an angle is more likely in degrees: somewhat more than one turn either way."""
