@@ -15,7 +15,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 
 ORDER = 6
-"""Of the Butterworth filters, which run forwards and backwards: the flank is that of twice the order."""
+"""Order of the Butterworth filters, which run forwards and backwards: the flank is that of twice the
+order."""
 
 WIDER = 2.0
 """Bandwidth of the filter of positions over that of equations: at 2, each changes what the other lets through
@@ -47,7 +48,7 @@ class Filter(NamedTuple):
 
     @classmethod
     def low_pass(cls, bandwidth: float, rate: float) -> Filter:
-        """Of a bandwidth, for records with so many samples a second; Hz both."""
+        """Return a low-pass with a bandwidth, for recordings with this many samples a second; both Hz."""
         from scipy.signal import butter
 
         sections = butter(ORDER, bandwidth, fs=rate, output="sos")

@@ -30,8 +30,9 @@ from vsacli.studies.identification.regressor import (
 )
 
 WEIGHT = 1.0
-"""Of the relative entropy beside half the squared standard errors of what was found: where a record tells
-little, links are rather an error off than far from the file's. With 0.01 a link came out with 141 kg."""
+"""Weight of the relative entropy next to half the squared standard errors of the result: where a recording
+tells little, links are rather an error off than far from the file's. With 0.01 a link came out with 141
+kg."""
 
 WITHIN = 3.0
 """Standard errors that what was found may be off from that of bodies: of forty numbers one is beyond two."""
@@ -59,7 +60,7 @@ ARRIVED = 1e-6
 
 
 class Told(NamedTuple):
-    """What was found: combinations of standard parameters, their values and covariance.
+    """The result: combinations of standard parameters, their values and covariance.
 
     Attributes:
         shares: of the parameters of all links in each, (told, parameters).
@@ -161,7 +162,7 @@ class _Problem(NamedTuple):
 
     @classmethod
     def of(cls, told: Told, root: FloatArray, start: FloatArray) -> _Problem:
-        """With the told values as coordinates, scaled by a root of their covariance."""
+        """Return the problem with identified values as coordinates, scaled by a root of their covariance."""
         from scipy.linalg import solve_triangular
 
         q, r = map(np.asarray, np.linalg.qr(told.shares.T, mode="complete"))
@@ -215,7 +216,7 @@ def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
 
 
 def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
-    """By Newton steps, halved at most to where links are bodies and the value falls for certain."""
+    """Return the minimum by Newton steps, halved at most until links are bodies and the value falls."""
     for _ in range(STEPS):
         gradient, hessian = problem.slopes(s, weight)
         scale: FloatArray = 1 / np.sqrt(np.diagonal(hessian))
@@ -240,7 +241,7 @@ def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
 
 
 def _told(system: LinkSystem, found: Solution) -> Told:
-    """What can be told of base parameters, one by one or in combinations, at the other numbers found."""
+    """Return the identifiable base parameters, alone or in combinations, at the other values found."""
     fit, base = found.fit, system.base
     combined = {each.terms[0][0]: each.terms for each in fit.inseparable}
     first = [at for at in range(len(fit.values)) if at in combined or np.isfinite(fit.standard_errors[at])]
@@ -259,7 +260,7 @@ def _told(system: LinkSystem, found: Solution) -> Told:
 
 
 def doubts_of(links: ConsistentLinks) -> Iterator[str]:
-    """What to say if bodies cannot have what was found."""
+    """Yield doubts if no bodies can have these parameters."""
     if not links.within:
         off = np.abs(links.off).max()
         yield (

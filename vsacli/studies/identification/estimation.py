@@ -169,7 +169,7 @@ SETTLED = 0.01
 
 
 class Combination(NamedTuple):
-    """What can be told of unknowns that cannot be told apart: the sum of factor times unknown.
+    """An identifiable combination of indistinguishable unknowns: the sum of factor times unknown.
 
     Attributes:
         terms: index of each unknown with its factor; that of the first one is 1.
@@ -297,7 +297,7 @@ def fit_of(
     step: Step,
     before: FloatArray,
 ) -> Fit:
-    """What a solution says, with its standard errors.
+    """Return the fit of a solution, with standard errors.
 
     Args:
         system: the equations at the present numbers.
@@ -326,7 +326,7 @@ def fit_of(
 
 
 def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
-    """Of the changed unknowns, (unknowns, unknowns): of the noise, of numbers found before, and of bias.
+    """Return the covariance of the changed unknowns: of noise, of earlier values, and of bias.
 
     Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
     How much is known roughly, and counts as an error.

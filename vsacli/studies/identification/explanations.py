@@ -121,7 +121,7 @@ SEVERAL = 3
 
 
 class Explanation(NamedTuple):
-    """What was found of the residuals of a system.
+    """The explanation of the residuals of a system.
 
     Attributes:
         sentences: one for each cause, and one on the numbers that are wrong if it is not regarded.
@@ -171,7 +171,7 @@ def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fa
 
 
 def _moved(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
-    """What would become of numbers that are told, if what is missing were in the equations."""
+    """Yield the change of identified values if a missing cause were in the equations."""
     for at, number in enumerate(found.free):
         value, before = float(found.fit.values[at]), float(found.fit.standard_errors[at])
         name, unit, error = found.system.names[number], found.system.units[number], float(errors[at])
@@ -212,7 +212,7 @@ def _longer(equations: Sequence[Equations], chosen: Sequence[Cause]) -> list[Equ
 
 
 def _share_left(cause: Cause, longer: Sequence[Equations], solution: FloatArray) -> float:
-    """What remains of the sum of squares of residuals in equations that a cause changes."""
+    """Return the remaining share of squared residuals in equations with a cause."""
     rows = [np.any(columns != 0, axis=1) for columns in cause.columns]
     before = [(each.measured - each.predicted)[there] for each, there in zip(longer, rows, strict=True)]
     explained = [each.slopes[there] @ solution for each, there in zip(longer, rows, strict=True)]

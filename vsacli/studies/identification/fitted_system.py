@@ -51,7 +51,7 @@ class SystemOfEquations(ABC):
         """Return the same system with some numbers at given values, which are no longer unknown."""
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:
-        """Return the equations, with what noise like that of the positions changes of them if it is known."""
+        """Return the equations of a recording, at the values found."""
         found = self.of_record(values, signals)
         if signals.noise is None:
             return found
@@ -127,7 +127,7 @@ def _equations(system: SystemOfEquations, records: Sequence[Signals], values: Fl
 
 
 def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:
-    """What to set a number to; None if it may be what it came out as, or cannot be told and so stays.
+    """Return the value to hold a parameter at; None if its result is admissible, or it cannot be identified.
 
     That is what the file says if the record does not contradict it.
     """

@@ -55,7 +55,7 @@ from vsacli.studies.identification.recording_checks import (
 from vsacli.studies.identification.recordings import Record, check_distinct, complete_joints, read_record
 
 WORDS = (*GROUPS, LINKS)
-"""What users may ask for by a word."""
+"""Words for groups of parameters."""
 
 FORCES = wrench_columns("wrench")
 """Columns of what acts on the end effector."""
@@ -243,7 +243,7 @@ def _explanations(
     signals: Sequence[Signals],
     of_gains: Sequence[Gain],
 ) -> list[Explanation]:
-    """What would explain what equations leave; of links only if what springs carry is right.
+    """Return explanations of the residuals; of links only if the springs agree.
 
     Links are found by that, so that one fault would be told of both.
     """
@@ -329,5 +329,5 @@ def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """With more digits than records tell, so that links stay bodies, but for what is nothing in any unit."""
+    """Return a value with more digits than recordings determine, but without meaningless remainders."""
     return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")

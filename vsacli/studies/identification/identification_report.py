@@ -85,7 +85,7 @@ class Number(Published):
 
 @dataclass(frozen=True)
 class Residual(Published):
-    """What the equations of a motor, or a link, leave; root mean squares, after the filter.
+    """The residual of the equations of a motor or a link; root mean squares, after the filter.
 
     Attributes:
         group: which it is.
@@ -106,7 +106,7 @@ class Residual(Published):
 
 @dataclass(frozen=True)
 class SystemReport(Published):
-    """What was found of the numbers of a joint's motors and springs, or of the links.
+    """The results for the parameters of a joint's motors and springs, or of the links.
 
     Attributes:
         title: whose they are.
@@ -127,7 +127,7 @@ class SystemReport(Published):
 
 @dataclass(frozen=True)
 class RecordReport(Published):
-    """How a record was used.
+    """The use of a recording.
 
     Attributes:
         path: of it.
@@ -205,7 +205,7 @@ class Identification(Published):
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """Of all systems."""
+        """Results of all systems."""
         return tuple(number for system in self.systems for number in system.numbers)
 
     def __str__(self) -> str:
@@ -230,7 +230,7 @@ class Identification(Published):
         return f"{self.robot} from {count}: {self.verdict.upper()}"
 
     def _summary(self) -> str:
-        """How many numbers agree with the file, how many do not, and how many say nothing of it."""
+        """Return how many values agree with the file, disagree, or say nothing about it."""
         told, changed = sum(each.told for each in self.numbers), sum(each.changed for each in self.numbers)
         counts = {
             f"{'agrees' if told - changed == 1 else 'agree'} with the file": told - changed,
@@ -302,7 +302,7 @@ SMOOTH_CURVES = 8
 
 
 def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
-    """What a system told, and how well it holds."""
+    """Return the results of a system, and how well it fits."""
     system, fit = found.system, found.fit
     of_joint = f"{JOINTS}.{system.title}.actuator."
     names = [system.names[number].removeprefix(of_joint) for number in found.free]
@@ -321,7 +321,7 @@ def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> Syst
 
 
 def numbers_of(found: Solution) -> Iterator[Number]:
-    """What was found of each number of a system."""
+    """Yield the result of each parameter of a system."""
     system, fit = found.system, found.fit
     inseparable = {at for each in fit.inseparable for at, _ in each.terms}
     said = zip(system.names, system.units, system.sums, strict=True)
@@ -371,7 +371,7 @@ def _unit(robot: Robot, group: str) -> str:
 
 
 def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]) -> float:
-    """Of what is measured, by that of torques, and by that of positions; NaN if either is not known."""
+    """Return the noise of measurements, by that of torques and of positions; NaN if either is unknown."""
     index = _joint_of(robot, group)
     motors, sprung = motor_names(robot, index), robot.joints[index].actuator.sprung
     of_positions = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]

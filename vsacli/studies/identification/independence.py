@@ -1,4 +1,4 @@
-"""Which columns of a matrix are independent, and of which the others are combinations.
+"""Independent columns of a matrix, and the others as combinations of them.
 
 Householder QR with column pivoting (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., 2013, section
 5.4.2), as M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of Robotic

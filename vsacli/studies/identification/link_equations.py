@@ -164,7 +164,7 @@ def _carried(
 def _resistance(
     robot: Robot, index: int, signals: Signals, numbers: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
-    """What damping and friction of a joint and its rigid drive take, (samples,), and slopes by numbers."""
+    """Return damping and friction of a joint and its rigid drive, (samples,), and slopes by parameters."""
     joint = apart(seeded(robot, numbers).joints[index])
     motion = joint_motion(signals, index)
     dq = motion["dq"]

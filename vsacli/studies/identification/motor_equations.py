@@ -27,7 +27,7 @@ from vsacli.studies.identification.fitted_system import SystemOfEquations
 
 SPRINGS, MOTORS, FRICTION = "springs", "motors", "friction"
 GROUPS = (SPRINGS, MOTORS, FRICTION)
-"""What users may ask for by a word."""
+"""Words for groups of parameters."""
 
 FIXED = ("gear_ratio", "torque_constant", "resistance")
 """Numbers of motors that are counted or printed on them, and of which no torque on the joint's side tells."""
@@ -83,7 +83,7 @@ def admissible(robot: Robot, path: str, value: float) -> float | None:
 
 
 def group_of(parameter: Parameter) -> str | None:
-    """What a number of a joint belongs to, a word of `GROUPS`; None if it is not to be found."""
+    """Return the group of a parameter of a joint, a word of `GROUPS`; None if it is not identified."""
     place = parameter.path[2:]
     if place[0] != "actuator" or place[-1] in FIXED:
         return None
@@ -127,7 +127,7 @@ def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
 
 
 def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
-    """What the motors of a joint are called in reports."""
+    """Return the names of the motors of a joint in reports."""
     joint = robot.joints[index]
     if len(joint.actuator.motors) == 1:
         return (f"motor of {joint.name}",)
@@ -215,7 +215,7 @@ def motor_systems(
     fit: Sequence[str],
     records: Sequence[Signals],
 ) -> Iterator[MotorSystem]:
-    """Of the joints with springs, those of which anything is to be found.
+    """Yield the systems of joints with springs in which anything is to be identified.
 
     Numbers of springs that change no torque at all, since they but bound where these work, are passed over.
 

@@ -57,7 +57,7 @@ ODD_GAINS: Mapping[str, float] = MappingProxyType(
         "look as if the second were in degrees, or the first marked so": math.pi / 180,
     }
 )
-"""Of a motor's motion over its joint's, by what they look like."""
+"""Gains of a motor's motion over its joint's, with the likely slip."""
 
 
 def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
@@ -203,7 +203,7 @@ WORTH_IT = 0.05
 
 
 class Delay(NamedTuple):
-    """Of the torques of a record behind its positions.
+    """The delay of the torques of a recording behind its positions.
 
     Attributes:
         seconds: negative if they are ahead; NaN if it cannot be told.
@@ -277,7 +277,7 @@ class Factor(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """What is said of the gain of a joint's torques.
+    """The judgement of the gain of a joint's torques.
 
     Attributes:
         sentence: on it.
@@ -311,7 +311,7 @@ def gains(
 
 
 def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None:
-    """That by which all numbers of a joint's motors and springs differ from the file; None if none does."""
+    """Return the common factor of all parameters of a joint's motors and springs from the file, if any."""
     equations = [found.equations(each) for each in signals]
     slopes = np.concatenate([each.slopes[:, found.free] for each in equations])
     predicted = np.concatenate([each.predicted for each in equations])
@@ -346,7 +346,7 @@ def _fitted_factor(found: Solution, by_gain: FloatArray, told: IndexArray) -> Fa
 def _by_links(
     robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
 ) -> dict[str, Factor]:
-    """What springs carry by the numbers found, over what links as in the file need, by joint."""
+    """Return the torque of springs by identified values over that required by links of the file, by joint."""
     if without_links(robot, joints, (LINKS,), signals):
         return {}
     system = link_system(robot, (), motors)
@@ -391,7 +391,7 @@ def _rotor_differs(robot: Robot, found: Solution) -> bool:
 
 
 def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bool) -> Gain:
-    """Which of both it is, as far as the links, or the rotor, tell."""
+    """Return whether torques or robot differ, as far as the links, or the rotor, tell."""
     size = "large" if factor.value > 1 else "small"
     alike = f"{found.system.title}: the numbers found are {factor} times those of the file, all of them"
     carried = f"what springs carry by these numbers is {by_links} times what links as in the file need"

@@ -42,7 +42,10 @@ from vsacli.trajectory.recorded.thresholds import (
 POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
 
 READINGS = (POSITION, MOTOR, TORQUE)
-"""What is needed of a joint. What sensors of a simulation read, `q_measured` and so on, goes before."""
+"""Required columns of a joint.
+
+Readings of sensors in a simulation, `q_measured` and so on, take precedence.
+"""
 
 Where: TypeAlias = tuple[str, int, int | None]
 """Variable, index of the joint, and number of the motor or None."""
@@ -67,7 +70,7 @@ class Column(NamedTuple):
 
 
 class _RobotColumns(NamedTuple):
-    """What columns there are of a robot; see `Jointed`."""
+    """The possible columns of a robot; see `Jointed`."""
 
     robot: Robot
 
@@ -81,13 +84,13 @@ class _RobotColumns(NamedTuple):
 
     @property
     def gear_ratio(self) -> FloatArray:
-        """Of the motors, (joints, 2); NaN where the file gives none."""
+        """Gear ratios of the motors, (joints, 2); NaN where the file gives none."""
         sides = [side for actuator in self.robot.actuators for side in actuator.sides]
         ratios = [side.gear_ratio if side and side.gear_ratio else math.nan for side in sides]
         return np.array(ratios).reshape(-1, SIDES)
 
     def existing(self, variable: Variable) -> BoolArray:
-        """Which columns of a variable of joints there are."""
+        """Return the existing columns of a variable of joints."""
         return np.array([joint.has(variable) for joint in self.robot.joints])
 
 
@@ -119,14 +122,14 @@ def recorded_columns(
 
 
 def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
-    """For each place the column that counts: what sensors read if it is there, torques before currents."""
+    """Return the preferred column for each place: sensor readings first, torques before currents."""
     best = preferred(signals)
     currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
     return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
 
 
 def _torque_of_current(robot: Robot, signal: Measured) -> float:
-    """What the numbers of a column are multiplied by to be torques, if they are currents."""
+    """Return the factor of a column to torques, if it holds currents."""
     variable, joint, motor, *_ = signal.place
     if variable != CURRENT or motor is None:
         return 1.0

@@ -30,10 +30,10 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.independence import first_independent, in_words, shares_of
 
 SYMBOLS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
-"""Of the parameters of a link, in their order."""
+"""Symbols of the parameters of a link, in their order."""
 
 UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
-"""Of these."""
+"""Units of these."""
 
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 """Entries of a symmetric tensor in the order of the parameters."""
@@ -61,12 +61,12 @@ def link_of(parameters: FloatArray) -> Link:
 
 
 def all_parameters(robot: Robot) -> FloatArray:
-    """Of all links, base to tip, (10 joints,)."""
+    """Return the parameters of all links, base to tip, (10 joints,)."""
     return np.concatenate([parameters_of(joint.link) for joint in robot.joints])
 
 
 def names(robot: Robot) -> list[str]:
-    """Of the parameters of all links, e.g. `elbow.Izz`."""
+    """Return the names of the parameters of all links, e.g. `elbow.Izz`."""
     return [f"{joint.name}.{symbol}" for joint in robot.joints for symbol in SYMBOLS]
 
 
@@ -179,7 +179,7 @@ SAMPLES_A_LINK = 30
 """Random poses, speeds and accelerations: three for each parameter, and a row of each joint."""
 
 SEED = 0
-"""Of the random motions, so that the same robot has the same base parameters each time."""
+"""Seed of the random motions, so that the same robot has the same base parameters each time."""
 
 STRUCTURAL = 1e-9
 """Distance of a column from a combination of others, over its norm, below which it is one. Of the robots that
@@ -207,19 +207,19 @@ class BaseParameters(NamedTuple):
         return values
 
     def names(self, names: Sequence[str]) -> list[str]:
-        """That of the parameter that each begins with; with a star if others are regrouped into it."""
+        """Return the name of the first parameter of each; with a star if others are regrouped into it."""
         alone = np.count_nonzero(self.shares, axis=1) == 1
         return [f"{names[at]}{'' if one else '*'}" for at, one in zip(self.kept, alone, strict=True)]
 
     def words(self, place: int, names: Sequence[str]) -> str:
-        """What one is the sum of, e.g. `shoulder.Izz + 0.09 elbow.m`."""
+        """Return the sum that one stands for, e.g. `shoulder.Izz + 0.09 elbow.m`."""
         first, factors = int(self.kept[place]), self.shares[place]
         others = ((int(at), float(factors[at])) for at in np.flatnonzero(factors) if at != first)
         return in_words([(first, 1.0), *others], names)
 
 
 def base_parameters(robot: Robot) -> BaseParameters:
-    """Those of a robot's links."""
+    """Return the base parameters of a robot's links."""
     joints = len(robot.joints)
     q, dq, ddq = np.random.default_rng(SEED).uniform(-np.pi, np.pi, (3, SAMPLES_A_LINK * joints, joints))
     columns = np.moveaxis(regressor(robot, q, dq, ddq), 1, -1).reshape(-1, len(SYMBOLS) * joints)

@@ -42,8 +42,11 @@ it falls within the slowest tenth of their speed (B. Armstrong-Helouvry, P. Dupo
 Automatica 30 (1994))."""
 
 DEGREE = 4
-"""Of the polynomial of the deflection. Together with the linear and cubic terms of most files, springs that
-stiffen or yield otherwise are seen by terms of even degree."""
+"""Degree of the polynomial of the deflection.
+
+Together with the linear and cubic terms of most files, other kinds of hardening or softening springs show in
+terms of even degree.
+"""
 
 
 class Cause(NamedTuple):
@@ -67,7 +70,7 @@ class Cause(NamedTuple):
 
     @property
     def width(self) -> int:
-        """How many columns there are."""
+        """Number of columns."""
         return int(self.columns[0].shape[1])
 
 
@@ -203,7 +206,7 @@ def _polynomial_terms(positions: Sequence[FloatArray], place: int, sign: float) 
 def _by_zero(
     found: Solution, records: Sequence[Signals], equations: Sequence[Equations], index: int, motor: int
 ) -> list[FloatArray]:
-    """What an error of a motor's position makes of what is predicted, over that error, (rows, 1).
+    """Return the effect of an error of a motor's position on the prediction, over that error, (rows, 1).
 
     Springs are not linear in it, and the numbers found are wrong by it: so it is a secant over the error that
     fits best, with the numbers that go with it.

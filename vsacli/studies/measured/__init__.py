@@ -1,4 +1,4 @@
-"""What a laboratory measured beside what was computed."""
+"""Comparison of laboratory measurements with results."""
 
 from vsacli.studies.measured.against_result import compare
 from vsacli.studies.measured.agreement import Comparison

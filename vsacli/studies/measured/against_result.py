@@ -30,10 +30,11 @@ from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, i
 from vsacli.studies.measured.slips import NOTABLE, WILD, exchanged_places, slips
 
 POSITIONS = ("q", "theta")
-"""By these a recording is aligned if it has any: torques depend on the model, positions were commanded."""
+"""Variables by which a recording is aligned if it has any: torques depend on the model, positions were
+commanded."""
 
 OTHER_UNIT = 100
-"""How many times longer or shorter than the result a recording is whose times may be in another unit."""
+"""Ratio of durations of recording and result from which the times may be in another unit."""
 
 SAME_LAG = 0.2
 """Relative distance of lags up to which they are one, which the clock may have."""
@@ -125,7 +126,7 @@ def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatAr
 
 
 def _interpolated(result: StoredResult, signals: Sequence[Measured]) -> list[Computed]:
-    """What was computed of each signal, as a function of the time from the beginning of the result."""
+    """Return each computed signal as a function of the time from the beginning of the result."""
     found, time = [], result.time - result.time[0]
     names = {signal.place.variable for signal in signals}
     stored = {name: np.asarray(result.read(name), dtype=float) for name in names}
@@ -160,7 +161,7 @@ def _group(signal: Measured) -> tuple[str, str]:
 
 
 def _other_unit(pairing: Pairing) -> str:
-    """That times may be in another unit than seconds, if the recording lasts so much longer or shorter."""
+    """Return the doubt that times are in another unit than seconds, by the ratio of durations."""
     lasts = float(pairing.time[-1])
     if 1 / OTHER_UNIT < lasts / pairing.duration < OTHER_UNIT:
         return ""
@@ -169,7 +170,7 @@ def _other_unit(pairing: Pairing) -> str:
 
 
 def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
-    """How much of the result the recording covers, s."""
+    """Return the part of the result that the recording covers, s."""
     covered = min(float(time[-1]), duration) - max(float(time[0]), 0.0)
     rows = np.count_nonzero((time >= 0) & (time <= duration))
     if rows < FEWEST_SAMPLES:
@@ -245,7 +246,7 @@ def _alignment_notes(alignment: Alignment) -> Iterator[str]:
 
 
 def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]:
-    """Where all that is no position lags alike: a joint that does not follow its command misleads."""
+    """Yield the note that all signals but positions lag equally, as with a joint off its command."""
     others = [signal for signal in signals if not signal.variable.startswith(POSITIONS)]
     lags = [signal.lag for signal in others if math.isfinite(signal.lag)]
     middle = float(np.median(lags)) if lags else math.nan
@@ -258,7 +259,7 @@ def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]
 
 
 def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
-    """Of the motor that each signal is of; NaN if it is of none."""
+    """Return the gear ratio of the motor of each signal; NaN for other signals."""
     places = [signal.place for signal in recorded.signals]
     return [
         math.nan if place.motor is None else float(result.gear_ratio[place.joint, place.motor - 1])

@@ -1,4 +1,4 @@
-"""How well measured signals agree with computed ones: figures of each, and the report as text and as JSON."""
+"""Agreement of measured signals with computed ones: figures of each, and the report as text and as JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vsacli.base.tables import ReportText
 from vsacli.documents.source import Source
 
 Still: TypeAlias = Literal["computed", "measured"]
-"""Which of both signals does not move, beyond rounding or noise."""
+"""The signal that does not move beyond rounding or noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Agreement(Published):
 
 
 def straight_line(computed: FloatArray, measured: FloatArray) -> tuple[float, float, float]:
-    """Of measured = offset + gain computed: offset, gain, coefficient of correlation; NaN if one is flat."""
+    """Return offset, gain and correlation of measured = offset + gain computed; NaN if one is flat."""
     spread = float(np.std(computed))
     if not spread > 0 or not np.std(measured) > 0:
         return math.nan, math.nan, math.nan
@@ -89,7 +89,7 @@ SHOWN_LAG = 5e-4
 
 @dataclass(frozen=True)
 class Comparison(Published):
-    """What was measured against what was computed.
+    """The comparison of measurements with a result.
 
     Attributes:
         result, recording: paths of the files.

@@ -1,4 +1,4 @@
-"""When in a recording the computed motion begins: the shift at which measured signals follow computed ones.
+"""Start of the computed motion in a recording: the shift at which measured signals follow computed ones.
 
 Clocks of a laboratory start before the motion, and a recording may end before it or be cut out of its middle.
 Two steps find the shift. A search over all shifts takes the one at which the columns together leave least
@@ -52,14 +52,14 @@ LONGEST_STEP = 3.0
 """Steps between samples of a column, in usual ones, beyond which nothing is known between them."""
 
 ROUNDS = 3
-"""How often the columns are asked by how much they lag; the second answer hardly differs from the first."""
+"""Rounds in which the columns vote on their lag; the second answer hardly differs from the first."""
 
 APART = 3.5
 """Distance from the middle, in deviations, from which on a column does not count."""
 
 
 class Alignment(NamedTuple):
-    """Where the result begins in the recording.
+    """The place of the result in the recording.
 
     Attributes:
         begins_at: time of the recording, s, at which the result begins; negative if that is before it.
@@ -112,7 +112,7 @@ def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]
 
 
 def _step(pairings: Sequence[Pairing]) -> float:
-    """Of the grid: that of the most frequent column, unless it is finer than the grid has points."""
+    """Return the step of the grid: that of the most frequent column, unless finer than the grid allows."""
     span = pairings[0].duration + max(float(pairing.time[-1]) for pairing in pairings)
     return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MOST_POINTS)
 
@@ -128,7 +128,7 @@ def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, Floa
 
 
 def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> FloatArray:
-    """What one column leaves unexplained at every shift, (len(grid) + len(recorded) - 1,)."""
+    """Return the unexplained part of one column at every shift, (len(grid) + len(recorded) - 1,)."""
     tamed, computed = tame(pairing.measured), pairing.computed.at(grid)
     there, known = np.isfinite(computed), _known(pairing.time, recorded)
     middle, center = float(np.nanmean(computed)), float(np.mean(tamed))
@@ -152,7 +152,7 @@ def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> Float
 
 
 def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
-    """Which points of a grid lie between samples that follow each other as usual."""
+    """Return which points of a grid lie between consecutive samples."""
     steps = np.diff(time)
     follows = np.append(steps <= LONGEST_STEP * np.median(steps), True)
     before = np.clip(np.searchsorted(time, recorded, side="right") - 1, 0, len(time) - 1)
@@ -200,7 +200,7 @@ def _refined(
 
 
 def _left(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> float:
-    """What one column leaves unexplained at a shift."""
+    """Return the unexplained part of one column at a shift."""
     moments = moments_of(pairing.overlap(shift)[0], tamed)
     if moments.samples < FEWEST_SAMPLES:
         return 0.0

@@ -27,7 +27,7 @@ COSINES = 24
 with 80, of 3000 samples, those of pure derivatives of noise came out 5 times too large."""
 
 SAMPLES_A_COSINE = 4
-"""At least, so that of short records the cosines remain the lowest ones."""
+"""Smallest number of samples for a cosine, so that the cosines of short recordings remain the lowest ones."""
 
 
 def covariance_of_sum(scores: FloatArray) -> tuple[FloatArray, int]:
@@ -48,7 +48,7 @@ LAG_SHARE = 0.05
 """Share of the duration within which a lag is looked for."""
 
 MOST_STEPS = 20
-"""Of Gauss-Newton; from shifts of the search it takes 3 to 6."""
+"""Largest number of Gauss-Newton steps; from shifts of the search it takes 3 to 6."""
 
 SMALL_STEP = 0.01
 """Step, in standard errors of the lag, after which it is found."""
@@ -67,7 +67,7 @@ NEAR_LARGEST = 2.0
 """Times the largest residual but for those few, up to which a residual is like the others."""
 
 TRIALS = 4
-"""How often the line and the samples that count are found in turn."""
+"""Rounds in which the line and the samples that count are found in turn."""
 
 SIGNIFICANT = 5.0
 """Standard errors from which on a gain is one."""
@@ -204,7 +204,7 @@ def _solved(design: FloatArray, values: FloatArray) -> FloatArray | None:
 
 
 def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
-    """Of the unknowns: of white residuals, or of residuals of their own color where that is larger."""
+    """Return the covariance of the unknowns, of white or of colored residuals, whichever is larger."""
     sizes = np.linalg.norm(design, axis=0)
     scaled = design / sizes
     inverse = np.linalg.inv(scaled.T @ scaled)
@@ -240,7 +240,7 @@ def _line(pairing: Pairing, step: _Step, lag: float) -> LineFit:
 
 
 def still_signal(pairing: Pairing, shift: float, fit: LineFit) -> Still | None:
-    """Which signal does not move beyond rounding or noise; None if both do.
+    """Return the signal that does not move beyond rounding or noise; None if both move.
 
     Args:
         pairing: computed and measured values.
@@ -261,7 +261,7 @@ def still_signal(pairing: Pairing, shift: float, fit: LineFit) -> Still | None:
 
 
 def root_mean_square(values: FloatArray) -> float:
-    """Of values of any size; NaN of none."""
+    """Return the root mean square of values of any size; NaN of none."""
     largest = float(np.abs(values).max(initial=0.0))
     if not values.size or largest == 0:
         return largest if values.size else math.nan

@@ -1,4 +1,4 @@
-"""Which column of a recording is which variable of a result or a robot, in the units of these."""
+"""Assignment of the columns of a recording to variables of a result or a robot, in their units."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vsacli.documents.time_column import TIME
 
 
 class Jointed(Protocol):
-    """What a recording may be of: a result, or a robot."""
+    """The subject of a recording: a result, or a robot."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -36,16 +36,16 @@ class Jointed(Protocol):
 
     @property
     def gear_ratio(self) -> FloatArray:
-        """Of the motors, (joints, 2); NaN where it is not known."""
+        """Gear ratios of the motors, (joints, 2); NaN where unknown."""
         ...
 
     def existing(self, variable: Variable) -> BoolArray:
-        """Which columns of a variable of joints there are, (joints, 1 or 2)."""
+        """Return the existing columns of a variable of joints, (joints, 1 or 2)."""
         ...
 
 
 class Place(NamedTuple):
-    """Where a column belongs.
+    """The place of a column.
 
     Attributes:
         variable: name of what it is compared with or stands for.
@@ -85,7 +85,7 @@ class Measured:
 
 
 class Recording(NamedTuple):
-    """What was recorded of some variables.
+    """The recording of some variables.
 
     Attributes:
         time: (samples,), s, from the first sample on.
@@ -172,7 +172,7 @@ def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) 
 
 
 def preferred(signals: Iterable[Measured]) -> dict[tuple[str, int, int | None], Measured]:
-    """For each variable of a joint or motor the column that says most directly what the robot did."""
+    """Return the most direct column for each variable of a joint or motor."""
     ranked = sorted(signals, key=lambda signal: signal.place.rank)
     return {signal.place.target: signal for signal in ranked}
 

@@ -25,8 +25,8 @@ ROUNDING = 1e-8
 joints at rest change by 1e-16 to 1e-12 of it, and 1e-8 of a motion is below the resolution of any sensor."""
 
 WIDEST = 3.0
-"""How far beyond the range of nearly all samples the search takes values to go, in such ranges: single wild
-samples count no more than their neighbors."""
+"""Range of values in the search, in ranges of nearly all samples: single wild samples count no more than
+their neighbors."""
 
 LARGEST = 1e100
 """Values beyond are no measurements; the search sees the bound, since their squares would overflow."""
@@ -148,7 +148,7 @@ def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
 
 
 PRICE = math.log(10.0)
-"""Of a line, and once more of a falling one, in logarithms of what is unexplained."""
+"""Price of a line, and once more of a falling one, in logarithms of the unexplained part."""
 
 EXACT = 1e-5
 """Share of the variance below which nothing counts as unexplained: the filter of a sensor may do that."""

@@ -1,4 +1,4 @@
-"""What a signal that does not agree looks like: a wrong unit, sign, side of the gear, or column."""
+"""Likely causes of a signal that does not agree: a wrong unit, sign, side of the gear, or column."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _reversed(
 
 @np.errstate(all="ignore")  # signals that hold still explain nothing
 def _costs(measured: FloatArray, exact: float, computed: Sequence[FloatArray]) -> FloatArray:
-    """What measured values leave unexplained by each computed signal, (signals,)."""
+    """Return the unexplained part of measured values for each computed signal, (signals,)."""
     moments = [moments_of(each, tame(measured)) for each in computed]
     if min(float(each.samples) for each in moments) < FEWEST_SAMPLES:
         return np.zeros(len(computed))
@@ -130,7 +130,7 @@ def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterato
 
 
 def _gains_of_slips(gear_ratio: float) -> Mapping[str, float]:
-    """What a gain looks like, by the gain that a slip of units, signs or sides of a gear makes.
+    """Return words for gains that slips of units, signs or sides of a gear make.
 
     Args:
         gear_ratio: of the motor that the signal is of, NaN if it is of none or not known.
@@ -149,7 +149,7 @@ def _gains_of_slips(gear_ratio: float) -> Mapping[str, float]:
 
 
 def _slip_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
-    """What a signal looks like that does not agree."""
+    """Yield the likely slip of a signal that does not agree."""
     if not agreement.samples:
         yield f"{agreement.column} has no computed value: its joint is infeasible or singular throughout"
         return

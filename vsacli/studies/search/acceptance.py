@@ -58,7 +58,7 @@ class ImpossibleError(VsacliError):
 
 @dataclass(frozen=True)
 class Acceptance:
-    """When a step of a robot is accepted: a margin of at least `near_singular`, and every limit kept.
+    """The rule by which samples of a robot are accepted: a margin of `near_singular`, and every limit kept.
 
     Attributes:
         robot: the robot.
@@ -118,7 +118,7 @@ class Acceptance:
             yield Passage.between(trajectory, self.between, factor)
 
     def watched(self, trajectory: Trajectory, steps: int) -> Passage:
-        """At most so many steps of a task, and the instants between the steps that count."""
+        """Return at most this many samples of a task, and the instants between samples that count."""
         passages = [evenly_chosen(trajectory, steps)]
         if self.between.size:
             passages.append(Passage.between(trajectory, self.between))
@@ -136,7 +136,7 @@ class Acceptance:
         return self._refused(joint, self._driven(joint, load), load.instants)
 
     def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
-        """For each joint, by index, how it exceeds a limit of its position, at whatever speed, if it does."""
+        """Return how each joint, by index, exceeds a limit of its position at any speed, if it does."""
         found: dict[int, Trouble] = {}
         for passage in self.passages(trajectory):
             for index, joint in enumerate(self.robot.joints):
@@ -147,7 +147,7 @@ class Acceptance:
         return found
 
     def reasons(self, passage: Passage) -> tuple[str, ...]:
-        """For each joint that is not accepted throughout, the worst that is wrong with it."""
+        """Return the worst trouble of each joint that is not accepted throughout."""
         joints = enumerate(zip(self.robot.joints, passage.loads(self.robot), strict=True))
         found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
         return tuple(reason for reason in found if reason)
@@ -239,7 +239,7 @@ class Trouble(NamedTuple):
     of_load: bool = False
 
     def clause(self, joint: Joint) -> str:
-        """What is wrong, and with which joint."""
+        """Return the trouble, with its joint."""
         when = f"at t = {self.time:.3f} s"
         if math.isnan(self.bound):
             whatever = "" if math.isnan(self.value) else " at any stiffness"
@@ -264,7 +264,7 @@ SAME_STIFFNESS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class RecordedLimits:
-    """What the recorded signals of a task leave uncertain of limits, however slow and stiff it becomes.
+    """The uncertainty of limits by the recorded signals of a task, at any timing and stiffness.
 
     A run computes deviations at some times and is linear in between; here the same times count, so that both
     say the same of a step. They are computed only where the answer depends on them.
@@ -326,7 +326,7 @@ class RecordedLimits:
     def _change(
         self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants
     ) -> FloatArray:
-        """What was added to the stiffness of a joint, (samples,)."""
+        """Return the addition to the stiffness of a joint, (samples,)."""
         if stiffness is None or STIFFNESS.key not in joint.commanded:
             return np.zeros(len(instants.time))
         asked = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]

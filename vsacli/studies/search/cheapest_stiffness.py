@@ -49,7 +49,7 @@ class Countdown:
 
 
 TIME, TIMING, BOTH = "time", "timing", "both"
-"""What is minimised, and what varies, where it is not the stiffness alone."""
+"""Words for minimizing the time, and for varying more than the stiffness."""
 
 
 def varied_joints(robot: Robot, vary: str) -> list[int]:
@@ -86,7 +86,7 @@ def chosen_joints(robot: Robot) -> list[int]:
 
 
 def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criterion:
-    """What is minimised, if it can be computed for joints, by index.
+    """Return the criterion for joints, by index, if it can be computed.
 
     Raises:
         InputError: it cannot, or there is no such criterion.
@@ -228,7 +228,7 @@ class CheapestStiffness:
         return optima
 
     def _reasons_of_others(self) -> Sequence[str]:
-        """What is wrong with joints that have no stiffness to choose."""
+        """Return the trouble of joints without a stiffness to choose."""
         robot = self._acceptance.robot
         others = [index for index in range(len(robot.joints)) if index not in self._joints]
         loads = joint_loads(robot, self._trajectory, others)

@@ -137,7 +137,7 @@ class CombinedSearch:
         return best
 
     def _at(self, number: int) -> Combination | None:
-        """What mends every joint at a factor, if anything does."""
+        """Return the combination that fixes every joint at a factor, if there is one."""
         if number in self._impossible:
             return None
         if number not in self._found:
@@ -243,7 +243,7 @@ class CombinedSearch:
 
 
 def _choices(robot: Robot, watched: Passage | None) -> list[dict[str, Joint]]:
-    """What each joint may be by the word for its preload, which is empty if it stays as it is.
+    """Return the variants of each joint by the word for its preload, "" if unchanged.
 
     Args:
         robot: the robot.

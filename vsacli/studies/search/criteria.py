@@ -38,7 +38,7 @@ the last, a cost is overestimated by at most half as much, and the place of the 
 
 
 class Scale(NamedTuple):
-    """By what a cost is scaled, in its unit, over how long it is integrated, s, and how it is smoothed."""
+    """Scale of a cost in its unit, its duration, s, and its smoothing."""
 
     cost: float = 1.0
     duration: float = 1.0
@@ -80,7 +80,7 @@ class Criterion:
         """
 
     def integrands(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """What is integrated, each (instants,), by which the cost is scaled.
+        """Return the integrands of the scaled cost, each (instants,).
 
         Args:
             joint: the joint.
@@ -91,7 +91,7 @@ class Criterion:
         raise NotImplementedError
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """What each integrand counts at each instant, (integrands, instants)."""
+        """Return the weights of each integrand at each instant, (integrands, instants)."""
         weights: FloatArray = trapezoidal(time)[None]
         return weights
 
@@ -100,7 +100,7 @@ class Criterion:
         return 0
 
     def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
-        """What a level keeps from being positive, each (instants,)."""
+        """Return values that a level keeps from being positive, each (instants,)."""
         return ()
 
     def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
@@ -108,7 +108,7 @@ class Criterion:
         raise NotImplementedError
 
     def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """By what it is scaled: what it is, of some motion."""
+        """Return the scale of the cost: its value for some motion."""
         return self.of(joint, driven, time)
 
     def of_run(self, result: Result, index: int) -> float:
@@ -121,14 +121,14 @@ class Criterion:
 
 
 class NoCost(Criterion):
-    """Where something else is minimised."""
+    """The cost where something else is minimized."""
 
     over_time = ()
 
     def integrands(
         self, _joint: Joint, _driven: Drive, _level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
-        """None."""
+        """Return the integrands of the scaled cost, each (instants,)."""
         return ()
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -153,7 +153,7 @@ class Torque(Criterion):
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """Those of a mean."""
+        """Return the weights of a mean."""
         weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
         return weights
 
@@ -202,7 +202,7 @@ class Copper(Criterion):
 
 
 class Energy(Criterion):
-    """What the motors of the joint spend, without what they take back.
+    """Positive work of the motors of the joint, without energy recovered.
 
     Unless the motion repeats itself, what its springs hold at the start counts as well: someone loaded them.
     """
@@ -235,7 +235,7 @@ class Energy(Criterion):
         return spent if self.repeating else spent + float(result.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """What passes the motors either way: what they spend may be nothing."""
+        """Return the absolute work of the motors: their positive work may be nothing."""
         passed = sum(map(np.abs, _of_motors(joint, driven.motor_power)))
         return float(trapezoidal(time) @ passed) or 1.0
 
@@ -255,7 +255,7 @@ class Peak(Criterion):
         return [level]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """Those of a mean."""
+        """Return the weights of a mean."""
         return np.full((1, len(time)), 1 / len(time))
 
     def bound_count(self, joint: Joint) -> int:
@@ -281,7 +281,7 @@ class Peak(Criterion):
 
 
 CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, Copper, Peak)}
-"""Those of the stiffness by name."""
+"""Criteria of the stiffness, by name."""
 
 
 def trapezoidal(time: FloatArray) -> FloatArray:
@@ -353,11 +353,12 @@ def asked_size(joint: Joint, load: Load, criterion: Criterion) -> float:
 
 
 ROUGH_GAP = 1e-5
-"""What bounds may raise the cost by after a search from far; a tenth of what two starts may differ by."""
+"""Increase of the cost by bounds after a search from far; a tenth of the difference that two starts may
+have."""
 
 
 class Costed(Protocol):
-    """Whatever has a cost that can be smoothed."""
+    """Anything with a cost that can be smoothed."""
 
     criterion: Criterion
     scale: Scale

@@ -97,7 +97,7 @@ def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]
 
 
 def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
-    """What was said of the fit of a record."""
+    """Return the choices given for the fit of a recording."""
     if estimate is None:
         return {}
     chosen = estimate.choice

@@ -33,7 +33,7 @@ from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 SIMPLER_SHARE = 1.05
-"""How much larger a remedy with fewer kinds of change may be and still be worth more."""
+"""Ratio up to which a larger fix with fewer kinds of change is still worth more."""
 
 FASTER_SHARE = 0.8
 """Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
@@ -86,7 +86,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
 
 
 class _Tried(NamedTuple):
-    """What a search found, which of it is worth choosing, and what falls short between the steps."""
+    """The result of a search, the fixes worth choosing, and samples between that fall short."""
 
     found: _Found
     chosen: list[Remedy]
@@ -108,7 +108,7 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
 
 
 def _searched(asked: Task) -> _Tried:
-    """What is found when instants that fall short join the steps, search after search."""
+    """Return the result of searches in which instants that fall short join the samples."""
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
         found = _Found.of(replace(asked, acceptance=rule))
@@ -120,7 +120,7 @@ def _searched(asked: Task) -> _Tried:
 
 
 class _Found(NamedTuple):
-    """What a search finds: each kind of change by itself, and what may take several."""
+    """The result of a search: each kind of change on its own, and combinations."""
 
     slower: Remedy | NotPossible
     offset: Remedy | NotPossible
@@ -130,7 +130,7 @@ class _Found(NamedTuple):
 
     @classmethod
     def of(cls, task: Task) -> Self:
-        """What mends a task at its steps."""
+        """Return the fixes of a task at its samples."""
         return cls(
             _attempt(lambda: task.with_constants(_slow_down(task))),
             _attempt(lambda: task.with_constants(task.constants())),
@@ -191,7 +191,7 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Re
 def _worth_choosing(
     candidates: Iterable[Remedy], task: Task
 ) -> tuple[list[Remedy], list[Remedy], FloatArray]:
-    """Those that a run confirms and no simpler one makes superfluous, with another preload last.
+    """Return fixes that a run confirms and no simpler one replaces, another preload last.
 
     Returns:
         These; those that a run does not confirm, since they fall short between the steps; and when these do,
@@ -284,7 +284,7 @@ def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
 
 
 def _what(trouble: Trouble, *, resting: bool = False) -> str:
-    """What is beyond which bound, and when."""
+    """Return the exceeded bound, and when."""
     when = f"at t = {trouble.time:.3f} s" + (", even at rest" if resting else "")
     if math.isnan(trouble.bound):
         return f"its springs cannot carry the elastic torque {when}"
@@ -295,7 +295,7 @@ def _what(trouble: Trouble, *, resting: bool = False) -> str:
 
 
 def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
-    """Which stiffness helps at rest."""
+    """Return the stiffness that helps at rest."""
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
     if asked.min() == asked.max():
         relation = "at least" if offset > 0 else "at most"

@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 
 FIRST_GAP, LAST_GAP = 0.1, 1e-7
-"""What bounds raise the cost by, all together, at the first and at the last barrier; costs are about one."""
+"""Increase of the cost by all bounds together, at the first and at the last barrier; costs are about one."""
 
 WARM_GAP = 1e-3
 """The same to begin with near a minimum: a wide barrier would drive the search away from it."""
@@ -61,7 +61,7 @@ class Point(Protocol):
     gradient: FloatArray
 
     def changes(self, step: FloatArray) -> FloatArray:
-        """What the bounds change by with a step, to first order, (bounds,)."""
+        """Return the changes of the bounds with a step, to first order, (bounds,)."""
 
     def pull(self, weights: FloatArray) -> FloatArray:
         """Return the sum of the gradients of the bounds, each times its weight, (unknowns,)."""
@@ -85,7 +85,7 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where the search ended; all bounds are kept there.
+    """The end of a search, which keeps all bounds.
 
     Attributes:
         unknowns: (unknowns,).
@@ -182,7 +182,7 @@ class _Newton:
 
 
 def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool] | None:
-    """Of Newton's matrix if it is positive definite, else of a convex one with a little more.
+    """Return the factor of Newton's matrix if positive definite, else of a convex one with a small addition.
 
     None if that is not possible: numbers overflow, or nothing depends on some unknown.
     """

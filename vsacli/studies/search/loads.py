@@ -21,7 +21,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Instants(NamedTuple):
-    """Where steps stand in the trajectory that is to be mended.
+    """Times of samples in the trajectory of the task.
 
     Attributes:
         time: of that trajectory as it is, (samples,) in s.
@@ -70,7 +70,7 @@ class Passage(NamedTuple):
 
     @property
     def instants(self) -> Instants:
-        """Where the steps stand in the task."""
+        """Times of the samples in the task."""
         return Instants(self.motion.time, self.factor)
 
     def slowed(self, factor: float) -> Passage:
@@ -79,7 +79,7 @@ class Passage(NamedTuple):
         return Passage(slower, self.factor * factor)
 
     def stiffened(self, change: FloatArray) -> Passage:
-        """With something added to the stiffness of each joint, (joints,) N m/rad (N/m)."""
+        """Return the passage with an addition to the stiffness of each joint, (joints,) N m/rad (N/m)."""
         motion, arrays = self.motion, self.motion.of_joints
         arrays[STIFFNESS.key] = arrays[STIFFNESS.key] + change
         return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
@@ -103,7 +103,7 @@ def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 
 
 
 def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
-    """At most so many steps of a trajectory, both ends included."""
+    """Return at most this many samples of a trajectory, both ends included."""
     chosen = evenly(trajectory.samples, steps)
     samples = usual_block(trajectory.joints)
     return joined(
@@ -125,7 +125,7 @@ def joined(passages: Iterable[Passage]) -> Passage:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What one joint is asked to do, and its elastic torque.
+    """The command of one joint and its elastic torque.
 
     Attributes:
         time: ascending, (samples,) in s, of the task or of one that was stretched.
@@ -141,7 +141,7 @@ class Load:
 
     @classmethod
     def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
-        """At times of a task that was stretched by a factor, the steps among them."""
+        """Return the load at times of a task stretched by a factor, the samples among them."""
         unstretched = _unstretched(trajectory, time, factor)
         steps = np.searchsorted(time, trajectory.times.block(0, trajectory.samples))
         return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
@@ -196,7 +196,7 @@ def joint_loads(
 
 
 def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...]) -> FloatArray:
-    """What some joints are commanded along a motion, with elastic torques, (joints, names, instants)."""
+    """Return commands of joints along a motion, with elastic torques, (joints, names, instants)."""
     if not (joints and len(motion.time)):
         return np.empty((len(joints), len(names), len(motion.time)))
     commanded = {**motion.variables(), **elastic_torques(robot, motion)}
@@ -215,14 +215,14 @@ AT_REST = 1e-9
 """Largest share of its largest velocity with which a motion rests: rounding."""
 
 LOADING = ("q", "dq", "ddq", "tau_e", "dtau_e", "ddtau_e")
-"""What the motors have to do with, but for the stiffness."""
+"""Variables that load the motors, apart from the stiffness."""
 
 FEWEST_STEPS = 20
 """Steps of a period; what repeats itself faster is not told from noise."""
 
 
 class Ends(NamedTuple):
-    """How a motion begins and ends.
+    """The start and end of a motion.
 
     Attributes:
         periods: how many equal periods it has; 0 if it does not repeat itself.
@@ -234,7 +234,7 @@ class Ends(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, loads: Sequence[Load]) -> Ends:
-        """Those of a trajectory with the loads of all joints."""
+        """Return the ends of a trajectory with the loads of all joints."""
         moving = _moving_ends(trajectory)
         if not any(moving):
             return cls()
@@ -255,7 +255,7 @@ def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
 
 
 def periods(load: Load) -> int:
-    """How many equal periods, whole numbers of steps, a load has; 0 if it does not end as it begins.
+    """Return the number of equal periods, in whole samples, of a load; 0 if it ends in another state.
 
     Every second instant of a load is a step.
     """

@@ -47,7 +47,7 @@ MOST_ROUNDS = 100
 """Rounds of adding the instants at which bounds are missed; about five are needed."""
 
 BOUND_ACCURACY = 1e-7
-"""By how much of its largest value a spline may miss its bounds; a tenth of what is kept clear of them."""
+"""Share of its largest value by which a spline may miss its bounds; a tenth of the reserve."""
 
 
 class NoSplineError(Exception):
@@ -56,7 +56,7 @@ class NoSplineError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What a function has to lie between.
+    """The bounds of a function over time.
 
     Attributes:
         time: ascending, (instants,) in s.
@@ -70,11 +70,11 @@ class Bounds:
 
     @property
     def excluding_zero(self) -> BoolArray:
-        """Where the function cannot vanish."""
+        """Instants at which the function cannot vanish."""
         return (self.low > 0) | (self.high < 0)
 
     def missed_by(self, values: FloatArray) -> FloatArray:
-        """How far values lie outside; zero or negative inside."""
+        """Return the distance of values outside; zero or negative inside."""
         return np.maximum(self.low - values, values - self.high)
 
 
@@ -219,7 +219,7 @@ CLEARANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What is added to the stiffness of a joint.
+    """The addition to the stiffness of a joint.
 
     Attributes:
         time: (instants,) in s.

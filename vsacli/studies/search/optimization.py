@@ -101,7 +101,7 @@ def optimize(
 
 
 def searches(robot: Robot, minimize: str, vary: str) -> int:
-    """How many searches an optimisation may take."""
+    """Return the largest number of searches of an optimization."""
     of_pace = SEARCHES * (vary in (TIMING, BOTH))
     return of_pace + (0 if minimize == TIME or vary == TIMING else SEARCHES * len(chosen_joints(robot)))
 
@@ -333,7 +333,7 @@ def _sizes(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[fl
 def _joints(
     robot: Robot, criterion: Criterion, found: Pacing, asked: Trajectory, best: Trajectory
 ) -> dict[str, JointOptimum]:
-    """What each joint costs before and after, by name."""
+    """Return the costs of each joint before and after, by name."""
     criteria = dict.fromkeys(range(len(robot.joints)), criterion)
     before, after = (run_costs(robot, each, criteria) for each in (asked, best))
     return {
@@ -352,7 +352,7 @@ def _joints(
 
 
 def _together(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> TotalCost:
-    """What all joints cost together."""
+    """Return the costs of all joints together."""
     if not criterion.relative:
         before, after = (
             criterion.together([getattr(each, when) for each in joints.values()])

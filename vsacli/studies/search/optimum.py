@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 VARIED = {"stiffness": "stiffness", "timing": "timing", "both": "timing and stiffness"}
-"""What varies, in words."""
+"""Words for the varied quantities."""
 
 FULL = 0.995
 """Share of the time that is all of it, as it is printed."""
@@ -52,7 +52,7 @@ class JointOptimum(Published):
 
 @dataclass(frozen=True)
 class TotalCost(Published):
-    """What all joints cost together, which is what is minimised where they share a timing.
+    """The cost of all joints together, which is minimized where they share a timing.
 
     Attributes:
         before: as commanded; NaN where that is out of reach.
@@ -157,7 +157,7 @@ class Optimum(Published):
 
     @property
     def robot_name(self) -> str:
-        """Of the robot."""
+        """Name of the robot."""
         return self.robot.name
 
     def __str__(self) -> str:

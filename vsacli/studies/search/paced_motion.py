@@ -69,7 +69,7 @@ class Speeds(NamedTuple):
 
     @classmethod
     def of(cls, pace: Sequence[Row]) -> Speeds:
-        """From the pace and its first three derivatives by s.
+        """Return the speeds from the pace and its first three derivatives by s.
 
         With v = 1/p: s'' = v v_s, s''' = v (v v_s)_s, and so on.
         """
@@ -121,7 +121,7 @@ class PacedMotion:
         self._known: tuple[bytes, list[Command]] | None = None
 
     def commands(self, pace: Sequence[Row], instants: IndexArray) -> list[Command]:
-        """What each joint is asked to do, with the torque of its link, at a pace given with its derivatives.
+        """Return the commands of each joint, with link torques, at a pace with its derivatives.
 
         What was asked for last is remembered: joints are looked at one after the other.
         """
@@ -133,7 +133,7 @@ class PacedMotion:
 
     @property
     def resting(self) -> BoolArray:
-        """Where all joints rest, and go on resting, (instants,)."""
+        """Instants at which all joints rest, and go on resting, (instants,)."""
         still: BoolArray = np.all(
             [
                 np.abs(row) <= AT_REST * np.abs(row).max()
@@ -147,7 +147,7 @@ class PacedMotion:
         return resting
 
     def stiffness(self, joint: int) -> FloatArray:
-        """As commanded, (instants,)."""
+        """Return the commanded stiffness, (instants,)."""
         stiffness: FloatArray = self._variables[STIFFNESS.key][joint]
         return stiffness
 
@@ -184,7 +184,7 @@ class PacedMotion:
 
 
 def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = NOTHING) -> FloatArray:
-    """Where bounds are looked at, s: evenly, and more and more densely towards both ends.
+    """Return the instants at which bounds are checked, s: even, and ever denser towards both ends.
 
     A motion that begins at rest has hardly begun where its pace, which may be high there, is past its worst.
 
@@ -199,7 +199,7 @@ def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = N
 
 
 def _whole(torque: Row, like: Row) -> Row:
-    """Of a joint that moves nothing, the recursion finds a plain zero."""
+    """Return a torque as a row; the recursion gives a plain zero for joints that move nothing."""
     return np.full_like(like, torque) if isinstance(torque, int | float) else torque
 
 
@@ -233,7 +233,7 @@ class Pace:
 
 
 def least_pace(held: BoolArray) -> FloatArray:
-    """As fast as is tried, (instants,), and as commanded where the motion rests on its way."""
+    """Return the smallest tried pace, (instants,), or the commanded one where the motion pauses."""
     return np.where(held, 1.0, FASTEST)
 
 
@@ -281,12 +281,12 @@ class PacedJoint:
 
     @property
     def name(self) -> str:
-        """Of the joint."""
+        """Name of the joint."""
         return self._joint.name
 
     @property
     def bound_names(self) -> list[str]:
-        """What the first bounds are of, in words; those behind are of levels."""
+        """Words for the first bounds; those after are of levels."""
         return [*(ENDS_OF_CORRIDOR if self._chosen else ()), *limit_names(self._checks)]
 
     @property
@@ -295,7 +295,7 @@ class PacedJoint:
         return len(self.bound_names) + self.criterion.bound_count(self._joint)
 
     def weights(self, s: FloatArray) -> FloatArray:
-        """What each integrand of the cost counts at each instant, (integrands, instants)."""
+        """Return the weights of each integrand at each instant, (integrands, instants)."""
         return self._share * self.criterion.weights(s)
 
     def __call__(

@@ -37,7 +37,7 @@ MOST_ROUNDS = 12
 corridors alone, took seven."""
 
 ACTIVE = 1e-2
-"""How near a bound, relative to it, a motion runs along it: barriers keep the fastest a thousandth away."""
+"""Relative distance from a bound at which a motion runs along it: barriers keep a thousandth away."""
 
 STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
 """Multiples of the commanded stiffness to begin with, if it may vary."""
@@ -50,7 +50,7 @@ Start = tuple[FloatArray, FloatArray | None]
 
 
 class PacedSearch:
-    """What searches along a path have in common; those for the least time and the least cost derive from it.
+    """The common part of searches along a path; those for least time and least cost derive from it.
 
     Attributes:
         pieces: of the splines, first with several starts, then finer.
@@ -92,7 +92,7 @@ class PacedSearch:
         raise NotImplementedError
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        """Where to begin.
+        """Return the starts.
 
         Raises:
             ImpossibleError: there is no start.
@@ -100,15 +100,15 @@ class PacedSearch:
         raise NotImplementedError
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        """Where to begin among finer splines: near the pace, None, and the stiffness of joints, by index."""
+        """Return a start among finer splines: near the timing (None) and stiffnesses of joints, by index."""
         raise NotImplementedError
 
     def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        """Of the cost; bounds raise it at first by a gap."""
+        """Return the minimum of the cost; bounds raise it at first by a gap."""
         raise NotImplementedError
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """What was found, if it keeps all bounds at every instant."""
+        """Return a found minimum if it keeps all bounds at every instant."""
         raise NotImplementedError
 
     def best(self) -> Pacing:
@@ -224,13 +224,13 @@ UNBOUNDED = 1.1
 """Multiple of the time that the least pace takes, below which nothing else holds the motion back."""
 
 SLACK = 1.02
-"""How much slower than the fastest uniform motion a search begins."""
+"""Ratio to the fastest uniform motion at which a search begins."""
 
 SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
-"""By how much a motion may be slowed down so that it keeps all bounds between instants as well."""
+"""Relative slow-downs tried so that a motion keeps all bounds between instants as well."""
 
 LAST_TIMING_GAP = 1e-4
-"""What bounds may raise the time by at the end, relative to a uniform motion: near them steps are short."""
+"""Increase of the time by bounds at the end, relative to a uniform motion: near them steps are short."""
 
 STALLED_TIMING = 3e-4
 """Share of the time that some steps together must gain."""

@@ -28,7 +28,7 @@ class Candidates(Protocol):
     """Whole numbers that stand for changes of growing size, judged on a few watched steps or on all."""
 
     def stride(self, number: int) -> int:
-        """How far a scan goes from a refused number, at least 1."""
+        """Return how far a scan goes from a refused number, at least 1."""
 
     def accepts(self, number: int) -> bool:
         """Return whether the change is accepted at the watched steps."""
@@ -80,7 +80,7 @@ WATCHED_STEPS = 1000
 """Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
 
 FIRST_STEPS = 20
-"""How many of them are tried at many factors before the scan, and how many of those refused even at rest."""
+"""Samples tried at many factors before the scan, and refused ones tried even at rest."""
 
 FACTORS_AT_ONCE = 64
 """Factors that are tried at once."""
@@ -99,7 +99,7 @@ class Factors(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> Factors:
-        """Those of a task."""
+        """Return the factors of a task."""
         rate = rate_of(trajectory)
         return cls(float(FACTOR_DENOMINATOR) if rate is None else trajectory.duration * rate)
 
@@ -118,7 +118,7 @@ class Factors(NamedTuple):
         return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
 
     def factor(self, number: int) -> float:
-        """What a number stands for."""
+        """Return the factor of a number."""
         denominator = round(self.denominator) if self._whole else self.denominator
         return 1.0 if number == self.first else number / denominator
 
@@ -205,7 +205,7 @@ def _stride(number: int) -> int:
 
 
 LARGEST_RATIO = 100
-"""How many times stiffer or softer an offset may make a joint, where nothing else bounds it."""
+"""Largest ratio by which an offset changes the stiffness of a joint without other bounds."""
 
 OFFSETS_AT_ONCE = 64
 """Offsets that are tried at once: hardly dearer than one of them."""
@@ -217,7 +217,7 @@ ROUNDING = 1e-9
 """Relative rise of a stiffness after which rounding leaves it no margin short."""
 
 GRID_ROUNDING = 1e-6
-"""By how much of its spacing a number may miss the grid; far less than any limit allows."""
+"""Share of the spacing by which a number may miss the grid; far less than any limit allows."""
 
 
 def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:

@@ -22,20 +22,20 @@ DIFFERENCE = 1e-6
 """Steps in the scale of a row by which exact gradients are differenced: half of the digits are left."""
 
 LEAST_CLEARANCE = 1e-5
-"""By which all bounds shall be kept at a start: the way out of a corner is long."""
+"""Clearance of all bounds at a start: the path out of a corner is long."""
 
 LEAST_RELIEF = 1e-3
-"""By which bounds, relative to them, are kept at a start, if they can be."""
+"""Relative clearance of bounds at a start, if possible."""
 
 PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
 """Shares of the way to a place inside, one of which leads inside."""
 
 TETHER = 1e-3
-"""What going as far as rows are large costs while bounds are relieved: else what is free would drift."""
+"""Cost of moving as far as rows are large while bounds are relieved: otherwise free unknowns would drift."""
 
 
 class Functions(Protocol):
-    """What a cost and bounds are made of: functions of rows at instants, which may carry derivatives."""
+    """Terms of a cost and its bounds: functions of rows at instants, which may carry derivatives."""
 
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
@@ -143,7 +143,7 @@ class _Expanded:
         self.bounds = bounds._replace(gradients=np.where(group.there[:, None], bounds.gradients, 0.0))
 
     def gradient(self) -> FloatArray:
-        """Of the cost by the own unknowns."""
+        """Return the gradient of the cost by the own unknowns."""
         return self._by_unknowns(_weighted(self.group.weights, self.integrands.gradients))
 
     def pull(self, weights: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ class _Expanded:
         return self._by_unknowns(_weighted(self._of_all(weights), self.bounds.gradients))
 
     def changes(self, step: FloatArray) -> FloatArray:
-        """What the bounds change by."""
+        """Return the changes of the bounds."""
         moved = self.group.basis @ step[self.group.unknowns]
         changes: FloatArray = np.sum(self.bounds.gradients * moved, axis=1)[self.group.there]
         return changes

@@ -78,7 +78,7 @@ class SplineSpace:
         return cls(whole.knots, np.ones((len(whole.shapes), 1)))
 
     def one_at(self, first: bool, last: bool) -> SplineSpace:
-        """Those of `free` splines that are one at an end, or both, where three derivatives vanish.
+        """Return the `free` splines that are one at one or both ends, where three derivatives vanish.
 
         They do where the first four coefficients are equal.
         """
@@ -88,7 +88,7 @@ class SplineSpace:
         return replace(self, shapes=self.shapes[:, fixed * first : self.size - fixed * last], offset=1.0)
 
     def of_mean(self, mean: float) -> SplineSpace:
-        """Those of them with a mean over the span, the constant among them."""
+        """Return those splines with a mean over the span, the constant among them."""
         from scipy.interpolate import BSpline
         from scipy.linalg import null_space
 
@@ -122,7 +122,7 @@ class SplineSpace:
         return np.stack([every(time, nu=order) for order in range(orders)])
 
     def offsets(self, orders: int) -> FloatArray:
-        """What the splines and their derivatives are without any shape, (orders,)."""
+        """Return values and derivatives of the splines without any shape, (orders,)."""
         return np.append(self.offset, np.zeros(orders - 1))
 
     def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
@@ -183,7 +183,7 @@ class Pacing:
 
 
 class Rows(NamedTuple):
-    """How rows of functions follow from unknowns: the fields of a `Group` that say so."""
+    """Rows of functions from unknowns: the fields of a `Group` that say so."""
 
     basis: FloatArray
     places: IndexArray
@@ -219,7 +219,7 @@ class PacedSpaces(NamedTuple):
 
     @classmethod
     def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int], ends: Ends) -> PacedSpaces:
-        """With so many pieces each, for a motion with such ends.
+        """Return the spaces with this many pieces each, for a motion with these ends.
 
         What repeats itself goes on at the end as it begins, at whatever pace. What begins or ends on its way
         without repeating itself does so at the pace as commanded, with the accelerations as commanded, too.
@@ -231,7 +231,7 @@ class PacedSpaces(NamedTuple):
         return cls(pace, dict.fromkeys(varied, SplineSpace.at_rest(span, pieces)))
 
     def lasting_as_commanded(self) -> PacedSpaces:
-        """Those with which the path takes as long as it is."""
+        """Return the spaces in which the path takes the commanded time."""
         return self._replace(pace=self.pace.of_mean(1.0))
 
     def parts(self) -> dict[int | None, tuple[SplineSpace, IndexArray]]:

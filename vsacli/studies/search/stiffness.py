@@ -71,7 +71,7 @@ class FixedMotion:
 
     @property
     def bound_names(self) -> list[str]:
-        """What the first bounds are of, in words; those behind are of levels."""
+        """Words for the first bounds; those after are of levels."""
         return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
 
     @property
@@ -93,7 +93,7 @@ class FixedMotion:
         return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
 
     def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> Drive:
-        """What the motors do with a stiffness and its derivatives."""
+        """Return the drive for a stiffness and its derivatives."""
         load = self.load.at(instants).command
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
@@ -124,7 +124,7 @@ class _Distance:
 
 
 def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
-    """What to begin near: the profile that is asked for, the lower end, constants, some that are drawn."""
+    """Yield profiles to begin near: the commanded one, the lower end, constants, random ones."""
     highest = float(admissible.low.max())
     generator = np.random.default_rng(seed)
     yield asked
@@ -182,7 +182,7 @@ FIRST_LEVEL = 1.05
 """Multiple of what a level bounds, to begin with."""
 
 ACTIVE = 1e-3
-"""How near a bound, relative to it, a profile runs along it."""
+"""Relative distance from a bound at which a profile runs along it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ class SlowDown(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         return f"slow down by a factor {self.factor:.4g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
 
     @property
@@ -75,7 +75,7 @@ class StiffnessOffset(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         raised = ", ".join(str(offset) for offset in self.offsets if offset.value > 0)
         lowered = ", ".join(str(offset) for offset in self.offsets if offset.value < 0)
         clauses = {"raise": raised, "lower": lowered}
@@ -84,7 +84,7 @@ class StiffnessOffset(Published):
 
 @dataclass(frozen=True)
 class JointChange(Published):
-    """How far the stiffness of a joint moves: the largest change and when, and the root mean square."""
+    """The change of the stiffness of a joint: largest value, its time, root mean square."""
 
     joint: str
     largest: float
@@ -114,7 +114,7 @@ class StiffnessProfile(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         return f"reshape the stiffness of {', '.join(map(str, self.changes))}"
 
 
@@ -130,7 +130,7 @@ class LongerTransition(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         return f"lengthen the transitions of the stiffness from {self.before:.10g} s to {self.after:.10g} s"
 
 
@@ -144,7 +144,7 @@ class OtherPreload(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         return "change the preload of " + ", ".join(f"{joint} to {to}" for joint, to in self.preloads.items())
 
 
@@ -177,7 +177,7 @@ class Remedy(Published):
 
     @property
     def trajectory(self) -> Trajectory:
-        """What the robot is to do."""
+        """Trajectory of the task."""
         return self.declared if self.factor == 1 else self.declared.stretched(self.factor)
 
     @property
@@ -187,13 +187,13 @@ class Remedy(Published):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Which kinds of change it takes; a profile is a more general constant."""
+        """Kinds of change it takes; a profile is a more general constant."""
         kinds = {part for part in self.PARTS if getattr(self, part) is not None}
         return frozenset(kinds | ({"stiffness_offset"} if self.stiffness_profile else set()))
 
     @property
     def sentence(self) -> str:
-        """What to do, without a full stop."""
+        """Return the advice, without a full stop."""
         parts = [getattr(self, part) for part in self.PARTS]
         return ", and ".join(part.sentence for part in parts if part is not None)
 
@@ -218,7 +218,7 @@ class Cause(Published):
 
 @dataclass(frozen=True)
 class Suggestions(Published):
-    """What makes a task possible: each kind of change by itself, and combinations.
+    """The fixes of a task: each kind of change on its own, and combinations.
 
     Each kind is the smallest change that does, or why there is none; None where nothing needs to change, and
     where the stiffness has no transitions.

@@ -48,28 +48,28 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Cost(Protocol):
-    """How large changes are; the cost of all together is the root of the sum of the squares."""
+    """The size of changes; the cost of all together is the root of the sum of squares."""
 
     def of_factor(self, factor: float) -> float:
-        """Of a slow-down: 0 for a factor of 1, and growing with it."""
+        """Return the cost of a slow-down: 0 for a factor of 1, and growing with it."""
 
     def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
-        """Of what is added to the stiffness of a joint, (samples,): 0 if that is nothing."""
+        """Return the cost of an addition to the stiffness of a joint, (samples,): 0 without one."""
 
 
 class _RelativeChange:
-    """What is changed, relative to what was asked for.
+    """The change relative to the command.
 
     One part is the factor less 1, the others the root mean square of each joint's change over that of its
     stiffness: a motion that takes 10 % longer counts as much as a joint that is 10 % stiffer throughout.
     """
 
     def of_factor(self, factor: float) -> float:
-        """How much longer the motion takes, relative to its duration."""
+        """Return how much longer the motion takes, relative to its duration."""
         return factor - 1
 
     def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
-        """How much stiffer or softer the joint becomes, relative to its stiffness."""
+        """Return the change of the stiffness of a joint, relative to it."""
         return math.sqrt(float(np.mean(change**2) / np.mean(asked**2)))
 
 
@@ -77,7 +77,8 @@ RELATIVE_CHANGE: Cost = _RelativeChange()
 
 
 Form = Callable[[Acceptance, Joint, Load], FloatArray]
-"""What to add to the stiffness of a joint so that its load is accepted, (samples,), or an ImpossibleError."""
+"""Function to the addition to the stiffness of a joint that makes its load accepted, (samples,); or an
+ImpossibleError."""
 
 
 def constant_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
@@ -146,7 +147,7 @@ MOST_INSTANTS = 300_000
 
 @dataclass(frozen=True)
 class Task:
-    """What a robot is asked to do, and the rule for every step.
+    """The task of a robot, and the rule for every sample.
 
     Attributes:
         acceptance: the rule, and the robot.
@@ -259,7 +260,7 @@ class Task:
         return self.trajectory.stretched(factor), 1.0
 
     def _kept_rate(self, declared: Trajectory, factor: float, found: Combination) -> tuple[Trajectory, float]:
-        """What is declared and is still slower by a factor, at the rate of the task if it can be."""
+        """Return the declared trajectory, still slower by a factor, at the rate of the task if possible."""
         if found.factor == 1 or not self.keeps_rate:
             return declared, factor
         return with_kept_rate(declared, factor, rate_of(self.trajectory))
@@ -336,7 +337,7 @@ class Task:
 
 
 def _times(joint: JointReport) -> Iterator[float]:
-    """When each kind of trouble of a joint is worst."""
+    """Yield the times of the worst trouble of each kind at a joint."""
     yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
 
 

@@ -1,4 +1,4 @@
-"""How much everything that is computed depends on each number of the robot file."""
+"""Sensitivity of all results to each parameter of the robot file."""
 
 from vsacli.studies.sensitivities.analysis import analysed, sensitivity
 from vsacli.studies.sensitivities.sensitivity_report import Sensitivity

@@ -97,7 +97,7 @@ class Effects:
 
     @property
     def verdict(self) -> str:
-        """On the run with the numbers as they are."""
+        """Verdict on the run with unchanged parameters."""
         judged = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
         return next((verdict for verdict, bits in judged.items() if has(self._flags, bits).any()), "ok")
 
@@ -129,7 +129,7 @@ def sensitivity(
     runs: int = 0,
     seed: int = 0,
 ) -> Sensitivity:
-    """How much motor torques, margins and energy depend on each number of a robot.
+    """Return the dependence of motor torques, margins and energy on each parameter of a robot.
 
     Derivatives are exact to rounding: of the recursion by dual numbers, of the deflections by the implicit
     function theorem. Results of a change are its size times the derivative.
@@ -158,7 +158,7 @@ def analysed(
     progress: Callable[[int], None] = lambda _: None,
     keep: Callable[[Derivatives], None] = lambda _: None,
 ) -> Sensitivity:
-    """As `sensitivity`, of a run that was made already.
+    """Return `sensitivity` of a run that exists already.
 
     Args:
         run: the run.

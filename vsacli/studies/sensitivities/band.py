@@ -1,4 +1,4 @@
-"""How far motor torques and margins may be off while the numbers of a robot are uncertain.
+"""Uncertainty of motor torques and margins from tolerances of the parameters of a robot.
 
 To first order, but for dry friction, which jumps where motors reverse. They reverse earlier or later, or not
 at all, while their speed is uncertain.
@@ -80,7 +80,7 @@ class Reversals:
 
 @dataclass(frozen=True)
 class JointBand(Published):
-    """What tolerances do to a joint.
+    """The effect of tolerances on a joint.
 
     Attributes:
         torque: largest standard deviation of a motor torque, N m (N).
@@ -194,7 +194,7 @@ class Band:
         return TorqueCurves(run.time, run.tau_motor, run.of_torque)
 
     def joints(self) -> list[JointBand]:
-        """What was found, of each joint."""
+        """Return the band of each joint."""
         run = self._together()
         return [
             _of_joint(

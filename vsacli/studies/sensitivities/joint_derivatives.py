@@ -56,7 +56,7 @@ class ImplicitSolution:
         self._actuator, self._carrying, self._directions = actuator, carrying, directions
 
     def solve(self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray) -> PairSolution:
-        """As `Actuator.solve`, with derivatives."""
+        """See `Actuator.solve`; with derivatives."""
         found = self.solve_within(tau_e, stiffness, q)
         if self._actuator.motor_count == 1:
             return found
@@ -90,7 +90,7 @@ class ImplicitSolution:
         return found._replace(**derived)
 
     def _all(self, demanded: Dual | FloatArray, q: FloatArray) -> FloatArray:
-        """Its derivatives in all directions, (directions, samples)."""
+        """Return its derivatives in all directions, (directions, samples)."""
         return tangent_of(demanded, self._directions, q.shape)
 
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
@@ -134,7 +134,7 @@ class ImplicitSolution:
         return Dual.of(end, np.where(bounded, tangent, 0.0))
 
     def _pinned(self, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Which phi is at an end of its range, and what that end changes by the directions."""
+        """Return which phi is at an end of its range, and the derivatives of that end by the directions."""
         samples = phi.shape[1:]
         pinned = np.zeros(samples)
         moved = np.zeros((self._directions, *samples))
@@ -153,7 +153,7 @@ SPEED = "dtheta"
 """Variable that says where dry friction reverses; differentiated as well."""
 
 MARGIN = "margin"
-"""Of the stiffness to the nearer end of its corridor, relative."""
+"""Name of the relative margin of the stiffness to the nearer end of its attainable range."""
 
 
 class DriveDerivatives(NamedTuple):

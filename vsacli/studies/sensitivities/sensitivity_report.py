@@ -1,4 +1,4 @@
-"""What a sensitivity analysis says, as text and as JSON."""
+"""Report of a sensitivity analysis, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHOWN = 15
 
 @dataclass(frozen=True)
 class JointEffect(Published):
-    """What a change of a number does to a joint.
+    """The effect of a change of a parameter on a joint.
 
     Attributes:
         torque: largest change of a motor torque, N m (N), in size.
@@ -41,7 +41,7 @@ class JointEffect(Published):
 
 @dataclass(frozen=True)
 class ParameterEffect(Published):
-    """What a change of a number does.
+    """The effect of a change of a parameter.
 
     Attributes:
         path: of the number, from the robot.
@@ -70,13 +70,13 @@ class ParameterEffect(Published):
 
     @property
     def share(self) -> float:
-        """Of the largest motor torque of that joint."""
+        """Share of the largest motor torque of that joint."""
         return 0.0 if self.most is None else self.most[1].share
 
 
 @dataclass(frozen=True)
 class Sensitivity(Published):
-    """How much a run depends on each number of its robot.
+    """The dependence of a run on each parameter of its robot.
 
     Attributes:
         robot, trajectory: names of both.
@@ -192,5 +192,5 @@ def _probability(share: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """With two digits, or as many as the whole number has."""
+    """Return a percentage with two digits, or as many as the whole number has."""
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"

@@ -97,7 +97,7 @@ class Slopes(ABC):
 
     @abstractmethod
     def __getitem__(self, name: str) -> FloatArray:
-        """Of a variable: (numbers, 2, samples) of its motors, else (numbers, samples)."""
+        """Return slopes of a variable: (parameters, 2, samples) for motors, else (parameters, samples)."""
 
     @abstractmethod
     def total(self, name: str, weights: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ class Known(Slopes):
         return self._of_variables[name]
 
     def total(self, name: str, weights: FloatArray) -> FloatArray:
-        """As of `Slopes`."""
+        """See `Slopes.total`."""
         return np.tensordot(_existing(self[name]), weights, 2)
 
 
@@ -143,7 +143,7 @@ class Chained(Slopes):
         return total
 
     def total(self, name: str, weights: FloatArray) -> FloatArray:
-        """As of `Slopes`."""
+        """See `Slopes.total`."""
         by_torques = (_existing(self._by_torques[name]) * weights).sum(axis=1)
         return np.tensordot(self._of_torques, by_torques, 2)
 
@@ -162,7 +162,7 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """What changes with the numbers of a robot over a block of steps, per SI unit of each.
+    """The derivatives of a block of samples by the parameters of a robot, per SI unit of each.
 
     NaN where the variable does not exist, and where the decoupling matrix is singular.
 
@@ -184,7 +184,7 @@ class Derivatives:
 
     @property
     def margin(self) -> FloatArray:
-        """Of the stiffness to the nearer end of its corridor, relative, (samples, joints)."""
+        """Derivative of the relative margin of the stiffness, (samples, joints)."""
         return margin(self.block.stiffness, self.block.stiffness_lower, self.block.stiffness_upper)
 
     def over_time(self, name: str) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How uncertain the numbers of a robot are, and runs of robots that are drawn from these tolerances."""
+"""Tolerances of the parameters of a robot, and runs of robots drawn from them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ _PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
 
 class Tolerance(NamedTuple):
-    """How a number is distributed about its value.
+    """The distribution of a parameter about its value.
 
     Attributes:
         shape: `normal`, or `uniform`.
@@ -69,7 +69,7 @@ class Tolerance(NamedTuple):
 
     @property
     def deviation(self) -> float:
-        """Its standard deviation."""
+        """Standard deviation."""
         return self.size if self.shape == "normal" else self.size / math.sqrt(3)
 
     def drawn(self, random: np.random.Generator) -> float:
@@ -181,7 +181,7 @@ def _number(text: str, whole: str, unit: str = "") -> float:
 
 @dataclass(frozen=True)
 class MonteCarlo(Published):
-    """What became of the robots that were drawn.
+    """The runs of the drawn robots.
 
     Attributes:
         drawn: how many.

@@ -33,7 +33,7 @@ _NEEDED = {
     "max_current": ("torque_constant",),
     "max_voltage": ("torque_constant", "resistance"),
 }
-"""What must be given, too, where a column is."""
+"""Columns required by others."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class CatalogueMotor:
         check_fields(self, *self._missing(), *self._stuck())
 
     def _missing(self) -> Iterator[FieldProblem]:
-        """What cannot do without other columns."""
+        """Yield the columns that others require."""
         for name, needed in _NEEDED.items():
             missing = [key for key in needed if getattr(self, key) is None]
             if getattr(self, name) is not None and missing:

@@ -29,10 +29,10 @@ CRITERIA = {
     "utilisation": "smallest share of any limit",
     "mass": "least mass",
 }
-"""What the best choice has, in words."""
+"""Words for the quantity that the best choice minimizes."""
 
 DIGITS = 4
-"""Of a gear ratio that may be any."""
+"""Digits of a free gear ratio."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def _choice(
 
 
 def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
-    """What choices are sorted by."""
+    """Return the key by which choices are sorted."""
     return not choice.does, cost_of(choice, criterion), choice.motor
 
 
@@ -250,7 +250,7 @@ def coupled_choices(
 
 
 def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) -> BoolArray:
-    """Which pairs of rotors, by their inertias on the joint's side, can be coupled as they are."""
+    """Return the pairs of rotors, by joint-side inertia, that can be coupled as they are."""
     coupled = joint.actuator.coupled_rotors
     largest = np.array([[largest_coupling(one, other) for other in second] for one in first])
     possible: BoolArray = abs(coupled) < largest

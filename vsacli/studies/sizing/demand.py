@@ -1,4 +1,4 @@
-"""What trajectories require of each motor and each spring of a robot, whichever those are."""
+"""Requirements of trajectories on each motor and each spring of a robot, whatever motors it has."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Peak(Published):
 
     @classmethod
     def of(cls, values: FloatArray, time: FloatArray, trajectory: str) -> Self:
-        """Of those values that exist, each (samples,)."""
+        """Return the peak of the existing values, each (samples,)."""
         sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
         step = int(sizes.argmax())
         return cls(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else cls()
@@ -50,7 +50,7 @@ class Peak(Published):
 
 @dataclass(frozen=True, eq=False)
 class MotorDemand:
-    """What is asked of a motor on the joint's side of its gear, at all steps that can be done; (samples,).
+    """The demand on a motor on the joint side of its gear, at all feasible samples; (samples,).
 
     Attributes:
         joint, joint_type: whose motor it is.
@@ -78,7 +78,7 @@ class MotorDemand:
 
     @property
     def name(self) -> str:
-        """Of the motor."""
+        """Name of the motor."""
         return f"{self.joint} {self.number}"
 
     def peak(self, values: FloatArray) -> Peak:
@@ -114,7 +114,7 @@ class MotorDemand:
 
 @dataclass(frozen=True)
 class SpringDemand(Published):
-    """What a spring must bear.
+    """The demand on a spring.
 
     Attributes:
         joint, joint_type: whose it is.
@@ -137,7 +137,7 @@ class SpringDemand(Published):
 
     @property
     def share(self) -> float:
-        """Of the deflection that is admissible; NaN if nothing is said of that."""
+        """Share of the admissible deflection; NaN without one."""
         return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
 
 
@@ -163,7 +163,7 @@ class SpringPeaks:
                 self._found[key] = _larger(self._found.get(key, new), new)
 
     def report(self) -> tuple[SpringDemand, ...]:
-        """What was found of each spring."""
+        """Return the demand on each spring."""
         return tuple(self._found.values())
 
 
@@ -203,7 +203,7 @@ class Outcome(Published):
 
 
 class Demand(NamedTuple):
-    """What trajectories ask of a robot."""
+    """The demands of trajectories on a robot."""
 
     outcomes: tuple[Outcome, ...]
     motors: tuple[MotorDemand, ...]
@@ -273,7 +273,7 @@ def _motors(
 
 
 def _kept(part: dict[str, FloatArray], index: int, side: int) -> dict[str, FloatArray]:
-    """What one trajectory asks of a motor, with the weights of its steps, where it can be done."""
+    """Return the demand of one trajectory on a motor, with weights of its samples, where feasible."""
     of_motor = {name: values if values.ndim == 1 else values[:, index, side] for name, values in part.items()}
     known: BoolArray = np.all(np.isfinite([of_motor[name] for name in MOVED]), axis=0)
     intervals = np.where(known[:-1] & known[1:], np.diff(of_motor["time"]), 0.0)

@@ -55,7 +55,7 @@ class WorkingPoints(Published):
     def of(
         cls, demand: MotorDemand, shaft: Shaft, torques: FloatArray, velocities: FloatArray
     ) -> WorkingPoints:
-        """From torques and velocities on the shaft, each (samples,)."""
+        """Return the points from torques and velocities on the shaft, each (samples,)."""
         peak, rms = demand.peak(torques), demand.rms(torques)
         voltages = shaft.resistance / shaft.torque_constant * torques + shaft.torque_constant * velocities
         return cls(
@@ -74,18 +74,18 @@ class WorkingPoints(Published):
 
     @classmethod
     def with_gear(cls, demand: MotorDemand, shaft: Shaft, ratio: float) -> WorkingPoints:
-        """Of a motor with a gear, in the place of the robot's own."""
+        """Return the points of a motor with a gear in the place of the robot's own."""
         (coefficients,) = Shaft.of([shaft]).coefficients(np.array([ratio]))
         return cls.of(demand, shaft, coefficients @ demand.signals, ratio * demand.velocity)
 
     @classmethod
     def as_it_is(cls, demand: MotorDemand, motor: JointMotor) -> WorkingPoints:
-        """Of the robot's own motor; on the joint's side if its gear is not known."""
+        """Return the points of the robot's own motor; on the joint side if its gear is not known."""
         ratio = motor.gear_ratio or 1.0
         return cls.of(demand, Shaft.of_joint_motor(motor), demand.torque / ratio, demand.velocity * ratio)
 
     def shares(self, shaft: Shaft) -> dict[str, float]:
-        """What it uses of each limit that there is."""
+        """Return the used share of each limit that exists."""
         values = (self.torque.value, self.rms_torque, self.velocity.value, self.voltage)
         used = dict(zip(LIMITS, values, strict=True))
         return {name: used[name] / shaft.bounds[name] for name in shaft.limited}
@@ -93,7 +93,7 @@ class WorkingPoints(Published):
 
 @dataclass(frozen=True)
 class Asked(Published):
-    """What is asked of a motor whichever it is, joint side of its gear.
+    """The demand on any motor, joint side of its gear.
 
     Attributes:
         load: largest |torque| of springs, and of what else acts beside them, N m (N).
@@ -112,7 +112,7 @@ class Asked(Published):
 
 @dataclass(frozen=True)
 class OwnMotor(Published):
-    """What the robot's own motor does.
+    """The performance of the robot's own motor.
 
     Attributes:
         points: on its shaft; on the joint's side if its gear is not known.
@@ -161,7 +161,7 @@ class MotorSizing(Published):
 
     @property
     def joint(self) -> str:
-        """Whose motor it is."""
+        """Name of the joint."""
         return self.demand.joint
 
     @property
@@ -176,14 +176,14 @@ class MotorSizing(Published):
 
     @property
     def drive(self) -> str:
-        """Which motor with which gear its points are of, as far as that is known."""
+        """Motor and gear of its points, as far as known."""
         if self.best is not None:
             return f"{self.best.motor}, gear {self.best.ratio:.4g}"
         return "joint side" if self.gear_ratio is None else f"gear {abs(self.gear_ratio):.4g}"
 
     @property
     def units(self) -> tuple[str, str]:
-        """Of the torques and velocities of its points."""
+        """Units of the torques and velocities of its points."""
         known = self.best is not None or self.gear_ratio is not None
         joint_type = "revolute" if known else self.demand.joint_type
         return TORQUE.unit(joint_type), VELOCITY.unit(joint_type)
@@ -201,12 +201,12 @@ class MotorSizing(Published):
 
     @property
     def chosen(self) -> WorkingPoints | None:
-        """What the best motor of the catalogue does."""
+        """Working points of the best motor of the catalog."""
         return self.points if self.choices else None
 
     @cached_property
     def asked(self) -> Asked | None:
-        """What is asked of any motor; None if no step can be done."""
+        """Demand on any motor; None if no sample is feasible."""
         demand = self.demand
         if not demand.time.size:
             return None

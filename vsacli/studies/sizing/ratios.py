@@ -91,11 +91,11 @@ LOWEST, HIGHEST = 1e-9, 1e9
 """Ratios between which one is looked for; rad/m at a prismatic joint."""
 
 HALVINGS = 64
-"""Of the logarithm of the ratio, from the whole range to the last digit."""
+"""Bisections of the logarithm of the ratio, from the whole range to the last digit."""
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SECTIONS = 40
-"""Of the logarithm of the ratio: 0.618^40 of the whole range are 2e-7 of the ratio."""
+"""Sections of the logarithm of the ratio: 0.618^40 of the whole range are 2e-7 of the ratio."""
 
 SOLUTIONS_AT_A_TIME = 2_000_000
 """Pairs of a motor and a step computed together, some 16 MB an array."""
@@ -108,12 +108,12 @@ class Ratios(NamedTuple):
     high: FloatArray
 
     def within(self, other: Ratios) -> Ratios:
-        """What both ranges have in common."""
+        """Return the intersection of both ranges."""
         return Ratios(np.maximum(self.low, other.low), np.minimum(self.high, other.high))
 
     @property
     def empty(self) -> BoolArray:
-        """Where no ratio does."""
+        """Whether no ratio will do."""
         empty: BoolArray = ~(self.low <= self.high)
         return empty
 
@@ -126,7 +126,7 @@ class Ratios(NamedTuple):
 
 
 def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
-    """What motors use of each of their `LIMITS`, (motors, limits), 0 of what is unbounded.
+    """Return the shares of `LIMITS` that motors use, (motors, limits), 0 where unbounded.
 
     Args:
         demand: what is asked of the motor.
@@ -186,7 +186,7 @@ def ratios_within(demand: MotorDemand, shafts: Shaft) -> Ratios:
 def _peak_within(
     demand: MotorDemand, coefficients: tuple[FloatArray, FloatArray, FloatArray], bound: FloatArray
 ) -> Ratios:
-    """Where |A n + C + B/n| is at most a bound at every step; friction alone is within it."""
+    """Return the ratios at which |A n + C + B/n| is at most a bound at every sample."""
 
     def of_motors(part: slice) -> tuple[FloatArray, FloatArray]:
         a, c, b = (each[part] @ demand.signals for each in coefficients)
@@ -198,7 +198,7 @@ def _peak_within(
 
 
 def _below(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Ratios:
-    """Where square n^2 + linear n + constant <= 0 for n > 0; nowhere if linear > 0.
+    """Return where square n^2 + linear n + constant <= 0 for n > 0; nowhere if linear > 0.
 
     The root with the plus sign is found without cancellation, the other one from the product of both.
     """
@@ -234,7 +234,7 @@ def _unbounded(ratio: FloatArray) -> FloatArray:
 
 
 def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios:
-    """Where the root mean square of the torque is at most a bound."""
+    """Return the ratios at which the root mean square of the torque is at most a bound."""
     best = np.clip(least_rms(demand, shafts), LOWEST, HIGHEST)
 
     def allowed(ratio: FloatArray) -> BoolArray:
@@ -251,7 +251,7 @@ def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios
 def _turning_point(
     turned: Callable[[FloatArray], BoolArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Where something turns true between two ratios, at the first of which it is false."""
+    """Return where a condition becomes true between two ratios, at the first of which it is false."""
     low, high = np.log(low), np.log(high)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -287,7 +287,7 @@ def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
 def _in_parts(
     compute: Callable[[slice], tuple[FloatArray, ...]], motors: int, demand: MotorDemand
 ) -> tuple[FloatArray, ...]:
-    """What is computed of some motors at a time, of all."""
+    """Return values computed for some motors at a time, for all."""
     size = max(1, SOLUTIONS_AT_A_TIME // demand.signals.shape[1])
     parts = [compute(slice(start, start + size)) for start in range(0, motors, size)]
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))

@@ -23,7 +23,7 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 
 LIMITS = ("torque", "continuous_torque", "velocity", "voltage")
-"""What a motor is held to: by its peak torque or current, by the root mean square of these, and so on."""
+"""Limits of a motor: peak torque or current, their root mean square, and so on."""
 
 
 class Shaft(NamedTuple):
@@ -85,7 +85,7 @@ class Shaft(NamedTuple):
 
     @property
     def bounds(self) -> dict[str, Any]:
-        """Its limits by name."""
+        """Limits by name."""
         bounds = (self.max_torque, self.continuous_torque, self.max_velocity, self.max_voltage)
         return dict(zip(LIMITS, bounds, strict=True))
 
@@ -96,7 +96,7 @@ class Shaft(NamedTuple):
 
     @property
     def stall_torque(self) -> float:
-        """What it can give at rest, by torque, current and voltage."""
+        """Largest torque at rest, by torque, current and voltage."""
         by_voltage = self.max_voltage / self.volts_per_torque if self.volts_per_torque else math.inf
         return float(min(self.max_torque, by_voltage))
 
@@ -122,19 +122,19 @@ class Shaft(NamedTuple):
 
     @property
     def frictional(self) -> FloatArray:
-        """Those in what does not depend on the ratio."""
+        """Coefficients of the part that does not depend on the ratio."""
         return self._coefficients(0, 0, -self.backward, self.forward, self.offset, 0, 0)
 
     @property
     def loaded(self) -> FloatArray:
-        """Those in what falls with the ratio."""
+        """Coefficients of the part that falls with the ratio."""
         return self._coefficients(0, 0, 0, 0, 0, 1 / self.efficiency, self.efficiency)
 
     def _coefficients(self, *columns: Any) -> FloatArray:
         return np.stack(np.broadcast_arrays(np.zeros_like(self.inertia), *columns)[1:], axis=-1)
 
     def coefficients(self, ratio: FloatArray) -> FloatArray:
-        """Those of the torque on the shaft with ratios (motors,): (motors, 7)."""
+        """Return the coefficients of the torque on the shaft with ratios (motors,): (motors, 7)."""
         over = np.asarray(ratio)[..., None]
         torque: FloatArray = over * self.inertial + self.frictional + self.loaded / over
         return torque

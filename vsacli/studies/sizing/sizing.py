@@ -42,7 +42,7 @@ def size_drives(
     *,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Sizing:
-    """What motions ask of motors and springs, and which motors of a catalogue, with which gears, would do.
+    """Return demands on motors and springs, and the motors and gears of a catalog that will do.
 
     Peaks are the largest of all trajectories, means are over all of them, one after the other as a cycle.
 
@@ -160,7 +160,7 @@ def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMo
 
 
 def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[str]:
-    """What the numbers rest on, where that is not obvious."""
+    """Yield notes on the basis of the numbers, where that is not obvious."""
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"

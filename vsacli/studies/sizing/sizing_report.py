@@ -1,4 +1,4 @@
-"""What a sizing says, as text and as JSON."""
+"""Report of a sizing, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vsacli.studies.sizing.shaft import LIMITS
 
 @dataclass(frozen=True, eq=False)
 class Sizing(Published):
-    """What motions ask of the drives of a robot, and which would do.
+    """The demands of motions on the drives of a robot, and the drives that will do.
 
     Attributes:
         robot: its name.
@@ -68,7 +68,7 @@ class Sizing(Published):
 
     @property
     def lacking(self) -> tuple[MotorSizing, ...]:
-        """The motors for which nothing does."""
+        """Yield the nearest choice and its obstacle for each motor for which nothing will do."""
         return tuple(motor for motor in self.motors if not motor.does)
 
     def __str__(self) -> str:
@@ -118,11 +118,11 @@ WORDS = {
     "velocity": "speed",
     "voltage": "voltage",
 }
-"""Of the limits of a motor."""
+"""Words for the limits of a motor."""
 
 
 def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """What the sizing does not know of."""
+    """Yield effects that the sizing leaves out."""
     for outcome in outcomes:
         if outcome.left_out:
             yield (
@@ -132,7 +132,7 @@ def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
 
 
 def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """What is asked of any motor."""
+    """Yield the demand on any motor."""
     if not motors:
         return
     rows = [("asked, joint side", "peak load", "at", "rms load", "speed", "acceleration")]
@@ -153,7 +153,7 @@ def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str
 
 
 def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """What the robot's own motors do, on their shafts or, without known gears, on the joint's side."""
+    """Yield the use of the robot's own motors, on their shafts or, without known gears, on the joint side."""
     if not motors:
         return
     rows = [
@@ -214,7 +214,7 @@ def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
 
 
 def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
-    """For each motor for which nothing does, what comes nearest to it and what is in its way."""
+    """Yield the nearest choice and its obstacle for each motor for which nothing will do."""
     for motor in motors:
         shares = motor.best.shares if motor.best else motor.own.shares if motor.own else {}
         beyond = [
@@ -239,7 +239,7 @@ def _other_gears(motor: MotorSizing) -> str:
 
 
 def spring_table(springs: Sequence[SpringDemand], *, several: bool) -> Iterator[str]:
-    """What each spring must bear."""
+    """Yield the demand on each spring."""
     known = [spring for spring in springs if math.isfinite(spring.energy.value)]
     if not known:
         return

@@ -159,7 +159,7 @@ class Recorder:
 
     @property
     def curves(self) -> FloatArray:
-        """What was gathered, one step after the other, all variables of each; flat."""
+        """Return the gathered values, sample after sample, all variables of each; flat."""
         return np.concatenate(self._rows).ravel() if self._rows else np.empty(0)
 
 

@@ -1,4 +1,4 @@
-"""What varies over a study, with the values of each run: entries of `vary:` held against its files.
+"""Dimensions of a study with the values of each run: entries of `vary:` checked against its files.
 
 An entry becomes one `Dimension`, or several if a distribution fits several numbers. A `Design` combines the
 values of all: a grid, or points that are drawn.
@@ -34,7 +34,7 @@ from vsacli.trajectory.changes import divided
 from vsacli.trajectory.file import read_trajectory
 
 MOST_VALUES = 1_000_000
-"""Of one path: more than any study has runs."""
+"""Most values of one path: more than any study has runs."""
 
 
 class Held(NamedTuple):
@@ -74,7 +74,7 @@ def _type(number: NumberAt, joint_types: Mapping[str, str]) -> str:
 
 
 class Dimension(NamedTuple):
-    """What one path leads to, over a study.
+    """The values of one path over a study.
 
     Attributes:
         path: to a number, or to several that take the same value, or to anything else.
@@ -117,7 +117,7 @@ class Dimension(NamedTuple):
 def dimensions_of(
     varied: Varied, numbers: Sequence[Held], before: Sequence[Dimension]
 ) -> Iterator[Dimension]:
-    """What a path of the study file varies: a dimension, or of a distribution one for each number that fits.
+    """Yield the dimensions of a path: one, or one for each parameter of a distribution.
 
     Args:
         varied: the entry of the file.
@@ -202,7 +202,7 @@ def _number(text: str, unit: str) -> float:
 
 
 class Entries:
-    """What varies, and what is wrong with it.
+    """The entries of `vary:`, with their problems.
 
     Args:
         file: what the study file says.
@@ -226,7 +226,7 @@ class Entries:
         return tuple(dimension for _, dimension in self._found)
 
     def dimensions(self) -> tuple[Dimension, ...]:
-        """What varies.
+        """Return the dimensions.
 
         Raises:
             InputError: entries do not fit what is there, each with its line.
@@ -283,7 +283,7 @@ def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
 
 
 MOST_RUNS = 1_000_000
-"""At some 10 ms each that is three hours; the table has 300 MB."""
+"""Most runs: at some 10 ms each that is three hours; the table has 300 MB."""
 
 
 class Design:
@@ -312,7 +312,7 @@ class Design:
         self._shares = None if file.method == GRID else _shares(file, self.points, len(self._own))
 
     def different(self, dimensions: Sequence[Dimension]) -> int:
-        """How many different values some dimensions have together."""
+        """Return how many different values some dimensions have together."""
         own = [each for each in dimensions if not each.linked]
         if self._shares is not None and own:
             return self.points

@@ -32,10 +32,10 @@ RUNS_A_PROCESS = 25
 """A process takes as long to begin as some 25 short runs."""
 
 LOCAL = "local"
-"""In place of an address: a cluster of processes of this machine."""
+"""Stands for an address: a cluster of processes of this machine."""
 
 TASK_SECONDS = 0.5
-"""What a task shall take: about a hundred times what Dask takes for it, and what a killed worker costs."""
+"""Seconds of a task: about a hundred times the overhead of Dask, and the loss by a killed worker."""
 
 TASKS_A_THREAD = 2
 """Given to the cluster at a time: one is computed, the next one waits at the worker."""
@@ -117,7 +117,7 @@ class Executor(ABC):
         """
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
-        """As of `Rows`."""
+        """See `Rows.rows`."""
         waiting, given = deque(runs), dict[Future[Answer], list[int]]()
         while waiting or given:
             while waiting and (task := self.next_task(waiting, len(given))):
@@ -303,7 +303,7 @@ class Cluster(Executor):
         ) from error
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
-        """As of `Rows`."""
+        """See `Rows.rows`."""
         try:
             yield from super().rows(runs)
         except InputError:

@@ -28,7 +28,7 @@ FIRST_LINE = b"vsacli-study-journal/1\n"
 """Without it a file is somebody else's, whatever it is called."""
 
 SYNC_SECONDS = 1.0
-"""How often rows are forced to the disk: what a power failure may cost; a kill costs none."""
+"""Interval at which rows are forced to the disk: the loss by a power failure; a kill loses none."""
 
 
 class Journal:
@@ -186,7 +186,7 @@ def _line(row: Row) -> bytes:
 
 
 def _row_in(line: bytes) -> tuple[int, str]:
-    """Where the row begins that a line ends with, and its key; no key if it ends with none.
+    """Return the start of the row at the end of a line, and its key; no key without such a row.
 
     A line whose break is damaged is followed by a row that is whole.
     """

@@ -29,17 +29,17 @@ from vsacli.trajectory.file import declared_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
 FAILED = "failed"
-"""In place of the verdict of a run that could not be computed."""
+"""Verdict of a run that could not be computed."""
 
 IMPOSSIBLE = "impossible"
-"""In place of the verdict of a run for which no feasible optimum was found."""
+"""Verdict of a run without a feasible optimum."""
 
 LOST = "the process that computed it"
-"""How the error of a run begins that was lost with its process."""
+"""Beginning of the error of a run that was lost with its process."""
 
 
 class Row(NamedTuple):
-    """What is known of a run.
+    """The row of a run.
 
     Attributes:
         run: its number.

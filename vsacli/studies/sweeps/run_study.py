@@ -149,7 +149,7 @@ def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object])
 
 @contextmanager
 def _telling_what_is_kept(journal: Journal, tell: Callable[[str], object]) -> Iterator[None]:
-    """Whatever ends the study, say what it does not cost."""
+    """Report, when the study ends early, the rows that are kept."""
     try:
         yield
     except BaseException:

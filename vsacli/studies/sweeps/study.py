@@ -53,14 +53,14 @@ def settled_engine(
 def _samples(
     robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> int:
-    """How many steps the runs of one robot have, if all are as long as the first along each trajectory."""
+    """Return the samples of the runs of one robot, if all last as the first along each trajectory."""
     changes = divided(design.values(0)).trajectory
     robots = design.different([each for each in dimensions if divided({each.path: None}).robot])
     return sum(_steps(path, robot, changes) for path in trajectories) * design.points // robots
 
 
 def _steps(path: str, robot: Robot, changes: Changes) -> int:
-    """Those of the first run, or if it cannot be computed those of the file."""
+    """Return the samples of the first run, or of the file if that cannot be computed."""
     try:
         return load_trajectory(path, robot, changes).samples
     except InputError:
@@ -72,7 +72,7 @@ class ChangedError(InputError):
 
 
 class Point(NamedTuple):
-    """What is computed in a run: the trajectory by its index, and the value of each dimension by path."""
+    """The inputs of a run: the trajectory by its index, and the value of each dimension by path."""
 
     trajectory: int
     values: dict[str, Any]
@@ -113,22 +113,22 @@ class Study:
 
     @property
     def runs(self) -> int:
-        """How many there are."""
+        """Number of runs."""
         return len(self.trajectories) * self.design.points
 
     @property
     def kept(self) -> tuple[Column, ...]:
-        """What is kept of each run."""
+        """Columns stored for each run."""
         return tuple(KEPT[name] for name in dict.fromkeys(self.file.keep or KEPT))
 
     @property
     def costs(self) -> tuple[Column, ...]:
-        """What is kept of each run's optimum, if one is looked for."""
+        """Columns stored for each run's optimum, if one is computed."""
         return () if self.file.optimize is None else self.file.optimize.costs
 
     @property
     def over_time(self) -> tuple[Column, ...]:
-        """What is kept of each run over time."""
+        """Columns stored for each run over time."""
         return over_time(self.file.variables or ())
 
     @property
@@ -142,13 +142,13 @@ class Study:
         return list(dict.fromkeys(files))
 
     def point(self, run: int) -> Point:
-        """What is computed in a run; those of one trajectory come one after the other."""
+        """Return the inputs of a run; those of one trajectory are consecutive."""
         trajectory, point = divmod(run, self.design.points)
         return Point(trajectory, self.design.values(point))
 
     @cached_property
     def digest(self) -> str:
-        """Of all that the rows of the study depend on, beside the values of a run; in hex."""
+        """Digest of all that the rows of the study depend on, apart from the values of a run; in hex."""
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
         curves = [self.file.every, *(each.name for each in self.over_time)]
@@ -158,7 +158,7 @@ class Study:
 
     @property
     def computed_by(self) -> dict[str, str]:
-        """What computes, with versions, by words for it: on another one rows may differ in the last digit."""
+        """Backend and versions, by words for them: with others rows may differ in the last digit."""
         return {
             "vsacli": __version__,
             "NumPy": np.__version__,
@@ -168,7 +168,7 @@ class Study:
 
     @property
     def fingerprint(self) -> str:
-        """Of the study as a whole: of all its files, and of what computes it; in hex."""
+        """Digest of the study as a whole, with all its files and its backend; in hex."""
         return _digest([self.digest, [source.sha256 for source in self.sources]])
 
     @cached_property
@@ -219,7 +219,7 @@ class Study:
         )
 
     def key(self, point: Point) -> str:
-        """Of all that a row depends on; in hex."""
+        """Return the digest of all that a row depends on; in hex."""
         trajectory = [source.sha256 for source in self.trajectory_sources[point.trajectory]]
         return _digest([self.digest, trajectory, point.values])
 

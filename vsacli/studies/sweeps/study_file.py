@@ -135,7 +135,7 @@ def _way(node: Node) -> Way:
 
 
 def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
-    """What a mapping says."""
+    """Return the variation of a mapping."""
     key = next(iter(entries))
     if LINKED in entries:
         texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}
@@ -178,7 +178,7 @@ _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
 
 @dataclass(frozen=True)
 class Optimised:
-    """What is optimised, by names and defaults of the options of `vsacli optimize`."""
+    """The optimization of each run, by names and defaults of the options of `vsacli optimize`."""
 
     minimize: str = choice(
         MINIMIZED,
@@ -207,11 +207,11 @@ class Optimised:
 
     @property
     def varied(self) -> str:
-        """What varies."""
+        """Varied quantities."""
         return self.vary or (TIMING if self.minimize == TIME else STIFFNESS)
 
     def optimum(self, robot: Robot, trajectory: Trajectory) -> Optimum:
-        """That of a run.
+        """Return the optimum of a run.
 
         Raises:
             InputError: what is asked cannot be asked of this robot and trajectory.
@@ -231,7 +231,7 @@ class Optimised:
 
     @property
     def costs(self) -> tuple[Column, Column]:
-        """What the table says of it."""
+        """Columns of the table for it."""
         dims, quantity, words = self._cost
         return (
             Column("cost_before", dims, quantity, f"{words} as commanded"),

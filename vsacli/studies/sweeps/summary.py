@@ -1,4 +1,4 @@
-"""What a study found, in a few lines, and as JSON."""
+"""Summary of a study in a few lines, and as JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_ERRORS = 3
 
 
 MOST_NUMBERS = 3
-"""That vary and are shown with a run; of more, the table tells."""
+"""Most parameters shown with a run; the table has the others."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Extreme(Stored):
 
 @dataclass(frozen=True)
 class StudySummary(Stored):
-    """What a study found.
+    """The findings of a study.
 
     Attributes:
         study, robot: names.
@@ -69,7 +69,7 @@ class StudySummary(Stored):
 
     @classmethod
     def of(cls, table: StoredStudy) -> StudySummary:
-        """That of a table."""
+        """Return the summary of a table."""
         verdicts, errors, runs = table.texts("verdict"), table.texts("error"), table.read("run").tolist()
         return cls(
             study=table.study_name,
@@ -119,7 +119,7 @@ def _worst(table: StoredStudy) -> list[Extreme]:
 
 
 def _shown(table: StoredStudy, row: int) -> dict[str, str]:
-    """What a row has of what is not the same in all."""
+    """Return the values of a row that are not equal in all."""
     shown = {}
     for path in (*table.parameters, "trajectory"):
         is_text = table.parameter_is_text(path)

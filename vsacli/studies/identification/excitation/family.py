@@ -65,7 +65,7 @@ class Allowed(NamedTuple):
 
 
 def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
-    """What a robot's joints may do.
+    """Return the allowed ranges of a robot's joints.
 
     Args:
         robot: the robot.
@@ -119,10 +119,10 @@ def _lacking(joint: Joint, middle: str) -> Iterator[str]:
 
 
 LEAST_SHARE = 0.1
-"""Of the largest stiffness, which it does not fall below where springs may go slack."""
+"""Share of the largest stiffness that it does not fall below where springs may go slack."""
 
 HARMONICS = 5
-"""Of each signal of a joint, as in Swevers et al. (1997)."""
+"""Harmonics of each signal of a joint, as in Swevers et al. (1997)."""
 
 RATE = 1000.0
 """Samples per second of the trajectory, and so of the recording that is planned for."""
@@ -131,8 +131,8 @@ RAMP = 0.1
 """Share of the duration in which the sums rise from rest, and fall to it."""
 
 SAMPLES_PER_PERIOD = 24
-"""Of the highest harmonic, where limits are watched and information is summed: an extreme lies at most 0.9 %
-of an amplitude beyond such samples, within `MARGIN`."""
+"""Samples per period of the highest harmonic, where limits are watched and information is summed: an
+extreme lies at most 0.9 % of an amplitude beyond such samples, within `MARGIN`."""
 
 DIGITS = 4
 """Significant ones of amplitudes and offsets, as the file has them."""
@@ -159,12 +159,12 @@ class Design:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the numbers of a member: (signals, joints, numbers)."""
+        """Shape of the parameters of a member: (signals, joints, parameters)."""
         return 2, len(self.robot.joints), 2 * HARMONICS + 2
 
     @property
     def counts(self) -> BoolArray:
-        """Which numbers count, (signals, joints)."""
+        """Parameters that count, (signals, joints)."""
         return np.array([[True] * len(self.robot.joints), self._takes_stiffness])
 
     @property
@@ -284,7 +284,7 @@ def _digits(value: float) -> float:
 
 
 BISECTIONS = 6
-"""Of the share of a motion that limits allow, down to 1.6 %."""
+"""Bisections of the share of a motion that limits allow, down to 1.6 %."""
 
 ROUNDED = 1e-3
 """Relative clearance by which digits of a file, and what lies between samples, may miss the margin."""
@@ -334,7 +334,7 @@ def least_clearances(design: Design, block: Block) -> FloatArray:
 
 
 def watched(design: Design) -> list[Bounded]:
-    """What has bounds and is moved; dampers stand at the least of their ranges."""
+    """Return the bounded quantities that move; dampers are at their minimum."""
     quantities = bounded_quantities(design.robot)
     return [each for each in quantities if Flag.DAMPING_LIMIT not in each.bits]
 
@@ -351,7 +351,7 @@ def _tried(design: Design, numbers: FloatArray, share: float) -> Member | None:
 
 
 def obstacle(design: Design, numbers: FloatArray) -> str:
-    """What a member that is nearly at rest lacks to be feasible, a clause."""
+    """Return the obstacle that makes a member nearly at rest infeasible, a clause."""
     try:
         trajectory = design.member(numbers, 0.0)
     except ImpossibleError as error:

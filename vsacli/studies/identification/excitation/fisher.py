@@ -1,4 +1,4 @@
-"""How much a motion tells of the numbers of its robot: Fisher information, and predicted standard errors.
+"""Information of a motion on the parameters of its robot: Fisher information, predicted standard errors.
 
 `Information` compares motions by the slopes of the equations of identification alone. `predicted_errors`
 draws noisy recordings of one motion and identifies the robot from them.
@@ -30,7 +30,7 @@ from vsacli.studies.identification.regressor import names
 from vsacli.trajectory.trajectory import Trajectory
 
 ALL_PASS = Filter(bandwidth=np.inf, sections=np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), stride=1, reach=0)
-"""For motions without noise."""
+"""Filter for motions without noise."""
 
 TOLERANCE = 1e-6
 """Share of a column that no combination of others explains, from which on its unknown can be told by some
@@ -43,7 +43,7 @@ below; without, one search in three left 30 and more, which multiplies what the 
 
 
 class Information:
-    """What motions tell of the numbers of a robot.
+    """The information of motions on the parameters of a robot.
 
     The motors and springs of each joint are a system of equations of their own, the links of all joints
     another. There the torques of each joint count by their size, since those of a wrist are far smaller than
@@ -73,12 +73,12 @@ class Information:
         self.structural = tuple(self._untold(splits))
 
     def _splits(self, examples: Sequence[Block]) -> list[Independence]:
-        """Of each system, the unknowns that some motion tells apart, and the others."""
+        """Return for each system the unknowns that some motion distinguishes, and the others."""
         systems = zip(*map(self._slopes, examples), strict=True)
         return [independence(np.concatenate(slopes), TOLERANCE) for slopes in systems]
 
     def _untold(self, splits: Sequence[Independence]) -> Iterator[str]:
-        """What no motion tells, in words."""
+        """Yield the parameters that no motion identifies, in words."""
         for system, split in zip(self._systems, splits, strict=True):
             own = system.names
             if split.nothing.size:
@@ -104,7 +104,7 @@ class Information:
             yield slopes
 
     def worth(self, block: Block) -> float:
-        """What a motion tells, less what is too badly conditioned for equations that hold but roughly.
+        """Return the information of a motion, less a penalty for poorly conditioned equations.
 
         What it tells is the logarithm of the determinant of the information matrix, of one row on average,
         over twice the unknowns: D-optimality. It does not depend on the units of the unknowns, and is greater
@@ -144,8 +144,11 @@ POSITION_NOISE = 2e-5
 """Rad (m), of the last step of an encoder with 16 bits."""
 
 RECORDS = 3
-"""That are drawn, each with a noise of its own. A number that may not be negative and comes out at zero is
-held there, which makes standard errors of others smaller, of some by a third: so their mean is taken."""
+"""Recordings that are drawn, each with its own noise.
+
+A parameter that may not be negative and comes out at zero is held there, which reduces standard errors of
+others, of some by a third: so their mean is taken.
+"""
 
 TORQUE_SHARE = 0.005
 """Noise of a motor's torque over the largest of it, where nobody says more: as of measured currents."""
@@ -189,7 +192,7 @@ class Told(Published):
 
 
 def predicted_errors(robot: Robot, trajectory: Trajectory, noise: Noise, seed: int) -> tuple[Told, ...]:
-    """What an identification from one record of a motion will tell, if the robot is as its file says.
+    """Return the predicted identification from one recording of a motion, if the robot is as in its file.
 
     Args:
         robot: the robot.
@@ -222,7 +225,7 @@ def _identified(robot: Robot, record: Signals) -> list[Number]:
 
 
 def noisy_record(robot: Robot, block: Block, noise: Noise, random: np.random.Generator) -> Signals:
-    """What would be recorded of a motion, ready for equations."""
+    """Return a simulated recording of a motion, ready for equations."""
     q, theta = (each + noise.position * random.standard_normal(each.shape) for each in (block.q, block.theta))
     for index, joint in enumerate(robot.joints):
         if not joint.actuator.sprung:

@@ -41,8 +41,11 @@ STARTS = 60
 """Random members, in turn of each family."""
 
 STEPS = 540
-"""Of the strategy. On the paper's arm these made standard errors 30 % smaller than those of the best start,
-on average; 240 steps left them 10 % larger, and searches with other seeds differ by 5 %."""
+"""Steps of the strategy.
+
+On the paper's arm these made standard errors 30 % smaller than those of the best start, on average; 240 steps
+left them 10 % larger, and searches with other seeds differ by 5 %.
+"""
 
 FIRST_STEP = 0.5
 """Standard deviation of the first change, of numbers whose own is 1."""
@@ -108,8 +111,8 @@ def _better(
 
 
 FREQUENCIES = (0.05, 0.1, 0.2)
-"""Of the lowest harmonics that are tried, Hz: at five harmonics motions are of 1 Hz at most, well within what
-the low-pass of records lets through, and below the resonance of arms of robots."""
+"""Lowest harmonics tried, Hz: at five harmonics motions are of 1 Hz at most, well within the low-pass of
+recordings, and below the resonance of arms of robots."""
 
 SHORTEST = 5.0
 """Duration, s: one period of the fastest family."""
@@ -204,7 +207,7 @@ def _excitation(
     noise: Noise,
     seed: int,
 ) -> Excitation:
-    """What was found, checked by a run of its own."""
+    """Return the excitation, checked by a run of its own."""
     design, trajectory, block = found.design, found.trajectory, found.block
     run = Run(design.robot, trajectory)
     for _ in run:
@@ -226,7 +229,7 @@ def _excitation(
 def _usefulness(
     information: Information, robot: Robot, trajectory: Trajectory, noise: Noise, seed: int
 ) -> Usefulness:
-    """What a motion tells, with standard errors unless it is too short for them."""
+    """Return the usefulness of a motion, with standard errors unless it is too short for them."""
     conditions = information.conditions(executed(robot, trajectory))
     try:
         return Usefulness(conditions, predicted_errors(robot, trajectory, noise, seed))

@@ -50,7 +50,7 @@ class ActiveLimit(Published):
 
 @dataclass(frozen=True)
 class Usefulness(Published):
-    """What a motion tells of the numbers of a robot.
+    """The information of a motion on the parameters of a robot.
 
     Attributes:
         conditions: of the equations of each joint's motors and springs by name of the joint, and of `links`;
@@ -151,7 +151,7 @@ def _error(number: Told | None) -> str:
 
 
 def _share(number: Told) -> str:
-    """Of the number, unless that is zero."""
+    """Return the error as a share of the value, unless that is zero."""
     if number.value == 0 or math.isnan(number.standard_error):
         return "-"
     share = number.standard_error / abs(number.value)
@@ -178,7 +178,7 @@ def excitation_text(excitation: Excitation) -> str:
 
 
 def _head(excitation: Excitation) -> Iterator[str]:
-    """What reads the file should know."""
+    """Yield comments for readers of the file."""
     names = ", ".join(excitation.robot.joint_names)
     yield (
         f"Excitation to identify {excitation.robot.name} by; planned by vsacli {__version__}, seed "
