@@ -32,14 +32,11 @@ if TYPE_CHECKING:
     from vsacli.robot.models.mjcf_drives import Start
 
 ENDINGS = {
-    "csv": (".csv",),
-    "mat": (".mat",),
-    "parquet": (".parquet",),
     "joint-trajectory": (".json", ".yaml", ".yml"),
     "urdf": (".urdf", ".xml"),
     "mjcf": (".mjcf", ".xml"),
 }
-"""Endings of file names by format."""
+"""Endings of file names by format, where these are not its own name."""
 
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 """Options that say nothing of a robot."""
@@ -129,18 +126,22 @@ def export(
     return _export_result(file, output, OF_RESULTS[name], options, overwrite, talk)
 
 
+def _endings(form: str) -> tuple[str, ...]:
+    return ENDINGS.get(form, (f".{form}",))
+
+
 def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
     """Return the format named by --format or by the ending of the output; CSV without either."""
     words, name = ", ".join(formats), output or ""
     if form is not None and form not in formats:
         raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
-    able = [each for each in formats if ending_of(name) in ENDINGS[each]]
+    able = [each for each in formats if ending_of(name) in _endings(each)]
     if ending_of(name) and not able:
-        endings = ", ".join(dict.fromkeys(ending for each in formats for ending in ENDINGS[each]))
+        endings = ", ".join(dict.fromkeys(ending for each in formats for ending in _endings(each)))
         raise InputError.one(f"no format of a {kind} has such a name; there is {endings}", name)
     if form is not None:
         if able and form not in able:
-            message = f"--format {form} makes no file of this name; name it {ENDINGS[form][0]}"
+            message = f"--format {form} makes no file of this name; name it {_endings(form)[0]}"
             raise InputError.one(message, name)
         return form
     if len(able) != 1 and formats is not OF_RESULTS:
