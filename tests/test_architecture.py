@@ -54,7 +54,7 @@ change that needs more raises these, with its reason in its message; one that ne
 TALK = ("print", "sys.stdout", "sys.stderr", "sys.exit", "logging", "warnings.warn")
 
 PAGE = (REPOSITORY / "docs" / "contributing.md").read_text(encoding="utf-8")
-ENTRIES = ROW.findall(PAGE.partition("\n## Rooms\n")[2].partition("\n## ")[0])
+ENTRIES = ROW.findall(PAGE.partition("\n## Packages\n")[2].partition("\n## ")[0])
 """What lies in the package, from the rooms at the bottom to the entrances."""
 
 ROOMS = [entry for entry in ENTRIES if "." not in entry]

@@ -291,7 +291,7 @@ def test_the_numbers_in_the_text_are_those_of_the_code(format_page: str) -> None
 
 def test_every_extra_package_has_its_reason() -> None:
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    table = (REPOSITORY / "docs" / "contributing.md").read_text(encoding="utf-8")
+    table = (REPOSITORY / "docs" / "dependencies.md").read_text(encoding="utf-8")
     for requirement in (each for extra in project["optional-dependencies"].values() for each in extra):
         name = re.match(r"[\w-]+", requirement)
         assert name
