@@ -47,9 +47,17 @@ NOT_FOR_THE_MAIN_JOB = (
 )
 """Modules, here and elsewhere, that take time to import and have no part in the paper's example."""
 
-MOST_FILES, MOST_LINES, MOST_SHARED_NAMES = 420, 78_700, 19
-"""How many files and lines of Python the package has at most, and names of files that several folders have. A
-change that needs more raises these, with its reason in its message; one that needs less lowers them."""
+MOST_FILES, MOST_LINES, MOST_SHARED_NAMES, MOST_HEADLESS = 420, 78_700, 19, 2
+"""How many files and lines of Python the package has at most, names of files that several folders have, and
+docstrings that begin without a verb or a noun. A change that needs more raises these, with its reason in its
+message; one that needs less lowers them."""
+
+HEADLESS = re.compile(
+    r"(and|as|at|but|by|each|for|from|has|how|if|in|is|its?|of|on|so|than|that|those|to|what|when|where|which|while"
+    r"|who|whom|whose|with)\b",
+    re.IGNORECASE,
+)
+"""Words with which no docstring begins: it names its subject, or says what to do."""
 
 TALK = ("print", "sys.stdout", "sys.stderr", "sys.exit", "logging", "warnings.warn")
 
@@ -146,6 +154,21 @@ def test_the_package_grows_only_on_purpose() -> None:
     assert len(SOURCES) <= MOST_FILES
     assert sum(len(source.read_text(encoding="utf-8").splitlines()) for source in SOURCES) <= MOST_LINES
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
+
+
+def docstrings(source: Path) -> Iterator[str]:
+    """Yield the docstrings of modules, classes and functions, and the texts below constants."""
+    for node in ast.walk(parsed(source)):
+        body = getattr(node, "body", [])
+        for statement in body if isinstance(body, list) else []:
+            match statement:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    yield text
+
+
+def test_docstrings_begin_with_their_subject() -> None:
+    headless = [text for source in SOURCES for text in docstrings(source) if HEADLESS.match(text)]
+    assert len(headless) <= MOST_HEADLESS
 
 
 def test_libraries_stay_at_home() -> None:
