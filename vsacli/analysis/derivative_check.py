@@ -161,7 +161,7 @@ def _ladder(
 
     Args:
         kernel: of the robot.
-        trajectory: what it is asked to do.
+        trajectory: the commanded motion.
         compute: gives everything at times.
         times: (times,), s.
         steps: (scales, times), s.

@@ -28,7 +28,7 @@ class Report(Stored):
         samples: steps computed, both ends included.
         duration: time from the first to the last step of the trajectory, s.
         complete: whether every step of the trajectory was computed.
-        warnings: why the inputs may not be what was meant.
+        warnings: doubts about the inputs.
         notes: how they were understood, where that is not obvious.
         self_check: outcome of the self-check.
         joints: one report a joint.

@@ -46,7 +46,7 @@ class Run:
 
     Args:
         robot: the robot.
-        trajectory: what it is asked to do.
+        trajectory: the commanded motion.
         stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does; one that is
             nearest to something infeasible between the steps counts.
         near_singular: margin below which a step is near-singular.

@@ -58,7 +58,7 @@ class RunUncertainty:
             robot: the robot.
             trajectory: along which at least one signal was recorded and fitted.
             asked: the variables that decide, see `judged_variables`.
-            engine: what computes.
+            engine: the backend.
         """
         self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
         first, last = trajectory.times.span

@@ -73,7 +73,7 @@ class Chain(NamedTuple):
         links: constants of each joint and link.
         states: pose and motion of each joint.
         gravity: gravity acceleration in frame 0, m/s^2.
-        tip: what the end effector exerts on the environment, if anything; N and N m per s^k.
+        tip: load of the end effector on the environment, if any; N and N m per s^k.
     """
 
     links: Sequence[LinkConstants]

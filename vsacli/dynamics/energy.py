@@ -270,7 +270,7 @@ class RunEnergy:
 
     Args:
         robot: the robot.
-        engine: what computes.
+        engine: the backend.
     """
 
     def __init__(self, robot: Robot, engine: Engine) -> None:

@@ -47,7 +47,7 @@ class Task:
     """A robot and what it is asked to do; deflections are (joints, 2, samples).
 
     Attributes:
-        trajectory: what it is asked to do.
+        trajectory: the commanded motion.
         joints: those whose deflections can be integrated.
     """
 
@@ -287,7 +287,7 @@ def integrate_deflections(
 
     Args:
         robot: the robot.
-        trajectory: what it is asked to do.
+        trajectory: the commanded motion.
         tolerance: relative error admitted in an integration step, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()

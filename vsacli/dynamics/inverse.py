@@ -203,7 +203,7 @@ def compute_block(
         motion: commanded motion and stiffness, (samples, joints); the actuators that take no stiffness
             have a stiffness of their own, or none.
         near_singular: margin below which a step is near-singular.
-        engine: what computes.
+        engine: the backend.
         internal: what moves inside the transmissions that are damped, by index of the joint; if None, all of
             them are where their springs carry the joint alone, or where their damper is said to start.
     """
@@ -226,7 +226,7 @@ def block_of(
     Args:
         kernel: what is computed, and in which block it comes.
         motion: as of `compute_block`.
-        engine: what computes.
+        engine: the backend.
         integrated: deflections of the joints, if the kernel takes them, (joints, 2, samples); a step where
             they are NaN is infeasible.
         internal: what moves inside the joints that the kernel names.

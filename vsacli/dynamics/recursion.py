@@ -94,7 +94,7 @@ def recursion(
         links: constants of each joint and link, base to tip.
         states: pose and motion of each joint, in the same order.
         gravity: gravity acceleration in frame 0, m/s^2.
-        tip: what the end effector exerts on the environment, if anything; N and N m per s^k.
+        tip: load of the end effector on the environment, if any; N and N m per s^k.
 
     Returns:
         tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.

@@ -56,7 +56,7 @@ class Uncertainty:
         Args:
             robot: the robot.
             trajectory: for this robot, with estimated signals.
-            engine: what computes.
+            engine: the backend.
         """
         estimates = trajectory.estimates
         self._start, self._elapsed = trajectory.start, probed_times(trajectory)
@@ -137,7 +137,7 @@ def deviations(
         motion: at some times.
         estimates: the signals that were recorded.
         covariances: of these at the times, (components, orders, orders, times), as of `SampledProfile`.
-        engine: what computes.
+        engine: the backend.
     """
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [

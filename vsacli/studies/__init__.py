@@ -1,4 +1,4 @@
-"""Questions beyond a run: what would make it possible, what matters in it, what was measured of it."""
+"""Questions beyond a run: fixes, optima, sensitivity, identification, sizing, comparison."""
 
 from typing import TYPE_CHECKING
 

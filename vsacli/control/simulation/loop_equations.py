@@ -127,7 +127,7 @@ class Computing(NamedTuple):
 
     Attributes:
         engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
-        tell: learns what goes wrong with compiled code, and what will take long, before it does.
+        tell: receives problems with compiled code, and announcements of long work.
         runs: how many share what is compiled.
     """
 

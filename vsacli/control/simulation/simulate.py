@@ -150,7 +150,7 @@ def simulate(
             where that saves time.
         runs: how many such runs there will be, of robots that differ in numbers at most: what is compiled
             serves them all, so it is worth it sooner.
-        tell: learns what goes wrong with compiled code, and what will take long, before it does.
+        tell: receives problems with compiled code, and announcements of long work.
 
     Raises:
         InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions

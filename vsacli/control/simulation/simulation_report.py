@@ -80,7 +80,7 @@ class SimulationReport(Stored):
         evaluations: of the equations of motion.
         budget: how many there might have been; 0 in reports written before there was one.
         methods: of integration, each from its time on; none in such reports.
-        warnings: why the inputs may not be what was meant.
+        warnings: doubts about the inputs.
         notes: how they were understood, where that is not obvious.
         joints: one report a joint.
         with_full_state: deviation of q of each joint in the same run when the controller knows the full state

@@ -35,7 +35,7 @@ tells little, links are rather an error off than far from the file's. With 0.01 
 kg."""
 
 WITHIN = 3.0
-"""Standard errors that what was found may be off from that of bodies: of forty numbers one is beyond two."""
+"""Standard errors by which the result may differ from that of bodies: of forty numbers one is beyond two."""
 
 LEAST_MASS = 1e-3
 """Mass of the body with which a link without one is compared, over that of the heaviest link."""
@@ -86,7 +86,7 @@ class ConsistentLinks(NamedTuple):
 
     @property
     def within(self) -> bool:
-        """Whether bodies can have what was found, within its errors."""
+        """Whether bodies can have the result, within its errors."""
         return bool(np.all(np.abs(self.off) <= WITHIN))
 
 
@@ -95,7 +95,7 @@ def consistent_links(robot: Robot, told: Told) -> ConsistentLinks:
 
     Args:
         robot: the robot as its file has it.
-        told: what was found.
+        told: the result.
     """
     if not len(told.values):
         return ConsistentLinks((), told.values)
@@ -146,7 +146,7 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
 
 
 class _Problem(NamedTuple):
-    """Parameters x = centre + directions @ s, of which the first s are errors of what was found.
+    """Parameters x = centre + directions @ s, of which the first s are errors of the result.
 
     Attributes:
         centre: parameters with the values that were found, (parameters,).

@@ -23,7 +23,7 @@ class Equations(NamedTuple):
     """Equations of one record that are linear in the changes of some unknowns, rows in any order.
 
     Attributes:
-        measured: what was measured, (rows,).
+        measured: measured values, (rows,).
         predicted: the same by the present numbers, (rows,).
         slopes: its derivatives by the unknowns, (rows, unknowns).
         group: names of the noise in each row, (rows,): rows of one name have noise of one size.
@@ -49,14 +49,14 @@ class System(NamedTuple):
     """The equations of all records, one below the other.
 
     Attributes:
-        measured: what was measured, (rows,).
-        residual: that less what is predicted, (rows,).
-        slopes: derivatives of what is predicted, (rows, unknowns).
+        measured: measured values, (rows,).
+        residual: that less the prediction, (rows,).
+        slopes: derivatives of the prediction, (rows, unknowns).
         groups: names of noise.
         group: of each row, index in `groups`, (rows,).
         record: of each row, (rows,).
         sample: of each row in its record, (rows,).
-        errors: of what is measured, (rows, errors).
+        errors: of the measurements, (rows, errors).
         noise: gives what noise of positions changes of the residual, (rows,), and of the slopes.
     """
 
@@ -159,7 +159,7 @@ more than filtered noise changes these columns by, and k_c came out off by its o
 sines leaves 0.1 and more."""
 
 QUIET = 1e-9
-"""Noise of a group, over what was measured, below which it is the rounding of filters and not noise."""
+"""Noise of a group over the measured values, below which it is the rounding of filters and not noise."""
 
 PASSES = 20
 """Times the noise of the groups is estimated at most; three or four do unless a group has hardly any rows."""
@@ -196,9 +196,9 @@ class Fit(NamedTuple):
             before, and the others make up for it.
         covariance: of that, (unknowns, unknowns), zero for those that are as before.
         condition: of the columns, each divided by its norm.
-        inseparable: what can be told of unknowns that cannot be told apart.
-        unexcited: unknowns that change nothing of what is predicted, (unexcited,).
-        residual_rms: root mean square of what is left in each group, corrected for the unknowns.
+        inseparable: identifiable combinations of indistinguishable unknowns.
+        unexcited: unknowns without effect on the prediction, (unexcited,).
+        residual_rms: root mean square residual of each group, corrected for the unknowns.
         converged: whether an iteration came to its end; see `gauss_newton`.
     """
 
@@ -236,7 +236,7 @@ def least_squares(
     present: FloatArray,
     tolerance: float = SEPARABLE,
 ) -> Fit:
-    """Solve linear equations; rows of each group count by its noise, which is estimated from what is left.
+    """Solve linear equations; rows of each group count by its noise, which is estimated from the residual.
 
     Standard errors hold for residuals of any colour, which groups may have in common; see `score_covariance`.
 
@@ -286,7 +286,7 @@ def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
 
 
 def _noise(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray:
-    """Root mean square of what is left in each group, (groups,), over the rows less what the fit took."""
+    """Root mean square residual of each group, (groups,), over the rows less the fitted unknowns."""
     freedom = np.maximum(system.by_group(1 - leverage), 1.0)
     return np.sqrt(system.by_group(left**2) / freedom)
 
@@ -303,7 +303,7 @@ def fit_of(
         system: the equations at the present numbers.
         present: those, (unknowns,).
         step: the solution.
-        before: what unknowns that cannot be told remain, (unknowns,).
+        before: values of unidentifiable unknowns, (unknowns,).
     """
     split, left = step.split, system.residual - system.slopes @ step.change
     solution = present + step.change
@@ -388,7 +388,7 @@ def gauss_newton(
         tolerance: as of `least_squares`.
 
     Returns:
-        What was found last; `converged` is false if the steps did not come to an end.
+        The last result; `converged` is false if the steps did not come to an end.
 
     Raises:
         InputError: there are no more equations than unknowns.
@@ -420,7 +420,7 @@ def _shorter(
 
 
 def _left(system: System, step: Step) -> float:
-    """Sum of the squares of what is left, in units of the noise; infinite where nothing is predicted."""
+    """Sum of squared residuals in units of the noise; infinite where nothing is predicted."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = float(np.sum((system.residual * step.weight) ** 2))
     return left if np.isfinite(left) else np.inf

@@ -1,7 +1,7 @@
-"""Structure of what equations leave: what would explain it, and which numbers it makes wrong.
+"""Structure of residuals: its possible causes, and the parameters that it makes wrong.
 
-What noise leaves has no structure. Each cause of `causes` is tested by `addition`; the one that explains most
-is taken, then what is left is tested again. What is found so is told if it matters: if a number would be
+Residuals of noise have no structure. Each cause of `causes` is tested by `addition`; the one that explains
+most is taken, then what is left is tested again. What is found so is told if it matters: if a number would be
 another one, by more than its standard error says, if most of what is left is no noise, or if that is too much
 anyway.
 """
@@ -30,7 +30,7 @@ from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.residual_causes import Cause, causes
 
 FEWEST_ROWS = 3
-"""Equations to an unknown below which residuals say too little of what columns are missing."""
+"""Equations to an unknown below which residuals say too little about missing columns."""
 
 
 class Addition(NamedTuple):
@@ -136,7 +136,7 @@ NOTHING = Explanation((), matters=False)
 
 
 def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fails: bool) -> Explanation:
-    """Explain what the equations of a joint's motors, or of all links, leave.
+    """Explain the residuals of a joint's motors, or of all links.
 
     Args:
         robot: the robot.

@@ -28,7 +28,7 @@ class SystemOfEquations(ABC):
     Attributes:
         title: whose numbers they are: the joint, or the links.
         names, units: of the numbers.
-        sums: what each number that the robot file does not have is the sum of; "" for the others.
+        sums: terms of each base parameter; "" for parameters of the robot file.
         before: their values by the robot file, (numbers,), SI units.
     """
 
@@ -69,8 +69,8 @@ class Bound(NamedTuple):
     """A number that came out as none that a robot has, so that it was set.
 
     Attributes:
-        value: what to.
-        standard_error: of what came out; NaN if the robot has nothing near it.
+        value: the held value.
+        standard_error: of the result; NaN if the robot has nothing near it.
     """
 
     value: float
@@ -129,7 +129,7 @@ def _equations(system: SystemOfEquations, records: Sequence[Signals], values: Fl
 def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:
     """Return the value to hold a parameter at; None if its result is admissible, or it cannot be identified.
 
-    That is what the file says if the record does not contradict it.
+    It is held at the value of the file if the recording agrees with it.
     """
     nearest, before = system.admissible(number, value), float(system.before[number])
     if nearest == value or math.isnan(error):
@@ -140,10 +140,10 @@ def _bound(system: SystemOfEquations, number: int, value: float, error: float) -
 
 
 def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
-    """Residual of each group on what its fit did not see, root mean square.
+    """Residual of each group on held-out samples, root mean square.
 
     Each of several records is predicted by a fit to the others, the last fifth of a single one by a fit to
-    what was before. NaN where that leaves too little.
+    the previous ones. NaN where that leaves too little.
     """
     parts = [(records[:at] + records[at + 1 :], record) for at, record in enumerate(records)]
     if len(records) == 1:

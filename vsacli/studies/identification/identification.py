@@ -58,7 +58,7 @@ WORDS = (*GROUPS, LINKS)
 """Words for groups of parameters."""
 
 FORCES = wrench_columns("wrench")
-"""Columns of what acts on the end effector."""
+"""Columns of the wrench on the end effector."""
 
 PUSHED = "nothing is found of links while something acts on the end effector"
 
@@ -80,9 +80,10 @@ def identify(
         robot: with numbers to begin with.
         recordings: CSV files with a column `time` and columns named as `vsacli export` names them: positions
             of joints and motors, and motor torques or currents; cells may be empty.
-        fit: what to find: words of `WORDS`, or patterns of paths such as `joints.elbow.actuator.spring.*`.
+        fit: parameters to identify: words of `WORDS`, or patterns of paths such as
+            `joints.elbow.actuator.spring.*`.
         bandwidth: of the filter, Hz; chosen from each record if None.
-        columns: a file that says what columns of the records with other names stand for.
+        columns: a file with the mapping of columns with other names.
 
     Raises:
         InputError: a record cannot be used, or `fit` names nothing.
@@ -171,12 +172,12 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
 def solutions(
     robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
 ) -> list[Solution]:
-    """Solve for motors joint by joint, then for all links, with what springs carry by those.
+    """Solve for motors joint by joint, then for all links, with the torques of their springs.
 
     Args:
         robot: the robot.
         joints: indices of those that were recorded.
-        fit: what to find, as of `identify`.
+        fit: see `identify`.
         signals: records.
     """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
@@ -286,7 +287,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
 
     Args:
         robot: as it was read from its file.
-        found: what was identified.
+        found: the identification.
         folder: where the text will stand.
 
     Raises:

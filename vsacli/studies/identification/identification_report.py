@@ -46,10 +46,10 @@ class Number(Published):
         path: to it, from the robot; of a base parameter, its name.
         unit: of all values.
         before: by the robot file.
-        value: what is found, or kept.
+        value: identified, or kept.
         standard_error: of that; NaN if it was not told.
         note: why it was not told, or is at a bound; empty otherwise.
-        sum: of a base parameter, which the file does not have, what of link numbers it is; else empty.
+        sum: terms of a base parameter, which the file does not have; else empty.
     """
 
     path: str
@@ -90,8 +90,8 @@ class Residual(Published):
     Attributes:
         group: which it is.
         unit: of all values.
-        torque: what was measured.
-        residual: that less what is predicted.
+        torque: measured values.
+        residual: that less the prediction.
         noise: of the measured torque, from where no motion is; NaN if it is not known.
         held_out: the residual where the fit did not see it; NaN if nothing was held out.
     """
@@ -112,7 +112,7 @@ class SystemReport(Published):
         title: whose they are.
         numbers: all that were looked for.
         condition: of the columns of the equations.
-        combinations: what can be told of numbers that cannot be told apart, sentences.
+        combinations: identifiable combinations of indistinguishable parameters, sentences.
         residuals: of each motor, or link.
         converged: whether the search came to an end.
     """
@@ -131,13 +131,13 @@ class RecordReport(Published):
 
     Attributes:
         path: of it.
-        duration: of what was used, s.
+        duration: of the used part, s.
         rate: samples a second.
         bandwidth: of the filter, Hz.
         delay: by which torques were later than positions, s; NaN if it could not be told.
         delay_error: its standard error.
         corrected: whether it was taken out.
-        doubts: what looks wrong, sentences.
+        doubts: likely faults, sentences.
         unused: columns that were not needed.
     """
 
@@ -184,8 +184,8 @@ class Identification(Published):
         robot: its name.
         verdict: `ok`, or the worst of `untold`, `misfit` and `doubtful`.
         records: how each was used.
-        systems: what was found, joint by joint.
-        notes: what else is to be known, sentences.
+        systems: results, joint by joint.
+        notes: further findings, sentences.
         fitted: the robot with the numbers found.
         torques: measured and predicted, for figures; not in JSON.
         sources: the files of the robot and the records, as they were read; not in JSON.
@@ -250,7 +250,7 @@ class Identification(Published):
         return rows
 
     def residual_rows(self) -> list[tuple[str, ...]]:
-        """Return a table of what the equations of each motor, or link, leave; its header first."""
+        """Return a table of the residuals of each motor, or link; its header first."""
         rows: list[tuple[str, ...]] = [
             ("rms, filtered", "torque", "residual", "noise", "held out", "condition")
         ]

@@ -57,7 +57,7 @@ def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None
         columns: (rows, columns).
         tolerance: distance of a column from its best combination of those kept, over its norm, from which on
             it is independent.
-        noise: what of the columns is noise, alike; what is left of an independent column must be more.
+        noise: of the columns; the rest of an independent column must exceed it.
     """
     from scipy.linalg import solve_triangular
 

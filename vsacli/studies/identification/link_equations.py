@@ -1,6 +1,6 @@
-"""Equations of links: what the springs carry, or the motor of a rigid joint, is Y pi + damping + friction.
+"""Equations of links: the torque of springs, or of the motor of a rigid joint, is Y pi + damping + friction.
 
-What springs carry follows from recorded positions by their numbers, which the motors told before: their
+The torque of springs follows from recorded positions by their parameters, which the motors gave before: their
 uncertainty is part of that of the links. A rigid joint has motor and link in one equation.
 """
 
@@ -54,7 +54,7 @@ class LinkSystem(SystemOfEquations):
         base: combinations of the inertial parameters of its links, the first unknowns.
         sought: the others, numbers of the robot.
         springs: numbers of springs that were found before.
-        errors: what independent errors change of these, (springs, errors), each by one standard error.
+        errors: effect of independent errors on these, (springs, errors), each by one standard error.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ def link_system(robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = (
     Args:
         robot: as its file has it.
         fit: words and patterns, of which those of motors count where joints are rigid.
-        motors: what was found of motors and springs, which says what springs carry, and how exactly.
+        motors: results for motors and springs, which give the torque of springs and its errors.
     """
     sought = [each for each in parameters(robot) if each.part in RESISTANCES]
     for index, joint in enumerate(robot.joints):

@@ -1,6 +1,6 @@
 """Equations of motors behind springs: tau_motor = B theta'' + D theta' + friction + U_theta(q, theta).
 
-They are (73)-(74) with what was recorded, and free of the links. The unknowns are numbers of springs, motors
+They are (73)-(74) with recorded values, and free of the links. The unknowns are numbers of springs, motors
 and friction that words or patterns of paths ask for; `MotorSystem` is the system of one joint.
 """
 
@@ -42,7 +42,7 @@ def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, .
     """Return the numbers of one joint's motors and springs that are to be found.
 
     Terms of a spring that are zero, and the width of friction that is sharp, stay so unless a pattern names
-    them: what is not there is not looked for.
+    them: missing ones are not identified.
 
     Args:
         robot: the robot.
@@ -100,10 +100,10 @@ def _asked_for(parameter: Parameter, group: str, fit: Sequence[str]) -> bool:
 
 
 def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
-    """Refuse what is neither a word nor fits a number that can be found.
+    """Refuse a text that is no word and fits no parameter that can be identified.
 
     Raises:
-        InputError: saying what was probably meant.
+        InputError: with the probable word.
     """
     paths = [str(each) for each in parameters(robot) if each.joint is not None and group_of(each)]
     problems = []

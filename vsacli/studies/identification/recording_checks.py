@@ -1,4 +1,4 @@
-"""Recordings held against the robot: columns that are not what their names say, late torques, and their gain.
+"""Recordings compared with the robot: columns with wrong names, late torques, and their gain.
 
 `model_doubts` finds wrong units, turned signs, exchanged columns and motors before a fit, `delay` by how much
 torques are later than positions after it. `gains` asks whether all numbers are by one factor not those of
@@ -45,7 +45,7 @@ FOLLOWS_BETTER = 0.25
 """Variance of a motor about what it may follow, over that about its joint, below which it does follow it."""
 
 FOLLOWS = 0.5
-"""The same over the variance of what it follows."""
+"""The same over the variance of the followed joint."""
 
 RESTING = 1e-3
 """Share of the predicted range below which a measured torque does not move."""
@@ -61,7 +61,7 @@ ODD_GAINS: Mapping[str, float] = MappingProxyType(
 
 
 def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
-    """Sentences on what looks as if columns were not what their names say.
+    """Yield sentences on columns whose content does not fit their names.
 
     Motors follow their joints, and torques what the robot file predicts, but for what is to be found.
 
@@ -263,7 +263,7 @@ WITHIN = 3.0
 
 
 class Factor(NamedTuple):
-    """A ratio of what was found to what the file has, with its standard error."""
+    """A ratio of the result to the value of the file, with its standard error."""
 
     value: float
     error: float
@@ -291,12 +291,12 @@ class Gain(NamedTuple):
 def gains(
     robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
 ) -> list[Gain]:
-    """Return what is to be said of joints all of whose numbers are by one factor not those of the file.
+    """Return findings on joints whose parameters all differ from the file by one factor.
 
     Args:
         robot: as its file has it.
         joints: indices of those that were recorded.
-        motors: what was found, joint by joint.
+        motors: results, joint by joint.
         signals: records.
     """
     factors = {each.system.title: factor for each in motors if (factor := _common_factor(each, signals))}

@@ -56,7 +56,7 @@ class Column(NamedTuple):
 
     Attributes:
         name: in the file.
-        place: what it is.
+        place: its variable, joint and motor.
         time: of its samples, (samples,), s from the first row of the file on.
         values: (samples,), SI units, joint side of the gear.
         has_unit: whether a unit follows its name.
@@ -102,7 +102,7 @@ def recorded_columns(
     Args:
         robot: that was recorded.
         path: the CSV file.
-        mapping: what columns with other names stand for.
+        mapping: assignment of columns with other names.
 
     Raises:
         InputError: there is none, a unit is one of something else, or times do not ascend.
@@ -150,7 +150,7 @@ CUT_SHARE = 5.0
 
 
 def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
-    """Sentences on what nothing can be fitted with."""
+    """Yield sentences on unusable recordings."""
     yield from _together((column.name, clause) for column in columns for clause in _stamp_clauses(column))
     yield from _together(
         (column.name, clause)
@@ -163,7 +163,7 @@ def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
 
 
 def doubts(columns: Sequence[Column]) -> Iterator[str]:
-    """Sentences on what makes a fit doubtful."""
+    """Yield sentences on reasons for an unreliable fit."""
     yield from _together((column.name, clause) for column in columns for clause in _doubtful_clauses(column))
 
 
@@ -269,9 +269,9 @@ class Record(NamedTuple):
         theta: positions of the motors, (samples, joints, 2), likewise; of a motor that moves with its joint
             the joint's if it was not recorded.
         tau_motor: torques of the motors, (samples, joints, 2).
-        columns: names in the file, by what they are.
+        columns: names in the file, by variable.
         unused: names of columns that were not needed.
-        doubts: what looks wrong with it, sentences.
+        doubts: likely faults of it, sentences.
     """
 
     path: str
@@ -291,7 +291,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
     Args:
         robot: that was recorded.
         path: the file.
-        mapping: what columns with other names stand for.
+        mapping: assignment of columns with other names.
 
     Raises:
         InputError: there is no such column, a unit is one of something else, times do not ascend, or there
@@ -339,7 +339,7 @@ def check_distinct(records: Sequence[Record]) -> None:
 
 
 def _grid(columns: Sequence[Column]) -> FloatArray:
-    """Even times at the rate of the fastest column, over what all cover."""
+    """Return even times at the rate of the fastest column, over the span of all columns."""
     fastest = max(columns, key=lambda column: (len(column.time) - 1) / np.ptp(column.time))
     step = float(np.ptp(fastest.time)) / (len(fastest.time) - 1)
     start = max(float(column.time[0]) for column in columns)

@@ -1,4 +1,4 @@
-"""Causes that would explain what equations leave: a sensor that is off, or a law that is not in the file.
+"""Causes that could explain residuals: a sensor that is off, or a law missing in the file.
 
 Each is some columns that would be added to the equations if it were true. Friction and springs of unknown
 laws are sums of a few functions of velocity and deflection, enough to see that something is missing.
@@ -58,7 +58,7 @@ class Cause(NamedTuple):
         columns: of each record, (rows, columns).
         unit: of the size.
         largest: size up to which it is plausible.
-        neutral: size that is added to what was found: a gain is a ratio to 1.
+        neutral: size added to the result: a gain is a ratio to 1.
     """
 
     name: str
@@ -85,13 +85,13 @@ PLACE = "{name}: what is left depends on its position: a cable, a stop or a weig
 def causes(
     robot: Robot, found: Solution, records: Sequence[Signals], equations: Sequence[Equations]
 ) -> list[Cause]:
-    """Return what could be wrong with the equations of a joint's motors, or of all links.
+    """Return possible causes of residuals of a joint's motors, or of all links.
 
     Args:
         robot: the robot.
         found: solution of the equations.
         records: to which they were fitted.
-        equations: of these, at what was found.
+        equations: of these, at the result.
     """
     if found.system.title == LINKS:
         return list(_of_links(robot, records, equations))

@@ -53,7 +53,7 @@ def compare(
         recording: a CSV file with a column `time` and columns named as `vsacli export` names them, at times
             of its own; a unit in brackets may follow a name. Cells may be empty where a column has no sample.
         begins_at: when the result begins, s from the first row of the recording; looked for if None.
-        columns: a file that says what columns of the recording with other names stand for.
+        columns: a file with the mapping of columns with other names.
 
     Raises:
         InputError: the recording has no column of the result or a wrong unit, its times do not ascend, it
@@ -99,7 +99,7 @@ def compare(
 
 
 def _variables(result: StoredResult) -> dict[str, Variable]:
-    """Variables by their plain names: of a simulation what happened, not what was commanded."""
+    """Variables by their plain names; of a simulation the actual values, not the commanded ones."""
     found: dict[str, Variable] = {}
     for name in result.variables:
         plain = name.removesuffix(measured("")).removesuffix(actual(""))
@@ -185,7 +185,7 @@ def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
 def _agreements(
     result: StoredResult, recorded: Recording, pairings: Sequence[Pairing], alignment: Alignment
 ) -> tuple[Agreement, ...]:
-    """Return every column against what was computed."""
+    """Return the comparison of every column with the result."""
     groups = [_group(signal) for signal in recorded.signals]
     places = exchanged_places(pairings, groups, alignment.begins_at)
     followed = [

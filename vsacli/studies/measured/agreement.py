@@ -23,11 +23,11 @@ class Agreement(Published):
 
     Attributes:
         column: of the recording.
-        variable, joint, motor: what it was compared with; motor is None if it is none of a motor.
+        variable, joint, motor: of the result; motor is None for variables of joints.
         unit: of the figures.
         samples: how many were compared.
         rms: root mean square of the error.
-        share: that, relative to the root mean square of what was computed.
+        share: that, relative to the root mean square of the result.
         worst, worst_time: largest error in size, with its sign, and when, s from the beginning of the result.
         offset, gain: of the straight line measured = offset + gain computed, at its lag.
         lag: how much later than the others it follows best, s.
@@ -99,7 +99,7 @@ class Comparison(Published):
         duration: of the result, s.
         compared: how much of it the recording covers, s.
         signals: a record of each column that was compared.
-        notes: what looks like a slip, and what was not compared.
+        notes: likely slips, and columns not compared.
         sources: the recording as it was read; not in JSON.
     """
 

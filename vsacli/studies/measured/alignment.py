@@ -78,7 +78,7 @@ def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | 
 
     Args:
         pairings: all columns that may say something.
-        groups: for each, what it has in common with those with which it may have been exchanged.
+        groups: for each, the property shared with columns it may have been exchanged with.
     """
     moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
     pairings = [pairing for pairing, moves in zip(pairings, moving, strict=True) if moves]
@@ -118,7 +118,7 @@ def _step(pairings: Sequence[Pairing]) -> float:
 
 
 def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
-    """Shifts, and what each leaves unexplained, the mean of all columns."""
+    """Shifts, and the unexplained part at each, the mean of all columns."""
     grid = np.arange(0.0, pairings[0].duration + step / 2, step)
     last = max(float(pairing.time[-1]) for pairing in pairings)
     recorded = np.arange(0.0, last + step / 2, step)
@@ -174,7 +174,7 @@ def _refined(
     """Refine a candidate between the points of the grid.
 
     Returns:
-        What it leaves unexplained, its shift, and the pairings with exchanged columns put right.
+        The unexplained part, its shift, and the pairings with exchanged columns put right.
     """
     from scipy.optimize import minimize_scalar
 

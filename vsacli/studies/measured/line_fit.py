@@ -76,10 +76,10 @@ VAGUE = 0.2
 """Standard error of a gain from which on it says nothing."""
 
 CONSTANT = 1e-6
-"""Deviation of a recording, over that of what was computed, below which it is constant in any unit."""
+"""Deviation of a recording, over that of the result, below which it is constant in any unit."""
 
 RESTS = 0.2
-"""Deviation of a recording that does not follow, over that of what was computed, below which it does not
+"""Deviation of a recording that does not follow, over that of the result, below which it does not
 move."""
 
 
@@ -105,7 +105,7 @@ class LineFit(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """Least squares at one lag: unknowns, their covariance, and what they leave."""
+    """Least squares at one lag: unknowns, their covariance, and the residual."""
 
     unknowns: FloatArray
     covariance: FloatArray

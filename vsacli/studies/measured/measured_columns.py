@@ -48,12 +48,13 @@ class Place(NamedTuple):
     """The place of a column.
 
     Attributes:
-        variable: name of what it is compared with or stands for.
+        variable: name of the variable it is compared with or stands for.
         joint: its index.
         motor: 1 or 2, None if the variable is none of motors.
         unit: of numbers without a unit of their own.
-        gear: what those are multiplied by to be on the joint side of the gear.
-        rank: how directly it says what the robot did; of columns that stand for the same the highest counts.
+        gear: factor to the joint side of the gear.
+        rank: how directly it shows the motion of the robot; of columns that stand for the same the highest
+            counts.
     """
 
     variable: str
@@ -75,7 +76,7 @@ class Measured:
 
     Attributes:
         column: its name in the recording.
-        place: what it is.
+        place: its variable, joint and motor.
         values: (samples,), SI units, joint side of the gear.
     """
 
@@ -110,7 +111,7 @@ def read_recording(
             of the joint, `q1` for the first; a unit in brackets may follow any name.
         places: by the names that columns may have, see `known_columns`.
         owner: whose variables they are, for sentences.
-        mapping: what columns with other names stand for.
+        mapping: assignment of columns with other names.
 
     Raises:
         InputError: there is no such column, a unit is one of something else, or the times do not ascend.
@@ -145,8 +146,8 @@ def read_recording(
 def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:
     """Names that columns may have, each with its rank and the variable that it stands for.
 
-    What sensors read, `q_measured`, goes before what a simulation says happened, `q_actual`, and that before
-    what has the plain name, which may be the command.
+    Sensor readings, `q_measured`, take precedence over actual values of a simulation, `q_actual`, and those
+    over the plain name, which may be the command.
 
     Args:
         variables: by their plain names.
@@ -160,7 +161,7 @@ def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) 
     """Return every name that a column may have of variables of joints.
 
     Args:
-        jointed: what the recording is of.
+        jointed: the subject of the recording.
         named: names of variables in columns, with rank and variable, as `stand_ins` makes them.
     """
     return {

@@ -61,7 +61,7 @@ class Computed(NamedTuple):
 
 
 class Pairing(NamedTuple):
-    """A computed signal and what was measured of it.
+    """A computed signal and its measurement.
 
     Attributes:
         computed: the signal.
@@ -87,7 +87,7 @@ class Pairing(NamedTuple):
 
 
 def tame(values: FloatArray) -> FloatArray:
-    """Measured values, wild ones moved to the bounds of what the others suggest."""
+    """Measured values, wild ones moved to the bounds suggested by the others."""
     limited = np.clip(values, -LARGEST, LARGEST)
     low, high = np.quantile(limited, NEARLY_ALL)
     room = WIDEST * (high - low)

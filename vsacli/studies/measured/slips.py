@@ -15,7 +15,7 @@ SAVED = math.log(4.0)
 """Logarithm by which each exchanged column has to leave less unexplained than under its own name."""
 
 LEFT = math.log(0.1)
-"""Logarithm of what it may leave at most."""
+"""Logarithm of the largest unexplained part."""
 
 REVERSED = 0.25
 """Share of the squared errors of an exchange below which opposite signs explain the columns better. Torques
@@ -30,7 +30,7 @@ def exchanged_places(pairings: Sequence[Pairing], groups: Sequence[object], shif
 
     Args:
         pairings: of all columns.
-        groups: for each, what it has in common with those with which it may have been exchanged.
+        groups: for each, the property shared with columns it may have been exchanged with.
         shift: time of the recording, s, at which the result begins.
     """
     places = list(range(len(pairings)))
@@ -109,7 +109,7 @@ WILD = 20.0
 
 
 def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
-    """Sentences on what signals look like that do not agree, each naming its column.
+    """Yield sentences on the likely slips of signals that do not agree, each naming its column.
 
     Args:
         signals: of a recording.

@@ -1,6 +1,6 @@
 """The constraints of every search: margin and limits of each sample, judged as a run judges them.
 
-Limits of recorded motions count beyond what the recording leaves uncertain. The attainable range of the
+Limits of recorded motions count beyond the uncertainty of the recording. The attainable range of the
 stiffness follows from margin, limits of stiffness and limits of deflection.
 """
 
@@ -83,10 +83,10 @@ class Acceptance:
     def confirmed(
         self, attempt: Callable[[Acceptance], tuple[_Found, FloatArray | None]]
     ) -> tuple[_Found, bool]:
-        """Search until a run confirms what is found, and return that, and whether it did.
+        """Search until a run confirms the result; return it, and whether it did.
 
         Args:
-            attempt: searches by a rule; returns what it finds, and instants, as in `between`, at which a run
+            attempt: searches by a rule; returns the result, and instants, as in `between`, at which a run
                 of that falls short, or None. They count in the next search.
         """
         between = self.between
@@ -221,7 +221,7 @@ class Trouble(NamedTuple):
     """The worst step at which a joint is not accepted.
 
     Attributes:
-        variable: what is beyond a bound, by its name in results.
+        variable: name in results of the variable beyond a bound.
         whose: the same in words.
         time: when, s.
         value: of the variable there.

@@ -49,8 +49,8 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
     """Return a trajectory with the same steps, whose stiffness is recorded at them.
 
     Args:
-        trajectory: what is to be changed.
-        changes: for joints by index what to add to the stiffness, its rate and its second derivative at the
+        trajectory: the trajectory to change.
+        changes: for joints by index the addition to the stiffness, its rate and its second derivative at the
             steps, (3, steps), N m/rad (N/m) per s^k.
     """
     time = trajectory.times.block(0, trajectory.samples)
@@ -108,7 +108,7 @@ def with_kept_rate(trajectory: Trajectory, factor: float, rate: float | None) ->
     what is known at its samples alone has no other steps; both are returned as they are.
 
     Args:
-        trajectory: what is recorded.
+        trajectory: the recorded one.
         factor: by which it is to be passed more slowly.
         rate: steps per second; None if there is no such rate.
     """

@@ -146,7 +146,7 @@ class CheapestStiffness:
     Args:
         acceptance: the rule for every step.
         trajectory: the motion.
-        criterion: what is minimised.
+        criterion: the minimized quantity.
         seed: of the starts that are drawn.
         progress: is told how many searches are done.
     """
@@ -169,7 +169,7 @@ class CheapestStiffness:
         }
 
     def confirmed(self, what: Optimum) -> Found:
-        """Search until a run of what was found keeps every limit between its steps as well.
+        """Search until a run of the result keeps every limit between its samples as well.
 
         Raises:
             ImpossibleError: with the reason of each joint for which nothing was found.
@@ -206,7 +206,7 @@ class CheapestStiffness:
         return Found(best, constant, changed)
 
     def optima(self, found: Found) -> dict[str, JointOptimum]:
-        """Return what was found for each joint, by name, with the costs of runs."""
+        """Return the result for each joint, by name, with the costs of runs."""
         joints = self._acceptance.robot.joints
         constants = {index: each for index, each in found.constant.items() if each is not None}
         trajectories = self._trajectory, self._with_stiffness(constants), found.trajectory

@@ -1,7 +1,8 @@
 """Search over slow-down, stiffness and preload together, for the combination of least cost.
 
-Given the factor of the slow-down, what the links demand is known; given that, corridor and limits of a joint
-do not depend on the other joints. So the search has one dimension, along which joints are fixed one by one.
+Given the factor of the slow-down, the demand of the links is known; given that, corridor and limits of a
+joint do not depend on the other joints. So the search has one dimension, along which joints are fixed one by
+one.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
 
 MOST_ROUNDS = 20
-"""Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
+"""Rounds of adding samples that refuse a change accepted by the watched ones; two or three are usual."""
 
 SAME_CORRIDOR = 1e-6
 """Relative difference of two corridors that may be rounding."""
@@ -39,10 +40,11 @@ PRELOAD_GAIN = 0.9
 class CombinedSearch:
     """A search for the combination of changes that mends a motion.
 
-    It looks at some steps, which others that refuse what it finds join. What helps at a factor is remembered.
+    It looks at some samples, which others that refuse the result join. Changes that help at a factor are
+    kept.
 
     Args:
-        task: what is to be mended, by which rule, and at which cost.
+        task: motion to fix, rule, and cost.
         form: of the changes of stiffness.
         preloads: whether joints may take the other preload.
     """

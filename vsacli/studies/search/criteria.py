@@ -55,8 +55,8 @@ class Criterion:
     Attributes:
         name: as on the command line.
         words: for reports.
-        quantity: what it is measured in.
-        relative: whether joints, taken together, count relative to what they cost as commanded.
+        quantity: its quantity.
+        relative: whether joints, taken together, count relative to their cost as commanded.
         over_time: places of the integrands that are integrated over time; others count at instants.
         levels: rows besides those of the motion: 1 if the cost is a level that bounds something, else 0.
         smoothings: how much it is smoothed, one search after the other.
@@ -84,7 +84,7 @@ class Criterion:
 
         Args:
             joint: the joint.
-            driven: what its motors do.
+            driven: motion and torques of its motors.
             level: the further row, if there is one, scaled likewise.
             scale: of the cost.
         """
@@ -116,7 +116,7 @@ class Criterion:
         raise NotImplementedError
 
     def together(self, costs: Sequence[float]) -> float:
-        """Return the cost of all joints; of shares of what they cost as commanded if these are relative."""
+        """Return the cost of all joints, relative to the commanded costs if these are relative."""
         return math.fsum(costs)
 
 
@@ -204,7 +204,8 @@ class Copper(Criterion):
 class Energy(Criterion):
     """Positive work of the motors of the joint, without energy recovered.
 
-    Unless the motion repeats itself, what its springs hold at the start counts as well: someone loaded them.
+    Unless the motion repeats itself, the energy in its springs at the start counts as well: someone loaded
+        them.
     """
 
     name = "energy"
@@ -295,7 +296,7 @@ ENDS_OF_CORRIDOR = "lower end of the corridor", "upper end of the corridor"
 
 
 def limit_names(checks: Sequence[LimitCheck]) -> list[str]:
-    """Return what the `limit_bounds` are of, in words."""
+    """Return words for the `limit_bounds`."""
     return [check.flag.quantity_of(check.motor) for check in checks for _ in _finite_ends(check)]
 
 
@@ -372,8 +373,8 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
     Args:
         problem: the sum of the costs, with bounds.
         start: unknowns that keep all bounds.
-        gap: what bounds may raise the cost by at the first barrier.
-        costed: what has these costs, all by the same criterion.
+        gap: increase of the cost by bounds at the first barrier.
+        costed: parts with these costs, all by one criterion.
     """
     smoothings = costed[0].criterion.smoothings
     cold = gap > WARM_GAP

@@ -1,4 +1,4 @@
-"""A fix as files: the trajectory, a CSV table for what is no formula, the robot with another preload."""
+"""A fix as files: the trajectory, a CSV table for signals without formula, the robot with another preload."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def _write_table(
 
 
 def _stamps(trajectory: Trajectory) -> FloatArray:
-    """Return the times of what is recorded: those of the steps, or of a record if these differ."""
+    """Return the times of recorded signals: those of the samples, or of a recording if these differ."""
     for estimate in trajectory.estimates.values():
         if estimate.resampled:
             return estimate.record.start + estimate.record.time

@@ -1,4 +1,4 @@
-"""The text of a trajectory file with a fix in it: what changes is replaced where it stands, all else is kept.
+"""The text of a trajectory file with a fix in it: changed values are replaced in place, all else is kept.
 
 Comments, layout, units and names of joints stay as the user wrote them. Not every file can be changed so, for
 example one whose values are shared by aliases; so the text is read again, and counts only if it says what the
@@ -112,7 +112,7 @@ def _values(values: Sequence[float]) -> list[float | None]:
 
 
 SAME = 1e-9
-"""Relative difference of numbers that are the same but for rounding: what limits admit as such."""
+"""Relative difference of numbers that are equal up to rounding, as limits admit it."""
 
 CLOSE = 1e-8
 """Share of the peak of a variable by which the text may miss it: rounding, and four derivatives of that."""
@@ -162,7 +162,7 @@ def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | 
 
 
 def _candidates(remedy: Remedy, asked: Trajectory, text: str) -> Iterator[Values]:
-    """Values by path that may say what the fix is: other times, or `slow_down` if that is not enough."""
+    """Values by path that may declare the fix: other times, or `slow_down` if that is not enough."""
     root, names = root_of(text), remedy.robot.joint_names
     fixed = remedy.declared
     named = {"name": fixed.name}
@@ -204,7 +204,7 @@ def _profiles(trajectory: Trajectory) -> dict[Signal, Profile]:
 def _differences(
     node: Node, path: str, old: Any, new: Any, names: Sequence[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Paths below one, and what is new there: single values where the text has them, else all of a list."""
+    """Paths below one, with new values: single values where the text has them, else all of a list."""
     if isinstance(old, dict):
         for key, value in old.items():
             below = node_at(node, key)
@@ -260,7 +260,7 @@ def _with(text: str, values: Values, table: TableFile | None) -> str:
 
 
 def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool:
-    """Return whether a text in place of the user's file says what the fix is, at every step."""
+    """Return whether a text in place of the user's file gives the fix at every sample."""
     with temporary_folder() as place:
         copies = {path: str(place / "text")}
         (place / "text").write_text(text, encoding="utf-8")

@@ -47,7 +47,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
 
     Args:
         robot: the robot.
-        trajectory: what it is asked to do.
+        trajectory: the commanded motion.
         near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
 
     Raises:
@@ -94,7 +94,7 @@ class _Tried(NamedTuple):
 
 
 def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
-    """Search for what mends the joints that can be mended; instants at which it falls short join in."""
+    """Search for fixes of the joints that have one; instants at which they fall short join in."""
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))

@@ -44,7 +44,7 @@ ARMIJO = 1e-4
 """Share of the decrease that the slope foretells with which a step is content."""
 
 SHORTEST_STEP = 1e-10
-"""Share of a step below which the search gives up: rounding hides what it gains."""
+"""Share of a step below which the search gives up: rounding hides the gain."""
 
 MOST_ADDED = 1e6
 """Multiple of its diagonal that a matrix may get to be positive definite; steps go down the gradient then."""

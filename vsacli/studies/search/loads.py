@@ -209,7 +209,7 @@ def _unstretched(trajectory: Trajectory, time: FloatArray, factor: float) -> Flo
 
 
 SAME = 1e-6
-"""Largest difference of what repeats itself, relative to the largest value of each variable."""
+"""Largest difference of repeated values, relative to the largest value of each variable."""
 
 AT_REST = 1e-9
 """Largest share of its largest velocity with which a motion rests: rounding."""
@@ -218,7 +218,7 @@ LOADING = ("q", "dq", "ddq", "tau_e", "dtau_e", "ddtau_e")
 """Variables that load the motors, apart from the stiffness."""
 
 FEWEST_STEPS = 20
-"""Steps of a period; what repeats itself faster is not told from noise."""
+"""Samples of a period; faster repetition is not distinguished from noise."""
 
 
 class Ends(NamedTuple):

@@ -1,7 +1,7 @@
 """The stiffness profile nearest to the commanded one: a cubic spline between bounds, by a quadratic program.
 
 `vsacli optimize` has a solver of its own, which goes from a profile that keeps all bounds to a local minimum
-of any cost. Here such a profile is what is looked for, the minimum is the only one, and bounds may touch,
+of any cost. Here such a profile is searched, the minimum is the only one, and bounds may touch,
 which leaves nothing between them to start from.
 """
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 DEGREE = 3
 PIECES_PER_SMOOTHING = 3
-"""Pieces of the spline in one smoothing time: what the objective leaves is no finer."""
+"""Pieces of the spline in one smoothing time: the objective leaves nothing finer."""
 
 END_HALVINGS = 4
 """Halvings of the pieces at both ends, where the function begins flat although its bounds may move."""
@@ -81,7 +81,7 @@ class Bounds:
 def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = None) -> BSpline[np.float64]:
     """Return the C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
 
-    Its first and second derivative vanish at both ends, so that what it is added to starts and stops as it
+    Its first and second derivative vanish at both ends, so that the sum starts and stops as the profile
     did. A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least
     distance by non-negative least squares (Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter
     23). Far from where the bounds exclude zero, x is zero.
@@ -273,7 +273,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
 
 
 def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
-    """Refuse what no stiffness can mend."""
+    """Refuse a task that no stiffness can fix."""
     low, high = checked_range(acceptance, joint, load)
     worst = int((low - high).argmax())
     if low[worst] > high[worst]:

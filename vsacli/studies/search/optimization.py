@@ -67,7 +67,7 @@ def optimize(
 
     A stiffness profile is four times continuously differentiable. Its first two derivatives vanish at both
     ends, unless the motion repeats itself: then so does the profile. A timing passes the same path at another
-    pace, in the same time unless that is minimised. What is found is a local optimum.
+    pace, in the same time unless that is minimized. The result is a local optimum.
 
     Args:
         robot: the robot.
@@ -246,7 +246,7 @@ def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
 def _confirmed(
     what: Optimum, path: Trajectory, ends: Ends, search_by: Callable[[Acceptance], _Search]
 ) -> tuple[_Search, Pacing, Trajectory]:
-    """Search until a run of what was found keeps every limit between its steps as well.
+    """Search until a run of the result keeps every limit between its samples as well.
 
     Args:
         what: robot and margin.
@@ -255,7 +255,7 @@ def _confirmed(
         search_by: a search by a rule, whose instants between steps are places on the path.
 
     Returns:
-        The last search, what it found, and the motion at that pace.
+        The last search, its result, and the motion at that pace.
 
     Raises:
         ImpossibleError: nothing was found, or a run falls short between its steps whatever is tried.
@@ -281,7 +281,7 @@ def _retimed(
 ) -> tuple[Trajectory, FloatArray | None]:
     """Return the motion at a pace, and when a run of it falls short, if it does.
 
-    At its own rate if its samples say what lies between them; else at a multiple of it.
+    At its own rate if it is known between its samples; else at a multiple of it.
     """
     name = as_name(f"{what.asked}-{what.minimised}")
     parts = 1

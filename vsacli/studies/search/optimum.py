@@ -57,7 +57,7 @@ class TotalCost(Published):
     Attributes:
         before: as commanded; NaN where that is out of reach.
         after: with the best timing.
-        unit: of the costs; empty where each joint counts relative to what it costs as commanded.
+        unit: of the costs; empty where each joint counts relative to its cost as commanded.
     """
 
     before: float
@@ -88,7 +88,7 @@ class TimingOptimum(Published):
     bounding: dict[str, dict[str, float]]
 
     def lines(self) -> Iterator[str]:
-        """Yield the durations, and for each joint what holds it back."""
+        """Yield the durations, and the bounds that hold each joint back."""
         yield f"as commanded {self.before:.4g} s"
         if not math.isnan(self.uniform):
             yield f"fastest when slowed down or sped up as a whole {self.uniform:.4g} s"
@@ -104,12 +104,12 @@ class Optimum(Published):
     Attributes:
         robot: the robot.
         asked: name of the trajectory that was to be improved.
-        minimised: what is least: torque, energy, copper, peak or time.
+        minimised: torque, energy, copper, peak or time.
         words: the same in words.
-        varied: what was varied.
+        varied: stiffness, timing or both.
         margin: that every step has.
         joints: by name; empty if nothing was found, and where time is minimised.
-        together: what they cost together, if they share a timing; else None.
+        together: their total cost, if they share a timing; else None.
         slow_down: factor by which the motion is slower than commanded, where a cost is minimised and no pace
             in its duration was found that is feasible; else 1.
         timing: None if time is not minimised, or nothing was found.

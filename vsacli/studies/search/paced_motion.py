@@ -123,7 +123,7 @@ class PacedMotion:
     def commands(self, pace: Sequence[Row], instants: IndexArray) -> list[Command]:
         """Return the commands of each joint, with link torques, at a pace with its derivatives.
 
-        What was asked for last is remembered: joints are looked at one after the other.
+        The last request is kept: joints are evaluated one after the other.
         """
         values = np.stack([*(value_of(row) for row in pace), instants])
         key = values.tobytes() + type(pace[0]).__name__.encode()
@@ -228,7 +228,7 @@ class Pace:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """Time, and how far the pace is below what it may be."""
+        """Time, and the distance of the pace from its bound."""
         return [rows[0] / self._duration], [least_pace(self._held)[instants] - rows[0]]
 
 
@@ -244,13 +244,13 @@ class PacedJoint:
         motion: of all joints.
         index: of the joint.
         near_singular: the margin.
-        criterion: what it costs.
+        criterion: its cost.
         share: that its cost has in that of all joints.
         reserve: share of each limit that is kept clear of besides `CLEARANCE`.
         varied: whether the stiffness varies.
 
     Attributes:
-        criterion: what it costs.
+        criterion: its cost.
         scale: of that cost.
     """
 

@@ -152,7 +152,7 @@ class PacedSearch:
     def _attempt(
         self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
     ) -> Minimum | None:
-        """Search from what is wanted, with as many instants as it takes; None if nothing keeps all bounds."""
+        """Search from the wanted profile with as many instants as necessary; None if none keeps all bounds."""
         instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
         every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
         for _ in range(MOST_ROUNDS):
@@ -241,7 +241,7 @@ class NoStartError(ImpossibleError):
 
 
 class TimingSearch(PacedSearch):
-    """A search for the fastest pace along the path of a trajectory, over a period of what repeats itself.
+    """A search for the fastest pace along the path of a trajectory, over a period if it repeats itself.
 
     Args:
         acceptance: the rule, with instants of the path that count as well.
@@ -378,7 +378,7 @@ LIFTED = 1.1
 pendulum took more than two hundred steps, and from here fifty."""
 
 FIRST_LEVEL = 1.05
-"""Multiple of what a level bounds, to begin with."""
+"""First level, as a multiple of the bounded values."""
 
 
 class CheapestPaceSearch(PacedSearch):
@@ -448,7 +448,7 @@ class CheapestPaceSearch(PacedSearch):
         return bool(np.all(every.values(unknowns)[1] < 0))
 
     def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
-        """Unknowns with a level that bounds what it shall, if there are any."""
+        """Unknowns with an effective level, if there are any."""
         if not self._joints[0].criterion.levels:
             return unknowns
         without = np.append(unknowns, 0.0)

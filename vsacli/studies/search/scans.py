@@ -89,7 +89,7 @@ FACTORS_AT_ONCE = 64
 class Factors(NamedTuple):
     """The factors of slow-downs that are tried: those with a whole number of steps at the rate of the task.
 
-    A controller has one rate; what lasts 577.74 of its periods ends between two of them.
+    A controller has one rate; a motion of 577.74 of its periods ends between two of them.
 
     Attributes:
         denominator: numbers stand for themselves over this: steps of the task, which need not be whole.
@@ -211,7 +211,7 @@ OFFSETS_AT_ONCE = 64
 """Offsets that are tried at once: hardly dearer than one of them."""
 
 OFFSET_DIGITS = 4
-"""Decimal places of an offset behind the leading digit of the stiffness: so what is printed was confirmed."""
+"""Decimal places of an offset behind the leading digit of the stiffness: the printed value was confirmed."""
 
 ROUNDING = 1e-9
 """Relative rise of a stiffness after which rounding leaves it no margin short."""

@@ -66,14 +66,14 @@ class Group:
     """Functions of the same rows.
 
     Attributes:
-        functions: what they are.
+        functions: the cost and bounds.
         instants: at which, (instants,), as the functions number them.
         basis: of the rows, (rows, instants, own unknowns).
         unknowns: places of its unknowns among all, (own unknowns,).
         weights: of each integrand at each instant, (integrands, instants).
         there: which bounds there are, (bounds, instants); others do not count.
         scales: sizes of the rows, (rows,).
-        offsets: what the rows are without any unknown, (rows,); zero unless given.
+        offsets: values of the rows at zero unknowns, (rows,); zero unless given.
     """
 
     functions: Functions
@@ -195,7 +195,7 @@ class _Expanded:
 
 
 def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
-    """Return the sum of gradients times weights, (rows, instants); what has no weight may be no number."""
+    """Return the sum of gradients times weights, (rows, instants); gradients without weight may be NaN."""
     kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
     summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)
     return summed

@@ -29,7 +29,7 @@ class SplineSpace:
     Attributes:
         knots: (coefficients + 6,), s.
         shapes: B-spline coefficients of each shape, (coefficients, shapes).
-        offset: what each spline has besides its shapes.
+        offset: of each spline, without its shapes.
     """
 
     knots: FloatArray
@@ -221,8 +221,9 @@ class PacedSpaces(NamedTuple):
     def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int], ends: Ends) -> PacedSpaces:
         """Return the spaces with this many pieces each, for a motion with these ends.
 
-        What repeats itself goes on at the end as it begins, at whatever pace. What begins or ends on its way
-        without repeating itself does so at the pace as commanded, with the accelerations as commanded, too.
+        A repeated motion goes on at the end as it begins, at any pace. A motion that begins or ends on its
+        way without repeating itself does so at the pace as commanded, with the accelerations as commanded,
+        too.
         """
         if ends.periods:
             periodic = SplineSpace.periodic(span, pieces)
@@ -243,7 +244,7 @@ class PacedSpaces(NamedTuple):
         return {key: (space, own) for (key, space), own in zip(spaces.items(), places, strict=True)}
 
     def fitted(self, s: FloatArray, pace: FloatArray, stiffness: Mapping[int, FloatArray]) -> FloatArray:
-        """Unknowns of what comes nearest to a pace and to stiffness, each (instants,)."""
+        """Return unknowns nearest to a pace and to stiffness, each (instants,)."""
         wanted: dict[int | None, FloatArray] = {None: pace}
         wanted.update(stiffness.items())
         return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])

@@ -47,9 +47,9 @@ class FixedMotion:
 
     Args:
         joint: the joint.
-        load: what it carries, at all instants.
+        load: of the joint, at all instants.
         admissible: its stiffness at them.
-        criterion: what is minimised.
+        criterion: the minimized quantity.
         scale: of the cost.
         reserve: share of each limit of the motors that is kept clear of.
     """
@@ -102,7 +102,7 @@ class FixedMotion:
 
 
 INSIDE = 1e-3
-"""Share of its stiffness by which a start keeps clear of the ends of what is admissible, if there is room."""
+"""Share of its stiffness by which a start keeps clear of the ends of the admissible range, if possible."""
 
 DRAWN, LEVELS = 2, 6
 """Targets that are drawn, and the levels between which each of them is interpolated."""
@@ -117,7 +117,7 @@ class _Distance:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
-        """Return the square of the distance, and what the bounds are exceeded by."""
+        """Return the square of the distance, and the excess over the bounds."""
         low, high = (row[instants] for row in self._within)
         missed = (rows[0] - self._target[instants]) / self._size
         return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
@@ -176,10 +176,10 @@ MOST_ROUNDS = 12
 """Rounds of adding instants at which bounds are missed; one or two are usual, seven were needed."""
 
 SAME_LEVEL = 1e-5
-"""Share of a level by which what it bounds may exceed it at some instants: a tenth of `SAME_COST`."""
+"""Share of a level by which values may exceed it at some instants: a tenth of `SAME_COST`."""
 
 FIRST_LEVEL = 1.05
-"""Multiple of what a level bounds, to begin with."""
+"""First level, as a multiple of the bounded values."""
 
 ACTIVE = 1e-3
 """Relative distance from a bound at which a profile runs along it."""
@@ -234,9 +234,9 @@ class StiffnessSearch:
     Args:
         acceptance: the rule for every step.
         joint: whose stiffness can be chosen.
-        load: what it carries. Pieces of splines begin and end at its steps, so that the quintic between two
+        load: of the joint. Pieces of splines begin and end at its steps, so that the quintic between two
             steps with given derivatives, which a file describes, is the spline itself.
-        criterion: what is minimised.
+        criterion: the minimized quantity.
         spaces: among which splines is searched.
         seed: of the starts that are drawn.
         progress: called after each of its searches, about ten in all.
@@ -307,7 +307,7 @@ class StiffnessSearch:
         return self._spaces(self._span, pieces, self._steps)
 
     def _starts(self) -> tuple[int, list[FloatArray]]:
-        """Return the pieces of splines of which some lie within what is admissible, and these."""
+        """Return the smallest pieces with admissible splines, and these."""
         time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
@@ -347,7 +347,7 @@ class StiffnessSearch:
         Args:
             space: of the splines.
             pieces: of each.
-            start: amounts of the shapes, within what is admissible.
+            start: amounts of the shapes, admissible.
             nearby: a minimum among coarser splines, from which the search goes on.
             known: instants that another search took.
         """
@@ -397,7 +397,7 @@ class StiffnessSearch:
         )
 
     def _with_level(self, every: Group, start: FloatArray) -> FloatArray:
-        """Return a start with a level that bounds what it shall, if there are any."""
+        """Return a start with an effective level, if there are any."""
         if not self._criterion.levels:
             return start
         driven = self._whole.driven((every.basis[:-1, :, :-1] @ start), every.instants)

@@ -136,7 +136,7 @@ class LongerTransition(Published):
 
 @dataclass(frozen=True)
 class OtherPreload(Published):
-    """Take the other preload: what it becomes, by joint."""
+    """Take the other preload: the new one, by joint."""
 
     preloads: Mapping[str, str]
 
@@ -204,7 +204,7 @@ class Cause(Published):
 
     Attributes:
         joint: its name.
-        text: what is wrong, and what helps at rest or does not, in a clause.
+        text: the trouble, and whether a change helps at rest, in a clause.
         fixable: whether anything that was tried helps.
     """
 
@@ -226,7 +226,7 @@ class Suggestions(Published):
     Attributes:
         near_singular: the margin that every step shall have.
         causes: why each joint that falls short does.
-        remedies: what to choose from, the smallest first, those with another preload last.
+        remedies: the choices, the smallest first, those with another preload last.
     """
 
     near_singular: float

@@ -102,9 +102,9 @@ class Combination:
 
     Attributes:
         factor: of the slow-down, at least 1.
-        changes: what to add to the stiffness, (samples,), by index of the joint; joints that are fine are
+        changes: additions to the stiffness, (samples,), by index of the joint; joints that are fine are
             left out.
-        preloads: what becomes of the preload, by index of the joint, where it is to be the other one.
+        preloads: the new preload, by index of the joint, where it changes.
         size: by the cost that was asked for.
     """
 
@@ -136,7 +136,7 @@ def preload_path(robot: Robot, index: int) -> str:
 _Found = TypeVar("_Found")
 
 REFUSED = ("infeasible", "singular", "over_limit")
-"""Verdicts that no remedy may have; what a record does not determine no remedy changes."""
+"""Verdicts that no fix may have; no fix changes the uncertainty of a recording."""
 
 FINER = 10
 """Parts into which each step of a remedy is divided to see whether it falls short between them."""
@@ -151,7 +151,7 @@ class Task:
 
     Attributes:
         acceptance: the rule, and the robot.
-        trajectory: what the robot is asked to do.
+        trajectory: the commanded motion.
         cost: how large a remedy is.
         keeps_rate: whether a recording that becomes slower has steps at its rate, else at its samples.
         impossible: numbers of factors at which nothing helps, by form and whether preloads change; they are
@@ -296,7 +296,7 @@ class Task:
         return OtherPreload(preloads) if preloads else None
 
     def falls_short(self, remedy: Remedy) -> FloatArray | None:
-        """Instants at which a run over the whole of what is suggested misses margin or limits; None if none.
+        """Instants at which a run over the whole fix misses margin or limits; None without any.
 
         They are times since the start of the task as it is, s: the worst ones of the run, which looks between
         its steps, and those of a grid `FINER` times as fine.
@@ -315,7 +315,7 @@ class Task:
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 
     def _is_short(self, joint: JointReport) -> bool:
-        """Return whether the report of a joint shows what no remedy may have."""
+        """Return whether the report of a joint shows trouble that no fix may have."""
         return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
 
     def _refused_between(self, remedy: Remedy) -> FloatArray:
@@ -347,12 +347,12 @@ def for_refused_joints(
     find: Callable[[Joint, Load], _Found],
     factor: float = 1.0,
 ) -> dict[int, tuple[Load, _Found]]:
-    """Load, and what is found for it, of each joint with any step that is not accepted, by index.
+    """Return load and result of each joint with any sample that is not accepted, by index.
 
     Args:
         acceptance: the rule, and the robot.
         trajectory: a task, or one that was stretched.
-        find: what is looked for.
+        find: the search of a joint.
         factor: of the stretching.
 
     Raises:

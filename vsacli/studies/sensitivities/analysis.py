@@ -1,4 +1,4 @@
-"""Sensitivity of a whole run: effects of small changes, their ranking, and what tolerances make of it."""
+"""Sensitivity of a whole run: effects of small changes, their ranking, and the effect of tolerances."""
 
 from __future__ import annotations
 

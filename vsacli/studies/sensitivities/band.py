@@ -53,7 +53,7 @@ class Reversals:
         return bool(np.any(self._forward + self._backward))
 
     def variance(self, speed: FloatArray, deviation: FloatArray, covariance: FloatArray) -> FloatArray:
-        """Return what friction adds to the variance of motor torques; all (samples, joints, 2).
+        """Return the part of friction in the variance of motor torques; all (samples, joints, 2).
 
         Args:
             speed: of the motors.
@@ -132,7 +132,7 @@ class TorqueCurves(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A block of a run: variables, their standard deviations, and what reversals of motors make of them."""
+    """A block of a run: variables, their standard deviations, and the effect of motor reversals on them."""
 
     time: FloatArray
     tau_motor: FloatArray

@@ -1,7 +1,7 @@
-"""Derivatives of what the motors of a joint do, by numbers of its actuator and by the torques of its link.
+"""Derivatives of motor motion and torques, by parameters of the actuator and by the torques of its link.
 
 Deflections and corridors carry derivatives, by the implicit function theorem from (14). Solvers search by
-values. What they find is differentiated, not their search: from y(phi, p) = (tau_e, sigma) follows
+values. Their result is differentiated, not their search: from y(phi, p) = (tau_e, sigma) follows
 A dphi = (dtau_e, dsigma) - dy/dp. At an end of a corridor, where sigma is extreme along the curve of
 equal tau_e, or one phi is at the end of its range, sigma changes by the multiplier of tau_e.
 """
@@ -178,7 +178,7 @@ def drive_derivatives(
     Args:
         robot: the robot.
         index: of the joint.
-        command: what it is asked to do.
+        command: of the joint.
         chosen: numbers of its actuator.
     """
     numbers, motors = len(chosen), 2

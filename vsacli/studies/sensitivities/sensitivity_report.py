@@ -48,7 +48,7 @@ class ParameterEffect(Published):
         value, unit: of it, in SI units.
         step: the change, in SI units.
         words: the change as people say it.
-        joints: what it does to each joint that it does anything to, by name.
+        joints: effect on each joint that it has an effect on, by name.
         tolerance: standard deviation of the number, SI units; None if no tolerances were given.
     """
 
@@ -83,9 +83,9 @@ class Sensitivity(Published):
         verdict: on the run with the numbers as they are: ok, over_limit, singular or infeasible.
         failed: how many of its steps are infeasible or singular, each joint by itself, and do not count.
         parameters: the numbers, the most important first.
-        band: what tolerances do to each joint, by name; empty if none were given.
+        band: effect of tolerances on each joint, by name; empty if none were given.
         curves: motor torques and their deviations; None without tolerances, and not in JSON.
-        monte_carlo: what became of robots drawn from the tolerances; None if none were.
+        monte_carlo: runs of robots drawn from the tolerances; None if none were.
         units: of the torques of each joint, by name.
     """
 

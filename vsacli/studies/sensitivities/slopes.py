@@ -1,4 +1,4 @@
-"""Derivatives of a run by numbers of the robot: of what joints do, and of what links demand."""
+"""Derivatives of a run by parameters of the robot: of its joints, and of the torques of its links."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TorqueSlopes(NamedTuple):
     Attributes:
         places: of the numbers, among those that were chosen.
         of_joints: of each joint, (numbers, 3, samples), in N m (N) per s^k and per SI unit of each number;
-            None for a joint that bears nothing of what they change.
+            None for a joint without effect of them.
     """
 
     places: Sequence[int]

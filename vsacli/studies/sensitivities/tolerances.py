@@ -91,7 +91,7 @@ SHAPES = ("normal", "uniform")
 
 
 def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | None, ...]:
-    """Return the tolerance of each parameter; None for what is exact.
+    """Return the tolerance of each parameter; None for exact ones.
 
     Args:
         text: a share such as `5 %`, or the path of a YAML file of paths into the robot, each with a
@@ -100,7 +100,7 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
             lengths of links, which are zero as often as not.
 
     Raises:
-        InputError: with file and line of what is no distribution, or fits no parameter.
+        InputError: an entry is no distribution, or fits no parameter; with file and line.
     """
     share = PER_CENT.fullmatch(text.strip())
     if share is None:
@@ -118,7 +118,7 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
 
 
 def deviations(tolerances: Sequence[Tolerance | None]) -> FloatArray:
-    """Standard deviation of each parameter, zero for what is exact."""
+    """Standard deviation of each parameter, zero for exact ones."""
     return np.array([0.0 if each is None else each.deviation for each in tolerances])
 
 
@@ -215,7 +215,7 @@ def monte_carlo(
         robot: the robot.
         trajectory: for this robot.
         chosen: its numbers.
-        tolerances: of those, None for what is exact.
+        tolerances: of those, None for exact ones.
         runs: how many robots are drawn.
         seed: of the draws.
         progress: is told how many further robots are done.

@@ -1,4 +1,4 @@
-"""Sizing of drives and springs: what motions ask of them, and which motors and gears would do."""
+"""Sizing of drives and springs: the demands of motions, and the motors and gears that will do."""
 
 from vsacli.studies.sizing.catalogue import CatalogueMotor
 from vsacli.studies.sizing.choices import CRITERIA

@@ -1,4 +1,4 @@
-"""A catalogue of motors: a CSV file with what data sheets say of each, on the motor's own shaft."""
+"""A catalog of motors: a CSV file with data sheet values of each, on the motor's own shaft."""
 
 from __future__ import annotations
 

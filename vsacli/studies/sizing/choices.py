@@ -45,7 +45,7 @@ class Choice(Published):
         does: whether all limits are kept with it.
         low, high: ratios between which they are; NaN if with none.
         ratios: of those that are listed, the ones with which it does.
-        shares: what it uses of each limit, by name.
+        shares: used share of each limit, by name.
         rms_torque: on its shaft, N m.
         copper_loss: mean over time, W; NaN if constants are not known.
         mass: of the motor, kg; None if it is not known.
@@ -71,7 +71,7 @@ class Choice(Published):
 
     @property
     def largest(self) -> tuple[str, float]:
-        """The limit of which it uses most, and what share of it."""
+        """The limit with the largest used share, and the share."""
         name = max(self.shares, key=lambda each: self.shares[each])
         return name, self.shares[name]
 
@@ -102,7 +102,7 @@ def choices(
     """Return every motor of a catalogue with its best gear: those that do first, and the best of these first.
 
     Args:
-        demand: what is asked of the motor.
+        demand: on the motor.
         motors: those of the catalogue.
         gears: of those that have none of their own.
         criterion: one of `CRITERIA`.
@@ -206,7 +206,7 @@ def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
 
 
 def cost_of(choice: Choice, criterion: str) -> float:
-    """Return what the best choice has least of; of one that does not do, its largest share of a limit."""
+    """Return the minimized quantity; for a choice that will not do, its largest share of a limit."""
     _, largest = choice.largest
     wanted = {"copper": choice.copper_loss, "utilisation": largest, "mass": choice.mass or math.inf}
     return wanted[criterion] if choice.does else largest

@@ -60,7 +60,7 @@ class MotorDemand:
         time: of the step in it, s.
         weight: time that the step stands for in means over time, s.
         velocity, acceleration: of the motor.
-        load: what springs, a damper and a coupled rotor exert against it.
+        load: torque of springs, damper and coupled rotor against it.
         torque: of the motor that the robot file has.
     """
 
@@ -122,7 +122,7 @@ class SpringDemand(Published):
         energy: largest energy in it, J.
         torque: largest |torque|, N m (N).
         deflection: largest |deflection|, rad (m).
-        max_deflection: what the robot file admits; infinite if it says nothing.
+        max_deflection: admitted by the robot file; infinite without one.
     """
 
     joint: str
@@ -142,7 +142,7 @@ class SpringDemand(Published):
 
 
 class SpringPeaks:
-    """Keeps what springs bear at most; `add` blocks in order."""
+    """The largest loads of springs; `add` blocks in order."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -213,11 +213,11 @@ class Demand(NamedTuple):
 def demanded(
     robot: Robot, trajectories: Sequence[Trajectory], progress: Callable[[int], object] = lambda _: None
 ) -> Demand:
-    """Run all trajectories, and keep what does not depend on the motors.
+    """Run all trajectories, and keep the values that do not depend on the motors.
 
     Args:
         robot: the robot.
-        trajectories: what it is to do, one after the other.
+        trajectories: executed one after the other.
         progress: is told how many further steps are done.
 
     Raises:

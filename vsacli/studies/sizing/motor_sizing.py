@@ -1,4 +1,4 @@
-"""One motor of a robot: what is required of it, what it does, and which of a catalogue would do."""
+"""One motor of a robot: its demand, its use, and motors of a catalog that will do."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Asked(Published):
     """The demand on any motor, joint side of its gear.
 
     Attributes:
-        load: largest |torque| of springs, and of what else acts beside them, N m (N).
+        load: largest |torque| of springs and everything parallel to them, N m (N).
         rms_load: root mean square over time.
         velocity: largest speed, rad/s (m/s).
         acceleration: largest in size, rad/s^2 (m/s^2).
@@ -116,7 +116,7 @@ class OwnMotor(Published):
 
     Attributes:
         points: on its shaft; on the joint's side if its gear is not known.
-        shares: what it uses of each of its limits, by name.
+        shares: used share of each of its limits, by name.
         does: whether all are kept.
         low, high: gear ratios between which they would be, NaN if with none; None if that is not known, as of
             a motor without gear, or with smooth friction.
@@ -134,13 +134,13 @@ class MotorSizing(Published):
     """One motor of the robot.
 
     Attributes:
-        demand: what is asked of it, step by step.
+        demand: on it, sample by sample.
         gear_ratio: of the robot's own motor; None if it is not known.
-        own: what that does; None if no step can be done.
+        own: its use; None if no sample is feasible.
         choices: motors of the catalogue in its place, those that do first, the best of these first.
         record: the first of these in the catalogue.
         shaft: its constants, or those of the robot's own motor without a catalogue.
-        points: what that one does on its shaft.
+        points: of that motor on its shaft.
     """
 
     demand: MotorDemand = field(repr=False)

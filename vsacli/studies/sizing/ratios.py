@@ -118,7 +118,7 @@ class Ratios(NamedTuple):
         return empty
 
     def nearest(self, ratio: FloatArray) -> FloatArray:
-        """Return the ratio of a range that is nearest to one; what is not finite becomes an end, or 1."""
+        """Return the ratio of a range that is nearest to one; values not finite become an end, or 1."""
         inside = np.minimum(np.maximum(ratio, self.low), self.high)
         finite = np.where((inside > 0) & (inside < math.inf), inside, np.where(self.low > 0, self.low, 1.0))
         nearest: FloatArray = np.minimum(finite, self.high)
@@ -129,7 +129,7 @@ def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
     """Return the shares of `LIMITS` that motors use, (motors, limits), 0 where unbounded.
 
     Args:
-        demand: what is asked of the motor.
+        demand: on the motor.
         shafts: the motors.
         ratio: of their gears, (motors,).
     """
@@ -229,7 +229,7 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
 
 
 def _unbounded(ratio: FloatArray) -> FloatArray:
-    """Ratios, 0 or infinite at the ends of what was looked at."""
+    """Ratios, 0 or infinite at the ends of the searched range."""
     return np.where(ratio <= 2 * LOWEST, 0.0, np.where(ratio >= HIGHEST / 2, math.inf, ratio))
 
 

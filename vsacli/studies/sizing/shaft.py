@@ -1,4 +1,4 @@
-"""A motor on its own side of the gear, and what it does there for a demand on the joint's side.
+"""A motor on its own side of the gear, and its use there for a demand on the joint's side.
 
 With the ratio n, a motor that moves by theta on the joint's side turns by n theta. On its shaft it exerts
 
@@ -117,7 +117,7 @@ class Shaft(NamedTuple):
 
     @property
     def inertial(self) -> FloatArray:
-        """Coefficients of the seven signals in what grows with the ratio, (motors, 7)."""
+        """Coefficients of the seven signals in the part that grows with the ratio, (motors, 7)."""
         return self._coefficients(self.inertia, self.damping, 0, 0, 0, 0, 0)
 
     @property

@@ -1,4 +1,4 @@
-"""Sizing of drives: what trajectories require, which motors would do, and the robot's file with them."""
+"""Sizing of drives: the demands of trajectories, motors that will do, and the robot's file with them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def size_drives(
 
     Args:
         robot: the robot.
-        trajectories: what it is to do.
+        trajectories: to be executed.
         catalogue: path of a CSV file of motors; None to look at the robot's own alone.
         gears: ratios such as "50,80,100", or a range such as "30..160", for all joints, or for one of them as
             in "slide=500..3000"; any if empty. Motors that have a gear in the catalogue keep it.
@@ -180,7 +180,7 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
 
     Args:
         robot: as it was read from its file.
-        sizing: what was found for it, a motor for each place.
+        sizing: its result, a motor for each place.
         folder: where the text will stand.
 
     Raises:

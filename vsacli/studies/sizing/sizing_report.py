@@ -28,8 +28,8 @@ class Sizing(Published):
         candidates: how many motors are in it.
         criterion: by which the best is chosen, one of `CRITERIA`; None without a catalogue.
         motors: those of all joints in turn.
-        springs: what each must bear.
-        warnings: why the inputs may not be what was meant.
+        springs: load of each.
+        warnings: doubts about the inputs.
         notes: how the numbers are meant, where that is not obvious.
     """
 

@@ -33,7 +33,7 @@ class Column(NamedTuple):
         dims: dimensions after `run`.
         quantity: its unit.
         long_name: a few words.
-        of: gives its value, or those of two motors, from what it is kept of; None takes the attribute `name`.
+        of: gives its value, or those of two motors, from the source; None takes the attribute `name`.
         whole: whether it is NaN at a joint with infeasible or singular steps, since it would be that of the
             others alone.
     """
@@ -147,7 +147,7 @@ class Recorder:
         self._rows: list[FloatArray] = []
 
     def add(self, block: Block) -> None:
-        """Gather what is kept of the next steps."""
+        """Gather the kept values of the next samples."""
         if self._kept:
             first, count = -self._step % self._every, len(block.time)
             columns = [

@@ -79,7 +79,7 @@ class Dimension(NamedTuple):
     Attributes:
         path: to a number, or to several that take the same value, or to anything else.
         unit: SI unit of the number; empty if it is none, or not known.
-        values: those that it takes, each what the file could hold; empty if it is drawn.
+        values: as in files; empty if it is drawn.
         centre: about which it is drawn.
         tolerance: by which it is drawn; None if its values are listed.
         linked: path of the dimension that it is a multiple of, if it is of one.
@@ -125,7 +125,7 @@ def dimensions_of(
         before: dimensions of the entries before it.
 
     Raises:
-        InputError: the way of varying does not fit what is there.
+        InputError: the variation does not fit the value.
     """
     fitting = [each for each in numbers if _fits(each, varied.path)]
     unit = fitting[0].unit if fitting else ""
@@ -154,7 +154,7 @@ def dimensions_of(
 
 
 def _fits(number: Held, path: str) -> bool:
-    """Return whether a number is what a path leads to, or stands in it."""
+    """Return whether a path leads to a number, or to a record with it."""
     return any(fnmatchcase(each, pattern) for each in number[:2] for pattern in (path, f"{path}.*"))
 
 
@@ -205,10 +205,10 @@ class Entries:
     """The entries of `vary:`, with their problems.
 
     Args:
-        file: what the study file says.
+        file: content of the study file.
         path: of the study file.
         read: the robot file.
-        robot: what that says.
+        robot: its content.
         trajectories: paths of the trajectory files.
     """
 
@@ -229,7 +229,7 @@ class Entries:
         """Return the dimensions.
 
         Raises:
-            InputError: entries do not fit what is there, each with its line.
+            InputError: entries do not fit the values, each with its line.
         """
         problems, held_numbers = Problems(self._path), self._numbers()
         for varied in self._file.vary:
@@ -273,7 +273,7 @@ class Entries:
 
 @contextmanager
 def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
-    """Note what is wrong with an entry."""
+    """Note the problem of an entry."""
     try:
         yield
     except InputError as error:

@@ -54,7 +54,7 @@ Rows: TypeAlias = Callable[[Sequence[int]], Iterator[Row]]
 def executor(
     study: Study, runs: int, processes: int | None, dask: str | None, tell: Callable[[str], object]
 ) -> Iterator[Rows]:
-    """Return what computes rows of a study, for as long as the context lasts.
+    """Return the executor of the rows of a study, for as long as the context lasts.
 
     Args:
         study: the study.
@@ -62,7 +62,7 @@ def executor(
         processes: how many compute on this machine; as many as pay if None.
         dask: address of the scheduler of a Dask cluster whose workers compute instead, or "local" for one
             of `processes` of this machine.
-        tell: learns what is waited for.
+        tell: receives sentences on delays.
 
     Raises:
         InputError: there is no such cluster, or Dask is not installed.
@@ -110,7 +110,7 @@ class Executor(ABC):
 
     @abstractmethod
     def reason(self, task: Future[Answer], error: Exception) -> str:
-        """Return what became of the process whose task was lost.
+        """Return the fate of the process whose task was lost.
 
         Raises:
             InputError: no other one would do better.
@@ -217,7 +217,7 @@ class Processes(Executor):
 
 
 def _work(connection: Connection, job: Job) -> None:
-    """Read the study, then compute what is asked for until nobody asks."""
+    """Read the study, then compute requested runs until there are none."""
     leave_interrupts_to_others()
     with suppress(EOFError, OSError):  # whoever asked has gone
         answer(job, ())  # what is wrong with it the first task says
@@ -233,7 +233,7 @@ class Cluster(Executor):
         study: whose runs.
         address: of the scheduler, or `LOCAL`.
         processes: workers of a local cluster.
-        tell: learns what is waited for.
+        tell: receives sentences on delays.
     """
 
     def __init__(self, study: Study, address: str, processes: int, tell: Callable[[str], object]) -> None:

@@ -1,7 +1,7 @@
 """Rows that are finished, in a file that is only ever added to: whatever ends the study, they stay.
 
-The first line says that the file is a journal. Each further line holds the checksum of what follows, the key
-of the row, and the row. What a kill or a full disk left of the last line is cut off when the journal is
+The first line says that the file is a journal. Each further line holds the checksum of its rest, the key of
+the row, and the row. The remainder of a last line after a kill or a full disk is cut off when the journal is
 opened again; damaged lines before it are passed over.
 """
 

@@ -1,4 +1,4 @@
-"""The row of a run: what is kept of it, or why it could not be computed; and tasks of several runs.
+"""The row of a run: its kept values, or why it could not be computed; and tasks of several runs.
 
 A task is computed by another process, here or on another machine, which reads the study again by its `Job`.
 """
@@ -46,9 +46,9 @@ class Row(NamedTuple):
         key: of all that it depends on.
         verdict: of its report, or `FAILED`, or `IMPOSSIBLE`.
         error: the reason of the latter two, else empty.
-        values: costs of the optimum, if one was looked for, and what is kept, (columns,); empty if there is
+        values: costs of the optimum, if there is one, and the kept columns, (columns,); empty if there is
             nothing of which they could be.
-        curves: what is kept over time, flat; see `Recorder`.
+        curves: columns over time, flat; see `Recorder`.
     """
 
     run: int
@@ -81,7 +81,7 @@ def lost(study: Study, run: int, how: str) -> Row:
 class Computer:
     """Computes runs of a study, one after the other.
 
-    What is the same in consecutive runs is read once: the trajectory, as long as neither it nor who it is
+    Equal inputs of consecutive runs are read once: the trajectory, as long as neither it nor who it is
     for changes.
     """
 
@@ -93,7 +93,7 @@ class Computer:
         """Return the row of a run; no error of the run is raised.
 
         Raises:
-            ChangedError: a file is not what it was.
+            ChangedError: a file has changed.
         """
         point = self._study.point(run)
         key = self._study.key(point)

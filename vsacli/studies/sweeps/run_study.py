@@ -1,4 +1,4 @@
-"""A study carried out: what is missing is computed and kept in the journal, then all becomes a table."""
+"""Execution of a study: missing rows are computed and kept in the journal, then all become a table."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run_study(
     """Compute the runs of a study file, and write a table with a row for each.
 
     Finished rows are kept in a journal beside the table until that is written. Whatever ends the study, the
-    same call goes on with what is missing.
+    same call goes on with the missing rows.
 
     Args:
         path: the study file.
@@ -46,12 +46,12 @@ def run_study(
         processes: how many compute; by default one a processor. Rows do not depend on it. A script that calls
             this with more than one needs `if __name__ == "__main__":`, as the module `multiprocessing` says.
         dask: address of the scheduler of a Dask cluster that computes instead, or "local".
-        engine: what computes, "numpy" or compiled "c", or "auto", which takes the latter for all runs where
+        engine: the backend, "numpy" or compiled "c", or "auto", which takes the latter for all runs where
             that saves time.
         overwrite: whether a table that exists may be replaced.
-        command_line: what to remember of how it was called.
+        command_line: of the caller, for the provenance.
         progress: opens a bar over the runs that are missing.
-        tell: learns what is there already, and what was lost.
+        tell: receives the number of kept rows, and losses.
 
     Returns:
         The table, open; a context manager that closes it.
@@ -84,7 +84,7 @@ def run_study(
 
 
 def _part(study: Study, number: int, parts: int) -> tuple[range, str]:
-    """Return the runs of a part of a study, and what the name of its table ends with."""
+    """Return the runs of a part of a study, and the ending of the name of its table."""
     if not 1 <= number <= parts:
         raise InputError.one(
             f"shard must be the number of a part and how many there are, not {(number, parts)}"
@@ -111,7 +111,7 @@ def _computed(
     progress: Progress,
     tell: Callable[[str], object],
 ) -> dict[int, Row]:
-    """Compute what is missing in the journal; the rows of runs that were lost with their processes."""
+    """Compute rows missing in the journal; the rows of runs that were lost with their processes."""
     missing = [run for run in runs if study.key(study.point(run)) not in journal]
     if len(missing) < len(runs):
         tell(f"{len(runs) - len(missing):,} of {len(runs):,} runs are in {journal.path} already")

@@ -1,4 +1,4 @@
-"""A study as it is computed: files, what varies, which values each run has, and the engine of all of them."""
+"""A study as it is computed: files, dimensions, values of each run, and the backend of all of them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def settled_engine(
         name: as of `settle`.
         robot: as in its file.
         trajectories: paths of their files.
-        dimensions: what varies.
+        dimensions: the varied quantities.
         design: the points of each trajectory.
 
     Raises:
@@ -68,7 +68,7 @@ def _steps(path: str, robot: Robot, changes: Changes) -> int:
 
 
 class ChangedError(InputError):
-    """A file is not what it was when the study was read."""
+    """A file has changed since the study was read."""
 
 
 class Point(NamedTuple):
@@ -88,15 +88,15 @@ class Study:
     """A study.
 
     Attributes:
-        file: what the study file says.
+        file: content of the study file.
         source: the study file.
         read: the robot file.
-        robot: what that says, without changes.
+        robot: its content, without changes.
         trajectories: paths of the trajectory files.
         trajectory_sources: the files of each that were read.
-        dimensions: what varies.
+        dimensions: the varied quantities.
         design: which values each run has.
-        engine: what computes, "numpy" or "c".
+        engine: the backend, "numpy" or "c".
         compiler: of the latter, else empty.
     """
 
@@ -185,7 +185,7 @@ class Study:
         return self._named_files | {source.path: source.sha256 for source in self.sources}
 
     def check_read(self, sources: Iterable[Source]) -> None:
-        """Refuse to compute with files that were read again and are not what they were.
+        """Refuse to compute with files that were read again and have changed.
 
         Raises:
             ChangedError: one has another content than when the study was read.
@@ -195,7 +195,7 @@ class Study:
                 raise _changed(source.path)
 
     def check_files(self) -> None:
-        """Refuse to go on if a file is not what it was.
+        """Refuse to go on if a file has changed.
 
         Raises:
             ChangedError: one has another content than when the study was read, or has gone.

@@ -1,4 +1,4 @@
-"""Study files, `vsacli-study/1`: what they declare, ways of varying, and what is optimized in each run."""
+"""Study files, `vsacli-study/1`: their declarations, ways of varying, and the optimization of each run."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ FORMS = (
 
 
 class Listed(NamedTuple):
-    """Values one by one, each what the file could hold."""
+    """Values one by one, as in files."""
 
     values: tuple[Any, ...]
 
@@ -88,7 +88,7 @@ Way: TypeAlias = Listed | Spaced | Drawn | Ranged | Linked
 
 
 class Varied(NamedTuple):
-    """A path with its line in the study file, and how what it leads to varies."""
+    """A path with its line in the study file, and the variation of its value."""
 
     path: str
     line: int
@@ -96,7 +96,7 @@ class Varied(NamedTuple):
 
 
 class Ways(OwnKind):
-    """A mapping from paths into robot or trajectory to how what they lead to varies."""
+    """A mapping from paths into robot or trajectory to variations of their values."""
 
     words = "mapping from paths to values"
 
@@ -214,7 +214,7 @@ class Optimised:
         """Return the optimum of a run.
 
         Raises:
-            InputError: what is asked cannot be asked of this robot and trajectory.
+            InputError: the optimization does not apply to this robot and trajectory.
         """
         from vsacli.studies.search import optimize
 
@@ -240,7 +240,7 @@ class Optimised:
 
     @property
     def _cost(self) -> tuple[tuple[str, ...], Quantity, str]:
-        """Dimensions after `run`, unit and words of what is minimised."""
+        """Dimensions after `run`, unit and words of the minimized quantity."""
         if self.minimize == TIME:
             return (), units.TIME, "duration"
         from vsacli.studies.search.criteria import CRITERIA

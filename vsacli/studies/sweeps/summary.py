@@ -36,7 +36,7 @@ class Extreme(Stored):
         joint: name of the joint.
         margin: relative.
         run: its number.
-        at: what varies, as texts by path.
+        at: varied values, as texts by path.
     """
 
     joint: str

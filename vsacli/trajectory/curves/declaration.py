@@ -50,7 +50,7 @@ class Use:
     """The use of a declaration.
 
     Attributes:
-        signal: what is declared.
+        signal: the declared signal.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
     """
 

@@ -45,7 +45,7 @@ class HermiteSpline:
     """A profile through samples with all their derivatives, which belong together.
 
     Attributes:
-        signal: what is described.
+        signal: the described signal.
         time: of the samples, ascending from zero, (samples,) in s.
         rows: value and all derivatives, (orders, components, samples).
     """

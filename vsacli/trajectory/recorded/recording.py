@@ -116,7 +116,7 @@ def read_recording(
         joints: those that are commanded.
         wanted: the signals to read, each with what is said of its spline; all of joints if None, those of
             devices if they are there, each fitted as its noise asks for.
-        mapping: what columns with other names stand for.
+        mapping: assignment of columns with other names.
         resampled: whether the steps will be other times than the recorded ones.
         unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
         progress: opens a bar over the samples that splines are fitted to.

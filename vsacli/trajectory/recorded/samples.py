@@ -25,7 +25,7 @@ class Samples:
     """A signal at recorded times; `time_problems` and `value_problems` say what keeps it from being used.
 
     Attributes:
-        signal: what is described.
+        signal: the described signal.
         time: (samples,) in s, from the first sample on: stamps since 1970 are too coarse for splines.
         values: (components, samples); NaN throughout if the signal is optional and a component has none.
         derivatives: for each derivative of the signal the given values, (components, samples), or None.

@@ -1,6 +1,6 @@
 """Excitation trajectories of a family: sums of sinusoids for position and stiffness, from rest to rest.
 
-`allowed` says what each joint may do: the limits of the robot, cautious ones where it has none. A
+`allowed` gives the range of each joint: the limits of the robot, cautious ones where it has none. A
 `Design` makes members of its family from numbers, and `feasible` makes each as small as the limits of
 torques, currents and the like require.
 """
@@ -55,7 +55,7 @@ class Allowed(NamedTuple):
     Attributes:
         lowest, highest: positions, (joints,), rad (m).
         speed: largest velocity either way, (joints,), rad/s (m/s).
-        assumptions: what was assumed where the robot has no limit, one sentence each.
+        assumptions: where the robot has no limit, one sentence each.
     """
 
     lowest: FloatArray
@@ -104,7 +104,7 @@ def _assumptions(robot: Robot, middle: str) -> Iterator[str]:
 
 
 def _lacking(joint: Joint, middle: str) -> Iterator[str]:
-    """Limits that a joint has not, each with what is assumed."""
+    """Missing limits of a joint, each with its assumption."""
     position, velocity = units.POSITION.unit(joint.type), units.VELOCITY.unit(joint.type)
     if not np.isfinite(joint.limits.position).all():
         reach = f"{USUAL_REACH[joint.type]:.3g} {position} either way from {middle} assumed"
@@ -147,7 +147,7 @@ class Design:
 
     Attributes:
         robot: the robot.
-        allowed: what its joints may do.
+        allowed: ranges of its joints.
         duration: s.
         frequency: of the lowest harmonic, Hz.
     """
@@ -206,7 +206,7 @@ class Design:
         return _placed(raw, numbers, scale, (self.allowed.lowest, self.allowed.highest), (low, high))
 
     def _stiffness(self, numbers: FloatArray, position: Sinusoids, share: float) -> Sinusoids:
-        """Within what carries the motion."""
+        """Within the part that carries the motion."""
         lowest, highest = self._corridors(position)
         raw = self._raw(STIFFNESS, numbers)
         rows = raw.at(self.grid)
@@ -298,7 +298,7 @@ class Member(NamedTuple):
         numbers: of the member.
         trajectory: the excitation.
         block: all that inverse dynamics finds there.
-        value: what it is worth, the larger the better; NaN if nobody asked.
+        value: its merit, the larger the better; NaN if nobody asked.
     """
 
     design: Design

@@ -54,7 +54,7 @@ class Information:
         examples: motions from which it follows what no motion tells apart, and the size of torques.
 
     Attributes:
-        structural: what no motion tells, clauses.
+        structural: parameters that no motion identifies, clauses.
     """
 
     def __init__(self, robot: Robot, examples: Sequence[Block]) -> None:
@@ -106,7 +106,7 @@ class Information:
     def worth(self, block: Block) -> float:
         """Return the information of a motion, less a penalty for poorly conditioned equations.
 
-        What it tells is the logarithm of the determinant of the information matrix, of one row on average,
+        The information is the logarithm of the determinant of the information matrix, of one row on average,
         over twice the unknowns: D-optimality. It does not depend on the units of the unknowns, and is greater
         by 1 where standard errors are smaller by a factor e, on average.
         """
@@ -155,7 +155,7 @@ TORQUE_SHARE = 0.005
 
 
 class Noise(NamedTuple):
-    """Standard deviations of what sensors read, joint side of the gears.
+    """Standard deviations of sensor readings, joint side of the gears.
 
     Attributes:
         position: of joints and motors, rad (m).

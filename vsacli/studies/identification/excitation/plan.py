@@ -118,7 +118,7 @@ SHORTEST = 5.0
 """Duration, s: one period of the fastest family."""
 
 EXAMPLES = 4
-"""Members from which follows what no motion tells apart."""
+"""Members that show which parameters no motion distinguishes."""
 
 DRAWN = 10
 """Members of each family that are drawn for them at most."""
@@ -145,7 +145,7 @@ def plan_excitation(
         robot: with the numbers that are known so far.
         own: a motion to compare with, about whose middle joints move whose range is not limited.
         duration: s.
-        noise: standard deviations of what sensors read, for which standard errors are predicted: of positions
+        noise: standard deviations of sensor readings, for which standard errors are predicted: of positions
             of joints and motors, rad (m), and of motor torques, N m (N), joint side of the gears; None is
             0.5 % of the largest torque of each motor.
         seed: of the search, and of the noise.

@@ -1,4 +1,4 @@
-"""A planned excitation and what is known of it, as text, as JSON and as a trajectory file with comments."""
+"""A planned excitation and its merits, as text, as JSON and as a trajectory file with comments."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ class Excitation(Published):
         report: of inverse dynamics along it.
         seed: of the search that found it, and of the noise.
         noise: for which standard errors are predicted, in words.
-        planned: what it tells.
-        own: what the user's own motion tells; None if there is none.
-        structural: what no motion of the robot tells apart, sentences.
+        planned: its information.
+        own: information of the user's own motion; None without one.
+        structural: parameters that no motion of the robot distinguishes, sentences.
         active: bounds that keep it from being larger.
-        assumptions: what was assumed where the robot has no limits.
+        assumptions: where the robot has no limits.
     """
 
     robot: Robot = field(repr=False)
