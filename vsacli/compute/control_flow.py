@@ -28,7 +28,7 @@ def repeat(step: Step, state: Values, constants: Values, limit: int) -> Values:
     Args:
         step: from a state and the constants to the next state, and whether the sample is done with it.
         state: where to begin; arrays of any one shape.
-        constants: what else the step needs of each sample; arrays of that shape.
+        constants: further inputs of the step for each sample; arrays of that shape.
         limit: largest number of steps.
     """
     result: Values = repeat_on(state[0], step, state, constants, limit)
@@ -86,7 +86,7 @@ class Keyed:
     """A function that equals another one if its key does, for `call`.
 
     Attributes:
-        key: all that decides on what it computes.
+        key: all that decides on its results.
         function: the function.
     """
 

@@ -148,7 +148,7 @@ def _spread(tangent: Any, shape: tuple[int, ...]) -> FloatArray:
 
 
 def _sum_of(first: Any, second: Any) -> Dual:
-    """Return a sum; what has no tangent adds nothing to it."""
+    """Return a sum; operands without tangent add nothing to its tangents."""
     if not isinstance(second, Dual):
         return Dual(add(first.value, second), first.tangents)
     if not isinstance(first, Dual):

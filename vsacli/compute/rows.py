@@ -28,7 +28,7 @@ class RowLayout:
         self._places = dict(zip(self.shapes, (slice(*place) for place in pairwise(ends)), strict=True))
 
     def unpack(self, rows: Sequence[_Row]) -> dict[str, Sequence[_Row]]:
-        """Return the rows of each array; what lies beyond the last one is passed over."""
+        """Return the rows of each array; further ones are ignored."""
         return {name: rows[place] for name, place in self._places.items()}
 
     def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:

@@ -181,7 +181,7 @@ class FeedbackLinearization:
 
     Attributes:
         plant: the model that the law believes in.
-        law: what computes the torques of `plant`'s motors.
+        law: of the torques of `plant`'s motors.
     """
 
     def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:

@@ -21,7 +21,7 @@ NEWTON_STEPS = 4
 """Newton steps from a thousandth of the motion to the bottom of a dip."""
 
 VANISHING = 1e-12
-"""Share of the largest damping that counts as none: what rounding leaves of a dip to zero."""
+"""Share of the largest damping that counts as zero: the rounding of a dip to zero."""
 
 
 def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:

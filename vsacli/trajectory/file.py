@@ -40,7 +40,7 @@ DEFAULT_RATE = 1000.0
 class TrajectoryFile:
     """The content of a trajectory file.
 
-    What it declares of each signal is an attribute named by the key of the signal, see `content`.
+    The declaration of each signal is an attribute named by its key; see `content`.
     """
 
     name: str = value(Name(), "name of the trajectory")
@@ -124,7 +124,7 @@ class TrajectoryFile:
 
 @cache
 def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
-    """Return the record that says what a trajectory must have.
+    """Return the record with the required fields of a trajectory.
 
     Args:
         taken: keys of the signals that some joint takes, which must be there unless they are of a device;
@@ -144,7 +144,7 @@ def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] =
 
 
 OF_ANY_ROBOT = content(frozenset(), rigid=True)
-"""The content for a robot that is not known: what some robot would accept."""
+"""The content for an unknown robot: accepted if some robot would accept it."""
 
 
 def load_trajectory(
@@ -188,7 +188,7 @@ def declared_trajectory(
     changes: Changes = MappingProxyType({}),
     progress: Progress = unseen,
 ) -> Trajectory:
-    """Return a trajectory as its file has it: what devices do by themselves depends on numbers of the robot.
+    """Return a trajectory as in its file, without uncommanded devices, which depend on the robot.
 
     But for its warnings, it is the same for all robots with the same `CommandedJoints`.
 
@@ -313,7 +313,7 @@ def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
 
 
 def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_names: Sequence[str]) -> None:
-    """Refuse formulas that cannot last as long as what is recorded; the file alone could not tell."""
+    """Refuse formulas that cannot last as long as the recording; the file alone does not show it."""
     first, last = times.span
     problems = list(document.problems_over(last - first))
     if problems:

@@ -1,4 +1,4 @@
-"""Commanded motion of a block of steps: what every trajectory yields and the pipeline consumes."""
+"""Commanded motion of a block of samples, from any trajectory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Motion:
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
         commanded: signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples, joints);
             NaN for a joint that is not commanded so.
-        wrench: what the environment exerts on the end effector meanwhile, if anything.
+        wrench: of the environment on the end effector, if there is one.
     """
 
     time: FloatArray

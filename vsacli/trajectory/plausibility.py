@@ -47,7 +47,7 @@ LOWEST_SHARE = 0.2
 """A smaller share of the lowest stiffness at rest is no soft wish but another unit."""
 
 AMPLITUDES = frozenset(("sine", "cosine"))
-"""Keys of what swings about a stiffness, and is none."""
+"""Keys of amplitudes about a stiffness, which are no stiffness."""
 
 PER_SECOND = "per second"
 UNITS_OF_TIME = (Slip("ms", 1e-3, -1), Slip("us", 1e-6, -1), Slip("min", 60, -1), Slip("h", 3600, -1))
@@ -57,7 +57,7 @@ SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs"
 RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 FAST = ("fast motions of revolute joints", "fast motions of prismatic joints")
-"""Rules, also of the robot, that explain what others would find."""
+"""Rules, also of the robot, that explain findings of others."""
 
 
 def implausible(facts: Facts, source: Source) -> tuple[Problem, ...]:
@@ -159,7 +159,7 @@ def _velocities(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
 
 
 def _accelerations(facts: Facts, quantity: Quantity) -> Iterator[Measured]:
-    """Yield the largest of what is farthest from a joint, m/s^2."""
+    """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
     if facts.moved is not None and not facts.robot.placeholder:
         levers = np.where(facts.revolute, facts.sizes.levers, 1.0)
         yield from facts.paced(quantity, np.abs(facts.moved[2]).max(axis=1) * levers)
@@ -183,7 +183,7 @@ def _wrenches(facts: Facts, *, forces: bool) -> Iterator[Measured]:
 
 
 def _commanded(facts: Facts) -> Iterator[tuple[Measured, Joint, Corridor]]:
-    """Yield every stiffness but amplitudes, with its joint, and with what the springs give at rest."""
+    """Yield every stiffness but amplitudes, with its joint, and the stiffness of the springs at rest."""
     for measured, number in facts.of_joints(units.STIFFNESS) if not facts.robot.placeholder else ():
         found = facts.corridors[number]
         if found is not None and AMPLITUDES.isdisjoint(measured.path):

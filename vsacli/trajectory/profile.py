@@ -1,4 +1,4 @@
-"""A signal over time: what every kind of profile has, and the wrench in its frame."""
+"""A signal over time: the interface of profiles, and the wrench in its frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Profile(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why the values, or some of them, may not be what was meant."""
+        """Doubts about the values."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -52,7 +52,7 @@ class Profile(Protocol):
 
 @dataclass(frozen=True)
 class Continued:
-    """A profile at other steps than its own: at them it is what it is at any other time."""
+    """A profile at other samples than its own, where it has the values of any other time."""
 
     profile: Profile
 
@@ -63,7 +63,7 @@ class Continued:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why the values, or some of them, may not be what was meant."""
+        """Doubts about the values."""
         return self.profile.warnings
 
     @property

@@ -111,7 +111,7 @@ class RecordedTimes:
     """Times that are given one by one.
 
     Attributes:
-        time: (samples,) in s; see `time_problems` for what they must satisfy.
+        time: (samples,) in s; see `time_problems` for their conditions.
         notes: how they were understood, where that is not obvious.
     """
 

@@ -39,9 +39,9 @@ class Trajectory:
             1970 are rounded to 2.4e-7 s, too coarse for knots, integrators and differences.
         commanded: signals of `COMMANDED` by their keys, e.g. `stiffness`; NaN for a joint for which none is
             chosen.
-        wrench: what the environment exerts meanwhile; None if nothing.
+        wrench: of the environment; None without one.
         name: used in reports and for the name of the result file.
-        located_warnings: why times and profiles may not be what was meant; those on a number of the file with
+        located_warnings: doubts about times and profiles; those on a number of the file with
             its line.
         warnings: the same as texts.
         notes: how they were understood, where that is not obvious.
@@ -151,7 +151,7 @@ class Trajectory:
             ddq: second derivative of q.
             d3q: third derivative of q.
             d4q: fourth derivative of q.
-            wrench: what the environment exerts on the end effector, (samples, 6): force and moment about the
+            wrench: of the environment on the end effector, (samples, 6): force and moment about the
                 origin of the tool frame, N and N m, as are its derivatives per s^k; None if nothing.
             dwrench: first derivative of its components.
             ddwrench: second derivative of its components.

@@ -48,7 +48,7 @@ class Cache:
         """Return the library of a key, if there is one.
 
         Raises:
-            CacheError: there is, but it is not what was stored; it is removed.
+            CacheError: there is, but its content has changed; it is removed.
         """
         library = self.folder / key / LIBRARY
         if not library.parent.exists():
@@ -103,7 +103,7 @@ class Cache:
             self._remove(entry.key)
 
     def _make_room(self, new: str) -> None:
-        """Remove what was not used for the longest time until the rest is within bounds; a new one stays."""
+        """Remove the longest unused ones until the rest is within bounds; a new one stays."""
         entries = self.entries()
         excess = sum(entry.size for entry in entries) - MOST_BYTES
         for entry in entries:

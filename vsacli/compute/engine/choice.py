@@ -49,8 +49,8 @@ class Choice(NamedTuple):
 
     Attributes:
         engine: the engine chosen.
-        reason: what computes, and why; a clause.
-        compiler: what compiled the code, empty if none did.
+        reason: the backend, and why; a clause.
+        compiler: of the code, empty without one.
         threads: of compiled code.
     """
 
@@ -79,10 +79,10 @@ def choose(
 
     Args:
         name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: what is computed.
+        kernel: to be computed.
         samples: over how many samples.
         threads: of compiled code; as many as there are processors if None.
-        tell: learns what goes wrong on the way, and what will take long, before it does.
+        tell: receives problems on the way, and announcements of long work.
         busy: how many of the threads do something else meanwhile, as long as one is left.
 
     Raises:
@@ -128,7 +128,7 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
 
     Args:
         name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: what most of them compute.
+        kernel: of most of them.
         samples: over how many samples all of them compute it.
 
     Raises:

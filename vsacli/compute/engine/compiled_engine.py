@@ -22,9 +22,9 @@ class CompiledEngine:
     """Machine code, compiled for each kernel when it is first needed.
 
     Args:
-        compiler: what compiles.
+        compiler: to be used.
         threads: how many run at once.
-        tell: learns what is wrong with the cache of compiled code, and what will take long.
+        tell: receives problems with the cache of compiled code, and announcements of long work.
     """
 
     def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:

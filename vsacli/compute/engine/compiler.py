@@ -55,7 +55,7 @@ class Compiler:
 
     Attributes:
         command: how it is called.
-        identity: what decides on the code that it makes: version, processor, C library, flags.
+        identity: all that decides on its code: version, processor, C library, flags.
     """
 
     command: tuple[str, ...]

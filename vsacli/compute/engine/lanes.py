@@ -18,7 +18,7 @@ _CHOOSE: dict[Kind, str] = {
 
 
 def _function(kind: Kind, name: str) -> str:
-    """Return what lanes.c calls a function."""
+    """Return the name of a function in lanes.c."""
     return name if name == "search" else f"each_{name}_integer" if kind is Kind.INDEX else f"each_{name}"
 
 

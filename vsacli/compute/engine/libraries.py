@@ -27,7 +27,7 @@ _Opened = TypeVar("_Opened")
 
 
 class Code(NamedTuple):
-    """C text, and what it costs.
+    """C text, and its cost.
 
     Attributes:
         text: the text.
@@ -73,9 +73,9 @@ def load(
     """Return the library of some code; None if it is not there and not worth compiling.
 
     Args:
-        code: what to compile.
+        code: to be compiled.
         opened: loads a library, the same way wherever the text is the same; it may be removed once loaded.
-        compiler: what compiles it.
+        compiler: to be used.
         tell: learns what is wrong with the cache, which is no reason to fail, and what will take long.
         worthwhile: whether to compile it if it is not in the cache.
 

@@ -327,7 +327,7 @@ def trace(
         function: from rows of samples to rows of results; each sample is computed by itself.
         kinds: of the rows that it takes.
         most: operations that are recorded.
-        calling: whether calls are recorded as such, else what they do.
+        calling: whether calls are recorded as such, or expanded.
         short: whether subroutines are functions of their own.
 
     Raises:

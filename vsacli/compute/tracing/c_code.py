@@ -254,7 +254,7 @@ class Writer:
         return dialect.call(symbol.kind, C_NAMES.get(operation, operation), texts)
 
     def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
-        """Yield a function that puts what a program computes into an array of real numbers."""
+        """Yield a function that puts the results of a program into an array of real numbers."""
         yield head
         yield "{"
         yield from self.statements(program.operations, names)
@@ -263,7 +263,7 @@ class Writer:
         yield "}"
 
     def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """Yield an array of the results, and what fills it."""
+        """Yield an array of the results, and the statements that fill it."""
         assert self._name_of is not None
         (body,), *operands = symbol.operands
         own = _name(symbol, names, prefix)

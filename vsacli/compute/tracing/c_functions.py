@@ -94,7 +94,7 @@ class CallingCode:
     """The parts of C code for a program of calls.
 
     Args:
-        name: what the names of functions and tables begin with.
+        name: beginning of the names of functions and tables.
         program: one of nothing but calls and their items.
         writer: writes the bodies.
 

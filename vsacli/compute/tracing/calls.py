@@ -48,7 +48,7 @@ def with_outlined_runs(program: Program) -> Program:
 
 
 def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _Run]:
-    """Calls and their items as they are, and what lies between in runs."""
+    """Calls and their items as they are, and the operations between in runs."""
     run: list[Symbol] = []
     for symbol in operations:
         of_call = symbol.operation == "call" or _is_item_of_call(symbol)

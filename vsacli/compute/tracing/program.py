@@ -108,9 +108,9 @@ class Program(NamedTuple):
     """A program: what its outputs need, without a jump.
 
     Attributes:
-        inputs: what the program receives.
-        operations: what it does, in this order.
-        outputs: what it returns.
+        inputs: symbols of its inputs.
+        operations: in their order.
+        outputs: symbols or constants of its results.
     """
 
     inputs: tuple[Symbol, ...]

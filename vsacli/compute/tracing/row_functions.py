@@ -172,7 +172,7 @@ _Source = _Row | npt.NDArray[Any]
 
 
 class _Call(NamedTuple):
-    """A call of a function: what it is given, and where its results go."""
+    """A call of a function: its arguments, and the places of its results."""
 
     function: RowFunction
     given: list[_Source]

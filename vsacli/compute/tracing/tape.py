@@ -38,7 +38,7 @@ class Tape:
 
     Args:
         most: how many there may be; with one more it raises `TooLongError`.
-        calling: whether calls are recorded as such, else what they do.
+        calling: whether calls are recorded as such, or expanded.
         short: whether subroutines are functions of their own, else they are recorded where they stand.
 
     Attributes:

@@ -181,7 +181,7 @@ class _Called(NamedTuple):
 
     Attributes:
         body: its program.
-        result: the form of what it returns.
+        result: form of its result.
         returned: of each value in that, which of the inputs it is; None if it is an output of the body.
     """
 

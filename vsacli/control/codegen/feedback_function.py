@@ -60,7 +60,7 @@ class _Law:
     """The control law on rows of all its arguments.
 
     Attributes:
-        arguments: what it reads.
+        arguments: of the function.
     """
 
     def __init__(self, robot: Robot, frame: str | None) -> None:

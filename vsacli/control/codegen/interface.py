@@ -27,7 +27,7 @@ class Array:
     Attributes:
         name: as in C.
         shape: of the array.
-        meaning: what it holds, with its unit.
+        meaning: a few words, with its unit.
         bits: whether the entries are fields of bits, else numbers.
     """
 
@@ -49,7 +49,7 @@ class Structure:
 
     Attributes:
         name: as in C, without the prefix of the robot.
-        meaning: what it is.
+        meaning: a few words.
         arrays: its members.
         nominal: values of its entries, of which a constant is made; empty if there are none.
     """
@@ -91,7 +91,7 @@ class Function:
 
     Attributes:
         name: as in C, without the prefix of the robot.
-        meaning: what it computes, for the header.
+        meaning: for the header.
         arguments: structures that it reads, by the names of the arguments.
         result: structure that it fills.
         compute: from rows of samples of all entries of the arguments to rows of the entries of the result,

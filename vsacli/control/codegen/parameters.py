@@ -26,7 +26,7 @@ def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
 
 
 def _meaning(parameter: Parameter) -> str:
-    """Path and unit, and what the robot file demands of the number."""
+    """Path and unit, and the condition on the number in robot files."""
     unit = parameter.unit if parameter.unit != "1" else "no unit"
     return ", ".join(filter(None, (str(parameter), unit, parameter.requirement)))
 
@@ -37,7 +37,7 @@ def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequen
     What makes it is called again where these are symbols, so that there is no second text of anything.
 
     Raises:
-        NotImplementedError: what it does is decided by one of them.
+        NotImplementedError: a condition depends on one of them.
     """
     plain = make(robot, frame)
     if not chosen:

@@ -1,4 +1,4 @@
-"""Everything that `vsacli codegen` writes: header, source, self-test, what compiles them, README."""
+"""Everything that `vsacli codegen` writes: header, source, self-test, build files, README."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Project(NamedTuple):
     Attributes:
         files: texts by file name.
         omitted: the functions that there are not, with the reason; a sentence each.
-        warnings: what may be wrong with the robot, a sentence each; the files repeat it.
+        warnings: doubts about the robot, a sentence each; the files repeat them.
     """
 
     files: dict[str, str]

@@ -26,7 +26,7 @@ CASES = 6
 """Samples; the last one asks for half of the smallest stiffness that can be reached."""
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
-"""Half-widths of what is drawn, SI units; 1 for further signals."""
+"""Half-widths of the drawn values, SI units; 1 for further signals."""
 
 MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
 """Differences of the measured state from the command."""
@@ -44,7 +44,7 @@ class Comparison(NamedTuple):
     """The comparison of an array in the self-test.
 
     Attributes:
-        scale: what differences are relative to; 0 if there may be none, as of flags.
+        scale: of relative differences; 0 if there may be none, as of flags.
         bound: values beyond count as this one.
     """
 

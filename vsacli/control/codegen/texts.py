@@ -1,4 +1,4 @@
-"""Texts of the generated files: templates, and what fills their holes.
+"""Texts of the generated files: templates, and their values.
 
 A template in `templates/` is a file as it is written for every robot, with holes such as `@prefix`. Lists
 that depend on the robot, such as members of structures and reference values, are made here; the bodies of
@@ -104,10 +104,10 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, abou
     """Return the source file.
 
     Args:
-        prefix: what the names of the robot begin with.
-        functions: what it defines.
+        prefix: of the names of the robot.
+        functions: defined in it.
         precision: one of `vsacli.control.codegen.scalar.PRECISIONS`.
-        about: what the comment at its beginning says.
+        about: text of the comment at its beginning.
     """
     defined = "\n\n".join(definitions(prefix, functions, precision))
     return filled("robot.c", prefix, head=comment(about), definitions=defined)
@@ -238,7 +238,7 @@ NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
 def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
-    """Return the README: how to use the code, and what a call costs."""
+    """Return the README: how to use the code, and the cost of a call."""
     loop = next(function for function in functions if function.name == "inverse_dynamics")
     programs = [function.program for function in functions]
     costs = [worst_cost(program) for program in programs]

@@ -1,4 +1,4 @@
-"""A robot under a controller: what computes the motor torques, and the equations of motion of both."""
+"""A robot under a controller: the law of the motor torques, and the equations of motion of both."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class ClosedLoop:
 
     Args:
         robot: the robot as it is.
-        controller: what computes the torques; a motor gives at most its `max_torque`.
+        controller: law of the torques; a motor gives at most its `max_torque`.
         reference: gives the wrench that acts, and the damping.
 
     Attributes:

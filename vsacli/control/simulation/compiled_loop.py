@@ -143,7 +143,7 @@ class CompiledLoop:
     Args:
         functions: as `open_loop` gives them.
         numbers: of robot and controller, as the code counts them.
-        recording: what was compiled.
+        recording: the compiled one.
     """
 
     def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: Recording) -> None:

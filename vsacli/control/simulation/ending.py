@@ -21,8 +21,8 @@ class Ending:
 
     Attributes:
         time: when, s.
-        reason: what happened, as part of a sentence.
-        flag: what marks the last step of the joint to blame.
+        reason: of the end, as part of a sentence.
+        flag: of the last sample of the joint to blame.
         joint: its index; None, like the flag, if there is none.
         verdict: on a run that ends so, unless a flag says it.
     """

@@ -27,7 +27,7 @@ class RateFilter:
     """Backward differences of joint and motor positions, smoothed by a low-pass of first order.
 
     Args:
-        start: what is read of the first sample, whose velocities are known: the robot rests.
+        start: readings of the first sample, whose velocities are known: the robot rests.
     """
 
     def __init__(self, start: Phase) -> None:
@@ -78,7 +78,7 @@ def sampled(
 ) -> StateTrajectory:
     """Return the states of a run whose controller holds torques between the times, from measured positions.
 
-    What is measured are the readings of sensors, or the true positions.
+    Measured positions are the readings of sensors, or the true ones.
     """
 
     def read(state: FloatArray, sample: int) -> Phase:

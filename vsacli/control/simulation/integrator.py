@@ -65,7 +65,7 @@ class Method(Stored):
 class Effort(NamedTuple):
     """The effort of a run: methods, evaluations of the equations of motion, and their budget.
 
-    The provenance says what evaluated them: `engine`, `compiler` and `threads`.
+    The provenance names the backend: `engine`, `compiler` and `threads`.
     """
 
     methods: tuple[Method, ...]
@@ -78,7 +78,7 @@ class Integrator:
     """`solve_ivp` with boundaries at which a run ends, explicit as long as that leads to the end.
 
     Args:
-        equations: what to integrate, and where that ends.
+        equations: to integrate, with their boundaries.
         tolerances: of each step.
         progress: called with the time reached, s.
         sliding: of motors with sharp friction, at whose switches other equations of motion take over.

@@ -32,7 +32,7 @@ class GoalTolerance:
 
     Attributes:
         share: of the range over which the joint is commanded, from 0 to 1.
-        absolute: what is allowed beside it, so that a joint that is to hold still may err, too, rad (m).
+        absolute: added to it, so that a resting joint may have an error, too, rad (m).
 
     Raises:
         InputError: one is negative or not finite, both are zero, or the share exceeds 1.

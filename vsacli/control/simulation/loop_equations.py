@@ -67,7 +67,7 @@ class Edge:
     """The event of `solve_ivp` at the first boundary.
 
     Args:
-        equations: what is integrated.
+        equations: to integrate.
     """
 
     terminal = True
@@ -128,7 +128,7 @@ class Computing(NamedTuple):
     Attributes:
         engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
         tell: receives problems with compiled code, and announcements of long work.
-        runs: how many share what is compiled.
+        runs: how many share the compiled code.
     """
 
     engine: str
@@ -147,7 +147,7 @@ class RecordedEquations(Equations):
         loop: a robot under its controller.
         boundaries: at which a run ends.
         budget: of the run.
-        computing: what evaluates.
+        computing: the backend.
 
     Raises:
         InputError: there is no engine of that name; at the first evaluation, it is "c" and there is no
@@ -206,7 +206,7 @@ class RecordedEquations(Equations):
         return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
 
     def _improve(self) -> None:
-        """Take what is faster if it is due."""
+        """Take the faster backend if it is due."""
         if self.budget.used >= self._due:
             self._due = next(self._later, math.inf)
 

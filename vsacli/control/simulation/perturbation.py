@@ -138,7 +138,7 @@ def simulate_perturbed(
 
     Args:
         robot: the robot as it is.
-        trajectory: what it is to do.
+        trajectory: the commanded motion.
         relative: largest relative error of a parameter of the model; see `perturbed`.
         seeds: of the errors, one a run.
         processes: how many compute; a second for each to start is repaid by some ten runs. A script that asks

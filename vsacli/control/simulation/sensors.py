@@ -56,7 +56,7 @@ class Readings:
     The noise is drawn once: a controller that samples positions knows the numbers that are recorded.
 
     Args:
-        sensors: what is known of them.
+        sensors: their accuracy.
         robot: where they are.
         drivetrain: its motors and springs.
         samples: that a run has at most.

@@ -133,9 +133,9 @@ def simulate(
 
     Args:
         robot: the robot as it is.
-        trajectory: what it is to do; its wrench acts on the robot, and the controller knows it.
+        trajectory: the commanded motion; its wrench acts on the robot, and the controller knows it.
         gains: of feedback linearization; None applies the torques of the inverse dynamics (feedforward).
-        model: what the controller takes the robot for, e.g. by `perturbed`; the robot itself if None.
+        model: the robot as the controller knows it, e.g. by `perturbed`; the robot itself if None.
         initial_error: by how much the start differs from the command.
         measured: what the controller knows: the full "state" at every instant, or the "positions" of joints
             and motors at the steps of the trajectory, between which it holds its torques.
@@ -201,7 +201,7 @@ def _report(
         robot: as of `simulate`.
         trajectory: likewise.
         gains: likewise.
-        past: what happened.
+        past: the history.
         integrated: how it was integrated.
         goal_tolerance: as of `simulate`.
         exact: whether model and start were.
@@ -235,7 +235,7 @@ def _report(
 
 
 def check_measured(measured: Measured, gains: Gains | None) -> None:
-    """Refuse to measure what no controller uses.
+    """Refuse measurements that no controller uses.
 
     Raises:
         InputError: there is no such word, or positions are measured, but there is no feedback.

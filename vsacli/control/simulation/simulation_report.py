@@ -118,7 +118,7 @@ class SimulationReport(Stored):
 
     @property
     def largest_error(self) -> LargestError | None:
-        """The largest error of q on the way; None if what the joints may be off is not known."""
+        """The largest error of q on the way; None without a goal tolerance."""
         if any(math.isnan(joint.tolerance) for joint in self.joints):
             return None
         worst = max(self.joints, key=lambda joint: joint.q.peak / max(joint.tolerance, sys.float_info.min))

@@ -152,7 +152,7 @@ class PacedSearch:
     def _attempt(
         self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
     ) -> Minimum | None:
-        """Search from the wanted profile with as many instants as necessary; None if none keeps all bounds."""
+        """Search from the wanted profile with as many instants as needed; None if none keeps all bounds."""
         instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
         every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
         for _ in range(MOST_ROUNDS):

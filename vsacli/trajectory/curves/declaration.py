@@ -111,7 +111,7 @@ def odd(degrees: range, lowest: int, reason: str) -> Check:
 
 
 class Declaration(ABC):
-    """A type that a signal may be of in a trajectory file: what is declared, for each of its uses.
+    """A type of signal in a trajectory file: its fields, for each of its uses.
 
     Attributes:
         use: of the records that `record` makes.
@@ -226,7 +226,7 @@ class Formula(Declaration):
 
     @property
     def lasts(self) -> float | None:
-        """The duration that follows from what is declared, s; None if any will do."""
+        """Duration that follows from the declaration, s; None if any will do."""
         return None
 
     @abstractmethod
@@ -244,7 +244,7 @@ class Formula(Declaration):
             yield FieldProblem((), str(error))
 
     def warnings_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
-        """Why it may not be what was meant over a span, in clauses.
+        """Yield doubts about it over a span, in clauses.
 
         Args:
             _span: in s.

@@ -25,7 +25,7 @@ Position: TypeAlias = tuple[float, ...]
 
 
 class Part(Declaration):
-    """A motion with a duration of its own; what is declared may leave open where it begins."""
+    """A motion with a duration of its own; its declaration may leave the start open."""
 
     opening: ClassVar[tuple[str | int, ...]]
     """Path to where the position at its start is declared."""

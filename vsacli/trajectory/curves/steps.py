@@ -34,7 +34,7 @@ class Jump(NamedTuple):
         part: index of the later part.
         order: of the derivative, the lowest that jumps there.
         component: index; the first that jumps, if the value itself is continuous.
-        before, after: what it jumps from and to.
+        before, after: values on both sides of the jump.
     """
 
     part: int
@@ -128,7 +128,7 @@ def stepwise(
     """Levels that are held, with rest-to-rest changes from each to the next.
 
     Args:
-        signal: what steps.
+        signal: of the steps.
         span: of the whole, s.
         degree: of the changes.
         levels: one value a component each.

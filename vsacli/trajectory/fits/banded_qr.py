@@ -18,7 +18,7 @@ class Rows(NamedTuple):
     """Rows sorted by the block in which they start.
 
     Attributes:
-        blocks: (blocks, most rows of a block, 2 `BLOCK`); what is not used is zero.
+        blocks: (blocks, most rows of a block, 2 `BLOCK`); unused ones are zero.
         block: of each row, (rows,).
         place: of each row in its block, (rows,).
     """
@@ -29,7 +29,7 @@ class Rows(NamedTuple):
 
 
 class Factor(NamedTuple):
-    """The block-bidiagonal triangular factor of several estimations at a time, and what is left.
+    """The block-bidiagonal triangular factor of several estimations at a time, and the residuals.
 
     Attributes:
         diagonal: (candidates, blocks, `BLOCK`, `BLOCK`).
@@ -77,7 +77,7 @@ def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: 
 
     Args:
         data: rows, (blocks, rows, 2 `BLOCK`).
-        target: what the data rows are to give, (blocks, rows).
+        target: right-hand side of the data rows, (blocks, rows).
         prior: rows that are to give zero, (blocks, `BLOCK`, 2 `BLOCK`).
         weights: of the prior rows, (candidates, blocks, `BLOCK`).
     """
@@ -131,7 +131,7 @@ class Posterior:
         return values[:-1].ravel()
 
     def roots_of(self, rows: FloatArray, block: IndexArray | slice = slice(None)) -> FloatArray:
-        """Square roots of the covariances of what rows of the same block give, (..., rows, 2 `BLOCK`).
+        """Square roots of the covariances of values by rows of one block, (..., rows, 2 `BLOCK`).
 
         Args:
             rows: (..., rows, 2 `BLOCK`).

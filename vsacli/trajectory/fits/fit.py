@@ -1,4 +1,4 @@
-"""Splines that stand for recorded samples, what is known of their errors, and bounds where that is little."""
+"""Splines that replace recorded samples, with their errors, or bounds of these."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Part:
         members: their indices.
         spline: with one column a member.
         exact: whether it goes through the samples, rather than near them.
-        smoothing: what is known of it if it is a smoothing spline, or was compared with one.
+        smoothing: judgement of it if it is a smoothing spline, or was compared with one.
         smooth: whether it is a smoothing spline.
         noise: that it follows, since a filter made it smooth; the deviation in `smoothing` counts it.
     """
@@ -242,10 +242,10 @@ def join(
         degree: of their splines.
         parts: each component in at most one.
         time: (samples,) of the record, s.
-        rows: (components, samples), what was fitted.
+        rows: fitted samples, (components, samples).
         noise: estimated standard deviation of the samples, (components,); that of parts that are not exact
             is taken from their residual.
-        given: what the user says it is, (components,), NaN where nothing.
+        given: by the user, (components,), NaN where not given.
     """
     components = len(rows)
     residual, largest, noise = np.zeros(components), np.zeros(components), noise.copy()

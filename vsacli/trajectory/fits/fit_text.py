@@ -61,7 +61,7 @@ def fit_sentences(
 
 
 def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """Yield what recordings do not determine, by the smoothing splines of components."""
+    """Yield undetermined derivatives, by the smoothing splines of components."""
     for part in fit.parts:
         known = part.smoothing
         if known is None:

@@ -145,7 +145,7 @@ def _knots(time: FloatArray, spans: int, degree: int) -> FloatArray:
 
 
 def _add(bands: FloatArray, sums: FloatArray, time: FloatArray, rows: FloatArray, knots: FloatArray) -> None:
-    """Add what a block of samples gives to the normal equations: the lower bands and the right-hand sides."""
+    """Add a block of samples to the normal equations: the lower bands and the right-hand sides."""
     from scipy.interpolate import BSpline
 
     width = len(bands)

@@ -278,7 +278,7 @@ def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
     """Return whether steps of an encoder explain a residual: at constant velocity they are lines.
 
     Args:
-        row: (samples,), what was recorded.
+        row: recorded samples, (samples,).
         residual: (samples,), of its fit.
     """
     values = np.unique(row)

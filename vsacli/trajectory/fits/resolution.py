@@ -28,7 +28,7 @@ FIRST_DECADES = np.arange(-6.0, 19.0)
 """Penalties tried at the coarsest resolution, as powers of ten: from none to a polynomial."""
 
 NEAR_DECADES = np.arange(-5.0, 5.0)
-"""Penalties tried around what the coarser resolution found."""
+"""Penalties tried around those of the coarser resolution."""
 
 NEAR_CORRELATION = 1.2
 """Distance of inverse hyperbolic tangents within which correlations are tried around it."""
@@ -53,7 +53,7 @@ def most_likely(bins: Bins, coarser: Model | None) -> Model:
 
     Args:
         bins: of the record.
-        coarser: what was found with half as many spans, around which to search; None: everywhere.
+        coarser: result with half as many spans, around which to search; None: everywhere.
     """
     model = _segmented(_improved(_best_of_grids(bins, _grids(bins, coarser))))
     for _ in range(1 if _long(bins) else 2):
@@ -233,7 +233,7 @@ class Resolution(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Both together, as what is unresolved is an error like any other."""
+        """Both together, as an unresolved part is an error like any other."""
         return float(np.hypot(self.deviation, self.change))
 
     @property
@@ -261,7 +261,7 @@ def find_resolution(
         row: (samples,), of mean 0 and deviation 1.
         degree: of the spline.
         order: of the highest derivative that is needed.
-        known: what need not be estimated, the deviation in units of the row.
+        known: given noise and bandwidth, the deviation in units of the row.
         below: a frequency in Hz that no resolution that is tried may follow.
 
     Returns:

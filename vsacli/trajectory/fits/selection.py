@@ -52,7 +52,7 @@ class Record(NamedTuple):
             (components,).
         filtered: whether there is noise that was filtered, (components,).
         order: of the highest derivative that is needed.
-        known: what the user says of the noise of each component.
+        known: noise of each component as given by the user.
         least: derivative below which a component rests beside others that move, root mean square.
     """
 
@@ -83,7 +83,7 @@ def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part
     smoothing spline is the judge: the difference from it counts as a deviation.
 
     Args:
-        record: what was fitted.
+        record: the fitted one.
         fit: by least squares, or through the samples.
         bar: on which the samples of each component are counted when it is judged.
         chosen: whether the user chose it, so that it stays.

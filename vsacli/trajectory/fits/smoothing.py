@@ -129,7 +129,7 @@ class Smoothing:
         return self.resolved and self.relative <= DETERMINED
 
     def following(self, noise: FollowedNoise, size: float) -> Smoothing:
-        """Return what is known of a spline that follows noise, too.
+        """Return the judgement of a spline that follows noise, too.
 
         Args:
             noise: in its highest derivative.
@@ -174,10 +174,10 @@ def smoothing_spline(
         row: (samples,).
         degree: of the spline.
         order: of the highest derivative that is needed.
-        known: what need not be estimated.
+        known: given noise and bandwidth.
 
     Returns:
-        The spline, with one column, and what is known of it; None of a constant record, or one too short or
+        The spline, with one column, and its judgement; None for a constant recording, or one too short or
         uneven for any.
     """
     from scipy.interpolate import BSpline

@@ -50,7 +50,7 @@ FEWEST_LINES, FEW_LINES = 16, 12
 """Lines of a hump that is distinguished from a few sines; of a high hump."""
 
 PEAKED = 2.5
-"""Power of a hump over what its medians have, from which on lines make it up."""
+"""Power of a hump over its medians, from which on lines make it up."""
 
 SCATTER = (0.6, 1.8)
 """Standard deviation of the logarithms of a hump's lines about their medians; 1.28 of Gaussian noise."""

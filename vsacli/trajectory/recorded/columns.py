@@ -41,7 +41,7 @@ class Column:
     Attributes:
         index: its place, from 0.
         name: from the header, without the unit.
-        factor: what its numbers are multiplied by to be SI.
+        factor: of its numbers to SI units.
     """
 
     index: int

@@ -41,12 +41,12 @@ END_WEIGHTS = np.append(1.0, -np.vander([0.0], 4) @ np.linalg.pinv(np.vander(np.
 
 @dataclass(frozen=True, eq=False)
 class Faults:
-    """Samples, or stretches of them, that are not what a sensor of a moving robot gives.
+    """Samples, or stretches of them, that no sensor of a moving robot gives.
 
     Attributes:
         first: index of each, or of the first sample of each stretch, ascending; at least one.
         last: of the last sample of each stretch.
-        sizes: how bad each is: what a sample is off by, how long a stretch lasts in s.
+        sizes: the error of a sample, or the length of a stretch in s.
     """
 
     first: IndexArray

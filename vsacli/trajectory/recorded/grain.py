@@ -79,7 +79,7 @@ def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _quantum(values: FloatArray) -> float:
-    """Small changes from step to step that are none of rounding, or what no sensor resolves if it is more."""
+    """Small changes from sample to sample above rounding and the resolution of sensors."""
     largest = float(np.abs(values).max())
     changes = np.abs(np.diff(values, n=2))
     changes = changes[changes > ROUNDING * largest]

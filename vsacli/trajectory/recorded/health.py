@@ -1,6 +1,6 @@
-"""The health of a recording, told before anything is fitted to it: what a sensor or a log file spoiled.
+"""The health of a recording, judged before anything is fitted to it: faults of sensors and log files.
 
-A warning sums up a column: how often, when first, how badly at most, and what to do.
+A warning sums up a column: how often, when first, how badly at most, and advice.
 """
 
 from __future__ import annotations

@@ -44,11 +44,11 @@ class Recording:
     Attributes:
         times: the column `time`.
         profiles: one for each signal that was asked for, in that order.
-        warnings: what of it a sensor or a log file spoiled.
-        notes: what of the file is not used, and what was taken out of it.
+        warnings: faults by a sensor or a log file.
+        notes: unused parts of the file, and samples taken out.
         source: the file.
         lines: those of its rows.
-        first_stamp: what was taken off its times, see `Table`.
+        first_stamp: subtracted from its times, see `Table`.
         rated: whether its times follow from a rate, see `Table`.
     """
 
@@ -114,7 +114,7 @@ def read_recording(
     Args:
         path: a file with the columns `time` and those of `column_layout`.
         joints: those that are commanded.
-        wanted: the signals to read, each with what is said of its spline; all of joints if None, those of
+        wanted: the signals to read, each with the choice of its spline; all of joints if None, those of
             devices if they are there, each fitted as its noise asks for.
         mapping: assignment of columns with other names.
         resampled: whether the steps will be other times than the recorded ones.

@@ -22,14 +22,14 @@ from vsacli.trajectory.times import stretch
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """A signal at recorded times; `time_problems` and `value_problems` say what keeps it from being used.
+    """A signal at recorded times; `time_problems` and `value_problems` give reasons against its use.
 
     Attributes:
         signal: the described signal.
         time: (samples,) in s, from the first sample on: stamps since 1970 are too coarse for splines.
         values: (components, samples); NaN throughout if the signal is optional and a component has none.
         derivatives: for each derivative of the signal the given values, (components, samples), or None.
-        labels: what the components are called in sentences.
+        labels: names of the components in sentences.
         start: stamp of the first sample, s.
     """
 
@@ -98,7 +98,7 @@ class Samples:
             )
 
     def stretched(self, factor: float) -> Samples:
-        """Return the same values further apart; what was given of derivatives becomes smaller."""
+        """Return the same values further apart; given derivatives become smaller."""
         derivatives = tuple(
             None if given is None else given / factor**order
             for order, given in enumerate(self.derivatives, start=1)
@@ -115,9 +115,9 @@ class SampledProfile:
     Between them it is the function that samples with all derivatives determine, if they do, else the fit.
 
     Attributes:
-        record: what was recorded.
+        record: the recording.
         fit: of the values.
-        choice: what was said of the fit.
+        choice: of the fit.
         resampled: whether the steps are not the recorded times; only the fit counts then.
         warnings: which numbers are estimates, and given derivatives that do not follow from the values.
     """
@@ -141,7 +141,7 @@ class SampledProfile:
 
         Args:
             record: the samples.
-            choice: what is said of the fit; see `fit_samples`.
+            choice: of the fit; see `fit_samples`.
             resampled: whether the steps are not the recorded times.
             progress: opens a bar over the samples of all components.
         """
@@ -212,12 +212,12 @@ class SampledProfile:
 
     @cached_property
     def _through_all(self) -> bool:
-        """Whether given derivatives say what lies between the samples."""
+        """Whether given derivatives determine the values between the samples."""
         record = self.record
         return not self.resampled and record.complete and hermite.belong_together(record.time, record.rows)
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """Value and derivatives at the samples start..stop-1: what was given, and for the rest the fit."""
+        """Return value and derivatives at the samples start..stop-1: as given, and for the rest the fit."""
         record = self.record
         if self.resampled:
             return self.at(time)
@@ -248,8 +248,8 @@ class SampledProfile:
     def covariance(self, time: FloatArray) -> FloatArray:
         """Return covariances of value and derivatives at times, (components, orders, orders, samples).
 
-        Zero for what is given; NaN for components of which nothing can be said, as where the spline follows a
-        vibration that may be noise. Of those that are not `stated` it is no more than a bound.
+        Zero for given derivatives; NaN for components of which nothing can be said, as where the spline
+        follows a vibration that may be noise. Of those that are not `stated` it is no more than a bound.
         """
         found = self.fit.covariance(time)
         for each in self._unresolved:

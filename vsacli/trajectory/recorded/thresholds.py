@@ -36,7 +36,7 @@ FIT_DEVIATIONS = 8.0
 a fast motion, which no polynomial follows, reaches 2."""
 
 MARGIN = 6
-"""Samples on either side of what is off that a polynomial of degree `POLYNOMIAL` is put through."""
+"""Samples on either side of an outlier that a polynomial of degree `POLYNOMIAL` is put through."""
 
 POLYNOMIAL = 4
 
