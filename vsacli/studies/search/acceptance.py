@@ -171,7 +171,7 @@ class Acceptance:
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """All variables of one joint, by name."""
-        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular).arrays()}
+        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular)}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])
