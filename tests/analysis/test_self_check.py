@@ -14,11 +14,12 @@ from samples.marks import slow
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
+from vsacli.actuators.reach import OfJoint
 from vsacli.analysis.derivative_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.analysis.report import Report
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.drive import Drive, drive
+from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import Constant, RestToRest
@@ -216,11 +217,11 @@ def spoil_drive(
 ) -> None:
     """Let the actuation return a variable, (2, samples), with a defect, at one joint or at all."""
 
-    def spoiled(joint, *arguments) -> Drive:
+    def spoiled(joint, *arguments) -> OfJoint:
         driven = drive(joint, *arguments)
         if joint_name not in ("", joint.name):
             return driven
-        return driven._replace(**{name: spoil(getattr(driven, name))})
+        return {**driven, name: spoil(driven[name])}
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
 

@@ -14,7 +14,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck, OfJoint, within
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
@@ -192,14 +192,19 @@ class Actuator(ABC):
             yield LimitCheck(Flag.VOLTAGE_LIMIT, "voltage", number, within(motor.max_voltage or math.inf))
 
     @abstractmethod
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
-        """Return the torques and motions of springs and motors for a command.
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
+        """Compute the springs and the motion of the motors for a command.
 
         Args:
-            command: what the joint is asked to do; arrays (samples,).
+            command: motion and elastic torque of the joint; arrays (samples,).
             near_singular: margin below which a step is near-singular.
             integrated: deflections phi to use instead of those that `solve` finds, NaN where there are none;
                 given only if the kind has `deflection_rates`.
+
+        Returns:
+            The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `ddtheta`,
+            `tau_spring`, `elastic_energy`, `det_A`, `stiffness_lower`, `stiffness_upper` and `flags`; NaN
+            where the actuator has none, such as a second motor.
         """
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from vsacli.actuators.pairs.joints import beta, determinant, solve
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
 from vsacli.actuators.spring_elements import SpringElement
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, Pair, Record, check_fields, choice, value
@@ -132,17 +132,21 @@ class Antagonistic(Actuator):
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:
         return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
         """Deflections on the actuator's branch, their rates, and motor accelerations."""
         solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
         stiffness = command.commanded["stiffness"]
         phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
         moved = self._moved(command, solution, reached, phi)
-        return moved if self.coupling is None else _coupled(moved, self.coupling)
+        if self.coupling is None:
+            return moved
+        return {
+            **moved,
+            "tau_spring": moved["tau_spring"] + _between(self.coupling, phi),
+            "elastic_energy": moved["elastic_energy"] + self.coupling.energy(phi[0] - phi[1]),
+        }
 
-    def _moved(
-        self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray
-    ) -> Transmission:
+    def _moved(self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray) -> OfJoint:
         """Motion of both motors and torques of both springs at given deflections, (62)-(72).
 
         NaN where the step is infeasible; what needs the inverse of A also where it is singular.
@@ -155,20 +159,20 @@ class Antagonistic(Actuator):
         dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
         right = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
         ddtheta = solve(one, two, divisor, *right)  # (72)
-        return Transmission(
-            stiffness=command.commanded["stiffness"],
-            dstiffness=command.commanded["dstiffness"],
-            ddstiffness=command.commanded["ddstiffness"],
-            phi=phi,
-            dphi=np.stack(dphi),
-            ddtheta=np.stack(ddtheta),
-            tau_spring=np.stack((one.tau, two.tau)),
-            elastic_energy=energy_1 + energy_2,
-            det_A=det_a,
-            stiffness_lower=solution.lower,
-            stiffness_upper=solution.upper,
-            flags=reached.flags,
-        )
+        return {
+            "stiffness": command.commanded["stiffness"],
+            "dstiffness": command.commanded["dstiffness"],
+            "ddstiffness": command.commanded["ddstiffness"],
+            "phi": phi,
+            "dphi": np.stack(dphi),
+            "ddtheta": np.stack(ddtheta),
+            "tau_spring": np.stack((one.tau, two.tau)),
+            "elastic_energy": energy_1 + energy_2,
+            "det_A": det_a,
+            "stiffness_lower": solution.lower,
+            "stiffness_upper": solution.upper,
+            "flags": reached.flags,
+        }
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """sigma_k phi_k', and of a coupling U_3'' (phi_1' - phi_2')."""
@@ -236,14 +240,6 @@ class Antagonistic(Actuator):
     def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
         """Det A (67)."""
         return determinant(*self.pair.states(*phi))
-
-
-def _coupled(moved: Transmission, coupling: SpringLaw) -> Transmission:
-    """Return the same with a spring between the motors, which changes what they feel, and stores energy."""
-    return moved._replace(
-        tau_spring=moved.tau_spring + _between(coupling, moved.phi),
-        elastic_energy=moved.elastic_energy + coupling.energy(moved.phi[0] - moved.phi[1]),
-    )
 
 
 def _between(coupling: SpringLaw, phi: FloatArray) -> FloatArray:

@@ -24,8 +24,8 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import ElasticState
-from vsacli.actuators.reach import Reach, reach
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.reach import OfJoint, Reach, reach
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
 from vsacli.base.signals import DAMPING, STIFFNESS
@@ -141,7 +141,7 @@ class DampedSprings:
         if self._settable:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
-            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
+            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None)["phi"]
         if spread is None:
             return phi
         begin = self.spread(phi)
@@ -158,7 +158,7 @@ class DampedSprings:
         rate = springs.state.torque_rate(self._coordinates(command.dq, dtheta))[..., 0]
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
-    def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> Transmission:
+    def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> OfJoint:
         """Stiffness, motor motion and spring torques of a motion inside; as `Actuator.transmit`.
 
         The corridor is that of the springs' torque. A step is singular where the pivot is zero, not where
@@ -182,18 +182,18 @@ class DampedSprings:
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
         energy = self._elasticity.energy(self._at(phi, command.q))[..., 0]
-        return Transmission(
-            *self._stiffness(springs, rates, ddtheta, command),
-            phi=of_motors(phi),
-            dphi=of_motors(self._elasticity.deflections(command.dq[:, None], _columns(dtheta))[:, 0].T),
-            ddtheta=of_motors(ddtheta),
-            tau_spring=of_motors(springs.state.tau_spring[:, 0].T),
-            elastic_energy=np.where(reached.infeasible, np.nan, energy),
-            det_A=np.where(reached.infeasible, np.nan, springs.state.determinant()[..., 0]),
-            stiffness_lower=lower,
-            stiffness_upper=upper,
-            flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
-        )
+        return {
+            **dict(zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)),
+            "phi": of_motors(phi),
+            "dphi": of_motors(self._elasticity.deflections(command.dq[:, None], _columns(dtheta))[:, 0].T),
+            "ddtheta": of_motors(ddtheta),
+            "tau_spring": of_motors(springs.state.tau_spring[:, 0].T),
+            "elastic_energy": np.where(reached.infeasible, np.nan, energy),
+            "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant()[..., 0]),
+            "stiffness_lower": lower,
+            "stiffness_upper": upper,
+            "flags": reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+        }
 
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float

@@ -17,7 +17,7 @@ from vsacli.actuators.laws.law import PairSolution, SpringRows
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck, OfJoint, Reach
 from vsacli.actuators.spring_elements import SpringElement
-from vsacli.actuators.transmission import Command, Transmission, single_motor
+from vsacli.actuators.transmission import Command, single_motor
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
@@ -114,13 +114,11 @@ class Elastic(Actuator):
         torques = endless if self.spring is None else self.spring.torque_range
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
-    def transmit(
-        self, command: Command, _near_singular: float, _integrated: FloatArray | None
-    ) -> Transmission:
-        """Return the deflection at which the spring carries tau_e, and its derivatives."""
+    def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
+        """The deflection at which the spring carries tau_e, and its derivatives."""
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
-    def _linear(self, command: Command, stiffness: float) -> Transmission:
+    def _linear(self, command: Command, stiffness: float) -> OfJoint:
         """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
         phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
         return single_motor(
@@ -135,8 +133,8 @@ class Elastic(Actuator):
             flags=np.zeros(command.q.shape, dtype=np.uint16),
         )
 
-    def _nonlinear(self, command: Command) -> Transmission:
-        """Return the root of tau(phi) = tau_e, with tau_e' = sigma phi', tau_e'' = zeta phi'^2 + sigma phi''.
+    def _nonlinear(self, command: Command) -> OfJoint:
+        """The root of tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
 
         NaN where tau_e cannot be carried; what needs 1/sigma also where that is zero.
         """

@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command, Transmission, single_motor
+from vsacli.actuators.transmission import Command, single_motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import Record, check_fields, value
 
@@ -43,9 +43,7 @@ class Rigid(Actuator):
         """The one motor."""
         return (self.motor.at_joint,)
 
-    def transmit(
-        self, command: Command, _near_singular: float, _integrated: FloatArray | None
-    ) -> Transmission:
+    def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
         """No deflection; there is no stiffness, and so no derivative of one."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(

@@ -20,7 +20,7 @@ from vsacli.actuators.mechanisms.mechanism import Mechanism, MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import OfJoint, deflections_within_reach
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.transmission import Command
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -141,7 +141,7 @@ class Serial(Actuator):
         """Theta_1 = phi + q; theta_2 is the setting."""
         return np.stack((phi[0] + q, phi[1]))
 
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
         """Deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
         NaN where the step is infeasible; what needs the inverse of A also where it is singular.
@@ -155,20 +155,20 @@ class Serial(Actuator):
         rates = np.where(
             reached.singular[..., None], np.nan, state.rates(command.dtau_e, dstiffness, command.dq)
         )
-        return Transmission(
-            stiffness=stiffness,
-            dstiffness=dstiffness,
-            ddstiffness=ddstiffness,
-            phi=phi,
-            dphi=rates[..., :2].T,
-            ddtheta=state.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness).T,
-            tau_spring=state.tau_spring.T,
-            elastic_energy=state.energy,
-            det_A=state.determinant(),
-            stiffness_lower=solution.lower,
-            stiffness_upper=solution.upper,
-            flags=reached.flags,
-        )
+        return {
+            "stiffness": stiffness,
+            "dstiffness": dstiffness,
+            "ddstiffness": ddstiffness,
+            "phi": phi,
+            "dphi": rates[..., :2].T,
+            "ddtheta": state.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness).T,
+            "tau_spring": state.tau_spring.T,
+            "elastic_energy": state.energy,
+            "det_A": state.determinant(),
+            "stiffness_lower": solution.lower,
+            "stiffness_upper": solution.upper,
+            "flags": reached.flags,
+        }
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """Rates of the derivatives of the potential over theta_1 and theta_2."""

@@ -1,19 +1,22 @@
-"""The work of the actuator of a joint, whatever its kind: motors, springs, flags."""
+"""Actuation of a joint, (61)-(74): stiffness, motor motion and motor torques, whatever the kind of actuator.
+
+`driven_by` completes the variables that `Actuator.transmit` returns, `drive` adds the flags of limits.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
-from vsacli.actuators.motor import Windings
+from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command, Transmission
-from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
@@ -24,39 +27,14 @@ if TYPE_CHECKING:
     from vsacli.actuators.damped_springs import InternalMotion
 
 
-class Drive(NamedTuple):
-    """Stiffness, motor motion and motor torques of a joint; (2, samples) for the motors, else (samples,).
+ACTUATED = (
+    *("stiffness", "dstiffness", "ddstiffness", "phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring"),
+    *("tau_motor", "elastic_energy", "motor_power", "det_A", "stiffness_lower", "stiffness_upper", "flags"),
+)
+"""Result variables of the actuation of every joint, in the order of their rows."""
 
-    The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
-    where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have
-    is NaN throughout; what belongs to devices that the joint does not have, or to motors without torque
-    constant, is None.
-    """
-
-    stiffness: FloatArray
-    dstiffness: FloatArray
-    ddstiffness: FloatArray
-    phi: FloatArray
-    dphi: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    ddtheta: FloatArray
-    tau_spring: FloatArray
-    tau_motor: FloatArray
-    elastic_energy: FloatArray
-    motor_power: FloatArray
-    det_A: FloatArray  # noqa: N815  (the published name)
-    stiffness_lower: FloatArray
-    stiffness_upper: FloatArray
-    flags: FlagArray
-    tau_damper: FloatArray | None = None
-    current: FloatArray | None = None
-    voltage: FloatArray | None = None
-    copper_loss: FloatArray | None = None
-
-    def arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays that exist, by name."""
-        return {name: values for name, values in self._asdict().items() if values is not None}
+OF_DEVICES = ("tau_damper", *ELECTRICAL)
+"""Further ones of a joint with a damper, or with a motor that has a torque constant; they follow."""
 
 
 def drive(
@@ -65,8 +43,8 @@ def drive(
     near_singular: float = NEAR_SINGULAR_MARGIN,
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
-) -> Drive:
-    """Motor motion and motor torques of a joint, (61)-(74).
+) -> OfJoint:
+    """Compute motor motion and motor torques of a joint, (61)-(74).
 
     Args:
         joint: the joint with its actuator.
@@ -74,13 +52,18 @@ def drive(
         near_singular: margin below which a step is near-singular.
         integrated: deflections of a joint to use instead of the root of (14), (2, samples); a
             step where they are NaN is infeasible.
-        internal: what moves inside a transmission that is damped.
+        internal: motion inside a transmission that is damped.
+
+    Returns:
+        The variables `ACTUATED`, and those of `OF_DEVICES` that the joint has. Where a step is infeasible,
+        everything of the motors is NaN; where it is singular, everything that needs the inverse of the
+        decoupling matrix. A motor that the actuator does not have is NaN throughout.
     """
     driven = driven_by(joint, command, near_singular, integrated, internal)
-    of_joint = {**command.arrays(), **driven.arrays()}
-    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
+    of_joint = {**command.arrays(), **driven}
+    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven["flags"]))
     unexplained = not_finite_flags(_not_finite(joint, of_joint))
-    return driven._replace(flags=driven.flags | exceeded | unexplained)
+    return {**driven, "flags": driven["flags"] | exceeded | unexplained}
 
 
 def driven_by(
@@ -89,51 +72,41 @@ def driven_by(
     near_singular: float,
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
-) -> Drive:
-    """Return `drive` with the flags of reach alone; also with scalars that carry derivatives."""
+) -> OfJoint:
+    """Compute as `drive`, with the flags of reach alone; also with scalars that carry derivatives."""
     actuator = joint.actuator
     if internal is None:
-        transmission = actuator.transmit(command, near_singular, integrated)
+        found = dict(actuator.transmit(command, near_singular, integrated))
     else:
-        transmission = _damped(actuator, command, near_singular, internal)
-    dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
-    tau_motor = motor_torques(actuator, dtheta, transmission.ddtheta, transmission.tau_spring)
-    tau_damper, beside = _damper_torques(joint, command, transmission.dphi)
+        from vsacli.actuators.damped_springs import DampedSprings
+
+        found = dict(DampedSprings(actuator).transmit(command, internal, near_singular))
+    dtheta = actuator.motor_positions(found["dphi"], command.dq)  # (69)
+    tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_spring"])
+    tau_damper, beside = _damper_torques(joint, command, found["dphi"])
+    if tau_damper is not None:
+        found["tau_damper"] = tau_damper
     if beside is not None:
         tau_motor = tau_motor + beside
     windings = Windings.of(actuator.sides)
-    electrical: dict[str, Any] = (
-        {} if windings is None else windings.with_axis_behind().variables(tau_motor, dtheta)
-    )
-    driven = Drive(
-        **transmission._asdict(),
-        theta=actuator.motor_positions(transmission.phi, command.q),  # (69)
-        dtheta=dtheta,
-        tau_motor=tau_motor,
-        motor_power=tau_motor * dtheta,
-        tau_damper=tau_damper,
-    )._replace(**electrical)
-    return driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
+    if windings is not None:
+        found |= windings.with_axis_behind().variables(tau_motor, dtheta)
+    found["theta"] = actuator.motor_positions(found["phi"], command.q)  # (69)
+    found |= {"dtheta": dtheta, "tau_motor": tau_motor, "motor_power": tau_motor * dtheta}
+    found |= {name: _published(actuator, found[name]) for name in ("phi", "dphi")}
+    return {name: found[name] for name in (*ACTUATED, *(each for each in OF_DEVICES if each in found))}
 
 
 def motor_torques(
     actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_spring: FloatArray
 ) -> FloatArray:
-    """Torques of motors that move and bear springs so, (73)-(74) with friction; all (2, samples)."""
+    """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples)."""
     damping = _by_motor([motor.damping for motor in actuator.motors])
     torques = _rotor_torques(actuator, ddtheta) + damping * dtheta + tau_spring
     friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
     if friction is not None:
         torques = torques + friction.with_axis_behind().torque(dtheta)
     return torques
-
-
-def _damped(
-    actuator: Actuator, command: Command, near_singular: float, internal: InternalMotion
-) -> Transmission:
-    from vsacli.actuators.damped_springs import DampedSprings
-
-    return DampedSprings(actuator).transmit(command, internal, near_singular)
 
 
 def _damper_torques(
@@ -158,10 +131,10 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
 
 
 def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
-    """Return where a value of the motors is not finite, although neither infeasible nor singular.
+    """Return where a variable of the motors is not finite, and neither infeasible nor singular says why.
 
-    Of a demand that is no finite number itself, neither can be said. By (69) and (73)-(74) everything of a
-    motor goes into its position or its power; singular steps have no power.
+    A demand that is not finite is neither. By (69) and (73)-(74) every variable of a motor enters its
+    position or its power; singular steps have no power.
     """
     theta, tau_spring, power = (
         finite(of_joint[name][: joint.actuator.motor_count])
@@ -174,11 +147,10 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
 
 
 def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
-    """Phi of the motors that a spring lies behind; NaN of one that sets the springs."""
+    """Return phi of the motors behind a spring; NaN for one that sets the springs."""
     there = actuator.has(VARIABLES["phi"])[: actuator.motor_count]
     return phi if all(there) else np.where(np.array(actuator.has(VARIABLES["phi"]))[:, None], phi, np.nan)
 
 
 def _by_motor(values: list[float]) -> FloatArray:
-    """(2, 1), NaN for a motor there is not."""
     return np.stack([*values, *[math.nan] * (SIDES - len(values))])[:, None]

@@ -23,7 +23,7 @@ from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar
-from vsacli.dynamics.drive import Drive, drive
+from vsacli.dynamics.drive import ACTUATED, OF_DEVICES, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.losses import dissipated_power
@@ -37,7 +37,7 @@ from vsacli.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vsacli.actuators.damped_springs import InternalMotion
 
-COMPUTED = (*TORQUES, *Drive._fields, "dissipated_power")
+COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 """The variables that inverse dynamics computes, where the robot has them."""
 
 
@@ -127,7 +127,7 @@ class InverseDynamics(RowKernel):
         return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
 
     def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
-        """Return the variables of each joint by name, None for what it does not have."""
+        """Return the variables of each joint by name, without those that it does not have."""
         links, given = self.links, self.arguments.unpack(rows)
         demanded = links(rows[: links.inputs])
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
@@ -140,7 +140,7 @@ class InverseDynamics(RowKernel):
             internal = self._internal(index, given)
             driving = behind_link(drive, joint, self.limits[index])
             driven = call(rows[0], driving, command, self.near_singular, phi, internal)
-            found.append({**command.arrays(), **driven._asdict()})
+            found.append({**command.arrays(), **driven})
         if self.robot.has(VARIABLES["dissipated_power"]):
             for joint, of_joint in zip(self.robot.joints, found, strict=True):
                 of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
@@ -151,13 +151,10 @@ class InverseDynamics(RowKernel):
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
         return {
             name: rows_of_joints(
-                [
-                    absent[len(VARIABLES[name].dims)] if of_joint[name] is None else of_joint[name]
-                    for of_joint in of_joints
-                ]
+                [of_joint.get(name, absent[len(VARIABLES[name].dims)]) for of_joint in of_joints]
             )
             for name in COMPUTED
-            if name in of_joints[0]
+            if self.robot.has(VARIABLES[name])
         }
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:

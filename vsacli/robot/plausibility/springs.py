@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.transmission import Command
 from vsacli.base import units
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.plausibility import Measured, Rule, Slip
@@ -82,17 +83,17 @@ def _stiff_transmissions(facts: Facts) -> Iterator[Measured]:
     """Stiffness at rest over the weight at full reach, per rad."""
     for joint, measured, held in _single_springs(facts):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(float(held.stiffness[0]), facts.sizes.scale(joint)))
+            yield measured._replace(size=ratio(float(held["stiffness"][0]), facts.sizes.scale(joint)))
 
 
 def _soft_transmissions(facts: Facts) -> Iterator[Measured]:
     """Yield a rad, or the reach, over the deflection under what the weight can ask, if there is any."""
     for joint, measured, held in _single_springs(facts) if any(facts.gravity) else ():
-        yield measured._replace(size=ratio(_travel(facts, joint), float(held.phi[0, 1])))
+        yield measured._replace(size=ratio(_travel(facts, joint), float(held["phi"][0, 1])))
 
 
-def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, Transmission]]:
-    """Yield each joint without commanded stiffness: its spring at rest and under the largest weight.
+def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, OfJoint]]:
+    """Each joint whose stiffness is not commanded, with its spring at rest and under what the weight can ask.
 
     What is measured is the stiffness or the law; its size is to be replaced.
     """
@@ -154,7 +155,7 @@ def _least_stiffness(joint: Joint) -> float:
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
     held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), NEAR_SINGULAR_MARGIN, None)
-    return float(held.stiffness[0])
+    return float(held["stiffness"][0])
 
 
 def _largest_dampings(facts: Facts) -> Iterator[Measured]:

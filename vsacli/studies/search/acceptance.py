@@ -170,8 +170,8 @@ class Acceptance:
         return "" if trouble is None else trouble.clause(joint)
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
-        """Return all variables of one joint, by name."""
-        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular).arrays()}
+        """All variables of one joint, by name."""
+        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular)}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])

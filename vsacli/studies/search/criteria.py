@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck
+from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, TORQUE, Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import Drive, drive
+from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import apart
@@ -79,8 +79,8 @@ class Criterion:
             InputError: something is not given.
         """
 
-    def integrands(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """Return the integrands of the scaled cost, each (instants,).
+    def integrands(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
+        """What is integrated, each (instants,), by which the cost is scaled.
 
         Args:
             joint: the joint.
@@ -99,16 +99,16 @@ class Criterion:
         """Number of `bounds`."""
         return 0
 
-    def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
-        """Return values that a level keeps from being positive, each (instants,)."""
+    def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
+        """What a level keeps from being positive, each (instants,)."""
         return ()
 
-    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """Return the cost itself, in its unit."""
+    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+        """The cost itself, in its unit."""
         raise NotImplementedError
 
-    def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """Return the scale of the cost: its value for some motion."""
+    def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+        """By what it is scaled: what it is, of some motion."""
         return self.of(joint, driven, time)
 
     def of_run(self, result: Result, index: int) -> float:
@@ -126,7 +126,7 @@ class NoCost(Criterion):
     over_time = ()
 
     def integrands(
-        self, _joint: Joint, _driven: Drive, _level: Values | None, _scale: Scale
+        self, _joint: Joint, _driven: OfJoint, _level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
         """Return the integrands of the scaled cost, each (instants,)."""
         return ()
@@ -147,9 +147,9 @@ class Torque(Criterion):
     quantity = TORQUE
     relative = True
 
-    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """Return the mean square."""
-        torques = _of_motors(joint, driven.tau_motor)
+    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The mean square."""
+        torques = _of_motors(joint, driven["tau_motor"])
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -157,7 +157,7 @@ class Torque(Criterion):
         weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
         return weights
 
-    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
         """N m (N)."""
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
@@ -186,11 +186,11 @@ class Copper(Criterion):
                 "torque_constant and resistance, or --minimize torque"
             )
 
-    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """Return the power of all windings."""
-        return [sum(_of_motors(joint, driven.copper_loss)) / scale.cost]
+    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The power of all windings."""
+        return [sum(_of_motors(joint, driven["copper_loss"])) / scale.cost]
 
-    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
         """J."""
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
@@ -212,12 +212,12 @@ class Energy(Criterion):
     words = "energy spent"
     smoothings = SMOOTHINGS
 
-    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """Return the positive part of each power, smoothed; and the energy in the springs."""
+    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The positive part of each power, smoothed; and the energy in the springs."""
         width = scale.smoothing * scale.cost / scale.duration
-        powers = _of_motors(joint, driven.motor_power)
+        powers = _of_motors(joint, driven["motor_power"])
         positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
-        return [sum(positive) / scale.cost, driven.elastic_energy / scale.cost]
+        return [sum(positive) / scale.cost, driven["elastic_energy"] / scale.cost]
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return an integral, and the value at the start."""
@@ -225,19 +225,19 @@ class Energy(Criterion):
         loaded[0] = 0.0 if self.repeating else 1.0
         return np.stack([trapezoidal(time), loaded])
 
-    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
         """J."""
-        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven.motor_power))
-        return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
+        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven["motor_power"]))
+        return float(np.sum(self.weights(time) * np.stack([spent, driven["elastic_energy"]])))
 
     def of_run(self, result: Result, index: int) -> float:
         """J, as in the report of the run."""
         spent = result.report.joints[index].energy.spent
         return spent if self.repeating else spent + float(result.elastic_energy[0, index])
 
-    def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
-        """Return the absolute work of the motors: their positive work may be nothing."""
-        passed = sum(map(np.abs, _of_motors(joint, driven.motor_power)))
+    def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+        """What passes the motors either way: what they spend may be nothing."""
+        passed = sum(map(np.abs, _of_motors(joint, driven["motor_power"])))
         return float(trapezoidal(time) @ passed) or 1.0
 
 
@@ -251,8 +251,10 @@ class Peak(Criterion):
     over_time = ()
     levels = 1
 
-    def integrands(self, _joint: Joint, _driven: Drive, level: Values | None, _scale: Scale) -> Sequence[Any]:
-        """Return the level."""
+    def integrands(
+        self, _joint: Joint, _driven: OfJoint, level: Values | None, _scale: Scale
+    ) -> Sequence[Any]:
+        """The level."""
         return [level]
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -263,14 +265,14 @@ class Peak(Criterion):
         """Two a motor."""
         return 2 * joint.actuator.motor_count
 
-    def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """Return the torques, either way."""
-        torques = _of_motors(joint, driven.tau_motor)
+    def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The torques, either way."""
+        torques = _of_motors(joint, driven["tau_motor"])
         return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
 
-    def of(self, joint: Joint, driven: Drive, _time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: OfJoint, _time: FloatArray) -> float:
         """N m (N)."""
-        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
+        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven["tau_motor"])))
 
     def of_run(self, result: Result, index: int) -> float:
         """N m (N)."""

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, by_joint
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.duals import Dual, value_of
-from vsacli.dynamics.drive import Drive, driven_by
+from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Robot
@@ -312,7 +313,7 @@ class PacedJoint:
                 command = command._replace(commanded={**command.commanded, **asked})
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint
             driven = driven_by(joint, command, self._near_singular)
-            variables = {**command.arrays(), **driven.arrays()}
+            variables = {**command.arrays(), **driven}
             bounds = [*self._corridor(driven), *limit_bounds(self._checks, variables, self._clearance)]
             costed = (self._joint, driven, level[0] if len(level) else None, self.scale)
             integrands = list(self.criterion.integrands(*costed))
@@ -320,12 +321,12 @@ class PacedJoint:
                 integrands[index] = integrands[index] * pace[0]
         return integrands, [*bounds, *self.criterion.bounds(*costed)]
 
-    def _corridor(self, driven: Drive) -> Iterator[Any]:
+    def _corridor(self, driven: OfJoint) -> Iterator[Any]:
         if self._chosen:
             margin = self._near_singular
-            yield driven.stiffness_lower / ((1 - margin) * driven.stiffness) - 1 + CLEARANCE
-            unbounded = np.isinf(driven.stiffness_upper)
-            upper = np.where(unbounded, 1.0, driven.stiffness_upper) / ((1 + margin) * driven.stiffness)
+            yield driven["stiffness_lower"] / ((1 - margin) * driven["stiffness"]) - 1 + CLEARANCE
+            unbounded = np.isinf(driven["stiffness_upper"])
+            upper = np.where(unbounded, 1.0, driven["stiffness_upper"]) / ((1 + margin) * driven["stiffness"])
             yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
 
 

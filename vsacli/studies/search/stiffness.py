@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import Drive, driven_by
+from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range, checked_range
@@ -89,11 +90,11 @@ class FixedMotion:
         low, high = (row[instants] for row in self.admissible)
         size = self.stiffness
         bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
-        bounds += limit_bounds(self._limits, driven.arrays(), self._clearance)
+        bounds += limit_bounds(self._limits, driven, self._clearance)
         return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
 
-    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> Drive:
-        """Return the drive for a stiffness and its derivatives."""
+    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
+        """What the motors do with a stiffness and its derivatives."""
         load = self.load.at(instants).command
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
