@@ -93,7 +93,7 @@ def _soft_transmissions(facts: Facts) -> Iterator[Measured]:
 
 
 def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, OfJoint]]:
-    """Each joint whose stiffness is not commanded, with its spring at rest and under what the weight can ask.
+    """Yield each joint without commanded stiffness: its spring at rest and under the largest weight.
 
     What is measured is the stiffness or the law; its size is to be replaced.
     """

@@ -80,7 +80,7 @@ class Criterion:
         """
 
     def integrands(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """What is integrated, each (instants,), by which the cost is scaled.
+        """Return the integrands of the scaled cost, each (instants,).
 
         Args:
             joint: the joint.
@@ -100,7 +100,7 @@ class Criterion:
         return 0
 
     def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
-        """What a level keeps from being positive, each (instants,)."""
+        """Return values that a level keeps from being positive, each (instants,)."""
         return ()
 
     def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
@@ -108,7 +108,7 @@ class Criterion:
         raise NotImplementedError
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """By what it is scaled: what it is, of some motion."""
+        """Return the scale of the cost: its value for some motion."""
         return self.of(joint, driven, time)
 
     def of_run(self, result: Result, index: int) -> float:
@@ -236,7 +236,7 @@ class Energy(Criterion):
         return spent if self.repeating else spent + float(result.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """What passes the motors either way: what they spend may be nothing."""
+        """Return the absolute work of the motors: their positive work may be nothing."""
         passed = sum(map(np.abs, _of_motors(joint, driven["motor_power"])))
         return float(trapezoidal(time) @ passed) or 1.0
 

@@ -94,7 +94,7 @@ class FixedMotion:
         return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
 
     def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
-        """What the motors do with a stiffness and its derivatives."""
+        """Return the variables of the motors for a stiffness and its derivatives."""
         load = self.load.at(instants).command
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
