@@ -1,4 +1,4 @@
-"""What the program asks of an actuator, whatever its kind."""
+"""The interface of every kind of actuator: motors, springs, limits, and the transmission of a command."""
 
 from __future__ import annotations
 
@@ -51,13 +51,14 @@ class PlaceholderConstants(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """What springs carry at given deflections, by their laws; arrays (samples,).
+    """Torques and stiffness of springs at given deflections, by their laws; arrays (samples,).
 
     Attributes:
         tau_e: torque on the link.
-        size: of the torques that it is the sum of.
+        size: sum of the absolute torques of which tau_e is the sum.
         stiffness: of the joint.
-        stiffness_size: of what that is the sum of; rounding of the deflections changes it by eps times this.
+        stiffness_size: the same for the terms of the stiffness, which rounding of the deflections changes by
+            eps times this.
         tau_spring: torque against each motor, (motors, samples).
     """
 
@@ -69,12 +70,12 @@ class Carried(NamedTuple):
 
 
 class SpringLoad(NamedTuple):
-    """What one of an actuator's springs bears, or all springs of a mechanism; arrays (samples,).
+    """The load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
 
     Attributes:
-        name: which it is.
+        name: of the spring.
         deflection: of the spring; of a mechanism, between motor 1 and link.
-        torque: that of the deflection.
+        torque: of the spring at that deflection.
         energy: in it, J.
         max_deflection: largest admissible |deflection|.
     """
@@ -87,7 +88,7 @@ class SpringLoad(NamedTuple):
 
 
 class Actuator(ABC):
-    """What drives a joint: motors, and springs between them and the link.
+    """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
     Below, phi (2, samples) is what describes the springs: the deflection of each of them, or whatever the
@@ -107,7 +108,7 @@ class Actuator(ABC):
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
-        """Which columns of a result variable its joints have: of motors 1 and 2, or of the joint."""
+        """Return which columns of a result variable its joints have: of motors 1 and 2, or of the joint."""
         of_kind = {None: True, SPRINGS: cls.sprung}
         there = of_kind.get(variable.requires, variable.requires in cls.commanded)
         if "motor" not in variable.dims:
@@ -135,7 +136,7 @@ class Actuator(ABC):
     @property
     @abstractmethod
     def motors(self) -> tuple[JointMotor, ...]:
-        """Its motors as the joint has them."""
+        """Motors with constants on the joint side of the gear."""
 
     @property
     def coupled_rotors(self) -> float:
@@ -159,12 +160,12 @@ class Actuator(ABC):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest phi for which the springs' laws hold; or what `Elasticity.ranged` gives."""
+        """Lowest and highest phi, or values of `Elasticity.ranged`, for which the springs' laws hold."""
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about its springs."""
+        """Sentences on limits of validity of its springs, for the user."""
         return ()
 
     @property
@@ -174,16 +175,16 @@ class Actuator(ABC):
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
-        """Its springs, if a weighted sum of positions stretches each; None if they are no such springs."""
+        """The springs, if a weighted sum of positions stretches each; else None."""
         return None if self.sprung else ()
 
     @property
     def lever_spring(self) -> LeverSpring | None:
-        """Its only spring, if that lies between a lever and a point of the link."""
+        """The only spring, if it lies between a lever and a point of the link."""
         return None
 
     def limits(self) -> Iterator[LimitCheck]:
-        """Its limits, finite or not."""
+        """Yield the limits, finite or not."""
         for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
             yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
             yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
@@ -216,14 +217,14 @@ class Actuator(ABC):
         """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
-        """What its springs bear, from the other variables of the joint; of those behind motor 1 together."""
+        """Return the loads of its springs from the variables of the joint; by default of all together."""
         if not self.sprung:
             return ()
         loaded = of_joint["phi"][0], of_joint["tau_spring"][0], of_joint["elastic_energy"]
         return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """What the springs carry by their laws, from the motion of joint and motors."""
+        """Compute torque and stiffness of the springs by their laws, from the motion of joint and motors."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
     @property
@@ -257,7 +258,7 @@ class Actuator(ABC):
     """Path to that field."""
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Where another choice of the preload would reach the stiffness, (samples,)."""
+        """Return where the opposite preload would reach the stiffness, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     integrable: ClassVar[bool] = False

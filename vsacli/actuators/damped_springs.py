@@ -1,4 +1,4 @@
-"""Springs with a damper beside them, as in CompAct: the link feels tau_l = T(phi) + d w.
+"""Springs with a parallel damper, as in CompAct: the link feels tau_l = T(phi) + d w.
 
 Here w is the velocity of the damper, the sum of theta_k' - q' over the motors that a spring lies behind, and
 T the torque of the springs. The motors' velocities follow from w and from the rate of the stiffness,
@@ -32,11 +32,10 @@ from vsacli.base.signals import DAMPING, STIFFNESS
 from vsacli.base.variables import VARIABLES
 
 NEWTON_STEPS = 4
-"""From a guess that is 1e-4 off, three reach rounding; one more does no harm."""
-
+"""Newton steps of `settled`: from a guess that is 1e-4 off, three reach rounding; one more does no harm."""
 
 CONTINUATION_STEPS = 200
-"""From the equilibrium to where a robot file says that the motion starts."""
+"""Steps from the equilibrium to the `start` that a robot file gives a damper."""
 
 
 class InternalMotion(NamedTuple):
@@ -45,7 +44,7 @@ class InternalMotion(NamedTuple):
     Attributes:
         phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
             a guess from which the stiffness is found.
-        velocity: w, the rate of the spread, (samples,); what follows from the damping if None.
+        velocity: w, the rate of the spread, (samples,); None: it follows from the damping.
         acceleration: its derivative, (samples,), likewise.
     """
 
@@ -116,7 +115,7 @@ class DampedSprings:
         return self._springs(phi, q).pivot
 
     def within(self, phi: FloatArray) -> BoolArray:
-        """Where the laws of the springs hold."""
+        """Return where the laws of the springs hold."""
         lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
         inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
         return np.asarray(np.all(inside, axis=0))
@@ -150,7 +149,7 @@ class DampedSprings:
         return phi
 
     def driven(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
-        """What moves at deflections: w = (tau_l - T)/d, and w' = (tau_l' - d' w - T')/d."""
+        """Compute the motion inside at deflections: w = (tau_l - T)/d, and w' = (tau_l' - d' w - T')/d."""
         damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
         springs = self._springs(phi, command.q)
         velocity = (command.tau_e - springs.state.tau_e[..., 0]) / damping
@@ -198,7 +197,7 @@ class DampedSprings:
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
-        """The corridor at the torque of the springs, and what is wrong with the step."""
+        """Return the attainable range at the torque of the springs, and the flags of reach."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
         never = np.zeros_like(lost)
         if not self._settable:
@@ -219,7 +218,7 @@ class DampedSprings:
         )
 
     def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
-        """How far the stiffness is from its extremum at the same spread, relative to itself."""
+        """Return the relative distance of the stiffness from its extremum at the same spread."""
         bent = springs.state.stiffness_curvature(self._coordinates(0 * stiffness, self._along(stiffness)))
         divisor = 2 * stiffness * np.abs(bent[..., 0])
         margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
@@ -244,7 +243,7 @@ class DampedSprings:
         return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
 
     def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
-        """What solves both rows; the first alone if there is one motor."""
+        """Solve both rows; the first alone if there is one motor."""
         if self._motors == 1:
             return of_spread[None]
         (b_1, b_2), (g_1, g_2) = self._behind, springs.stiffness
@@ -258,7 +257,7 @@ class DampedSprings:
     def _stiffness(
         self, springs: _Springs, rates: FloatArray, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As it is commanded; else what the springs have there, with its derivatives."""
+        """Return the stiffness with its derivatives: as commanded, else from the springs."""
         if self._settable:
             stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
             return stiffness, rate, acceleration
@@ -284,7 +283,7 @@ class DampedSprings:
         return self._coordinates(q, self._actuator.motor_positions(phi, q)[: self._motors])
 
     def _coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Of the springs, (samples, 1 joint, coordinates), from positions of joint and motors, or rates."""
+        """Return the springs' coordinates, (samples, 1 joint, coordinates), from positions, or rates."""
         return self._elasticity.coordinates(q[:, None], _columns(theta))
 
 

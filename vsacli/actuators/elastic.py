@@ -80,22 +80,22 @@ class Elastic(Actuator):
 
     @property
     def max_deflections(self) -> tuple[float, ...]:
-        """That of the spring; none of a linear one."""
+        """See `Actuator.max_deflections`; a linear spring has no limit."""
         return (math.inf if self.spring is None else self.spring.max_deflection,)
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """That of the spring."""
+        """Domain of the law."""
         return (self.law.domain,)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the spring."""
+        """Warnings of the spring."""
         return self.law.warnings
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the spring."""
+        """Files of the spring."""
         return self.law.sources
 
     @property
@@ -104,7 +104,7 @@ class Elastic(Actuator):
         return (SpringElement(self.law, -1.0, (1.0,)),)
 
     def limits(self) -> Iterator[LimitCheck]:
-        """Those of every actuator, and the torques that the spring can carry."""
+        """Yield the limits of every actuator, and the torques that the spring can carry."""
         yield from super().limits()
         yield self._carriable
 
@@ -115,7 +115,7 @@ class Elastic(Actuator):
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
     def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
-        """The deflection at which the spring carries tau_e, and its derivatives."""
+        """Compute the deflection at which the spring carries tau_e, and its derivatives."""
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> OfJoint:
@@ -134,9 +134,9 @@ class Elastic(Actuator):
         )
 
     def _nonlinear(self, command: Command) -> OfJoint:
-        """The root of tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
+        """Solve tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
 
-        NaN where tau_e cannot be carried; what needs 1/sigma also where that is zero.
+        NaN where tau_e cannot be carried; derivatives, which need 1/sigma, also where sigma is zero.
         """
         law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)

@@ -44,7 +44,7 @@ class Rigid(Actuator):
         return (self.motor.at_joint,)
 
     def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
-        """No deflection; there is no stiffness, and so no derivative of one."""
+        """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
             stiffness=none,
@@ -59,5 +59,5 @@ class Rigid(Actuator):
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """What lies in place of a spring carries tau_e."""
+        """Return the rate of tau_e, which the motor carries directly."""
         return of_joint["dtau_e"][None]

@@ -1,6 +1,6 @@
 """One motor that carries the load, and one that sets the springs behind it: MACCEPA, AwAS, levers, cams.
 
-The springs' potential takes the place of (14) and (61)-(72); a mechanism says what it is.
+The springs' potential, which the mechanism defines, takes the place of (14) and (61)-(72).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, v
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
-"""Deflection, rad (m), whose torque is large beside rounding; a motor that carries the load alone passes
-through zero, where its own torque measures nothing."""
+"""Deflection, rad (m), whose torque is large compared with rounding. A motor that carries the load alone
+passes through zero, where its own torque is no measure."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Serial(Actuator):
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
-        """Motors alike, and the mechanism of this name; by default the first that drives such joints."""
+        """Return equal motors and the named mechanism; by default the first that drives such joints."""
         word = mechanism or next(name for name, each in MECHANISMS.items() if joint_type in each.joint_types)
         example = {"type": word, **MECHANISMS[word].example(joint_type)}
         return {"motor": Motor.example(joint_type), "mechanism": example}
@@ -89,7 +89,7 @@ class Serial(Actuator):
         return cls(motor=(motor, motor), mechanism=spring)
 
     def unfit_for(self, joint_type: str) -> FieldProblem | None:
-        """A mechanism that turns."""
+        """See `Actuator.unfit_for`; a mechanism that turns drives no prismatic joint."""
         if joint_type in self.mechanism.joint_types:
             return None
         others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
@@ -109,32 +109,32 @@ class Serial(Actuator):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Where the mechanism works, in what its range is stated in."""
+        """See `Mechanism.ranges`."""
         return self.mechanism.ranges
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Those of the mechanism."""
+        """See `Mechanism.warnings`."""
         return self.mechanism.warnings
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the mechanism."""
+        """See `Mechanism.sources`."""
         return self.mechanism.sources
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
-        """Those of the mechanism."""
+        """See `Actuator.spring_elements`."""
         return self.mechanism.spring_elements
 
     @property
     def lever_spring(self) -> LeverSpring | None:
-        """That of the mechanism."""
+        """See `Actuator.lever_spring`."""
         return self.mechanism.lever_spring
 
     @property
     def spring_group(self) -> Hashable:
-        """Joints with equal mechanisms are computed together."""
+        """See `Actuator.spring_group`; joints with equal mechanisms are computed together."""
         return self.mechanism
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
@@ -142,9 +142,9 @@ class Serial(Actuator):
         return np.stack((phi[0] + q, phi[1]))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
-        """Deflection and setting on the mechanism's branch, their rates, and motor accelerations.
+        """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
-        NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
         """
         stiffness, dstiffness, ddstiffness = (
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
@@ -176,13 +176,13 @@ class Serial(Actuator):
         return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """What the mechanism carries.
+        """Return the torques and the stiffness of the mechanism, with the sizes of their terms.
 
-        Its stiffness may be a difference, next to zero while neither part is; phi and the setting then
-        decide on it by their last digits.
+        Its stiffness may be a difference of two large terms, next to zero. The last digits of phi and of the
+        setting then decide on it.
         """
-        state, rows = self._state_of(of_joint), self._state_of(of_joint).rows
-        size = np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
+        state = self._state_of(of_joint)
+        rows, size = state.rows, np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
         turned = np.abs(rows.stiffness_1 * of_joint["phi"][0]) + np.abs(
             rows.stiffness_2 * of_joint["theta"][1]
         )
@@ -199,11 +199,11 @@ class Serial(Actuator):
 
     @property
     def opposite_preload(self) -> str | None:
-        """That of the mechanism."""
+        """See `Actuator.opposite_preload`."""
         return self.mechanism.opposite_preload
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
-        """Where another branch of the mechanism reaches the stiffness."""
+        """See `Mechanism.other_preload`."""
         return self.mechanism.other_preload(tau_e, stiffness, q)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
@@ -219,7 +219,6 @@ class Serial(Actuator):
         return self.mechanism.state(np.stack((*phi, q), axis=-1))
 
     def _state_of(self, of_joint: OfJoint) -> MechanismState:
-        """At the motion of joint and motors."""
         return self._state(np.stack((of_joint["phi"][0], of_joint["theta"][1])), of_joint["q"])
 
 
@@ -234,7 +233,7 @@ class _Springs(Elasticity):
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """What the range of the mechanism is stated in."""
+        """See `Mechanism.ranged`."""
         return np.stack(self._mechanism.ranged(theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:

@@ -40,12 +40,12 @@ class SingleSprings(Elasticity):
         self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
-        """The spring pulls link and motor alike."""
+        """The spring's torque acts equally on link and motor."""
         tau = self._rows.torque(phi)
         return Torques(tau[..., 0], tau)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """That of the spring."""
+        """Energy of the spring."""
         return self._rows.energy(phi)[..., 0]
 
     def state(self, phi: FloatArray) -> ElasticState:
@@ -67,7 +67,7 @@ class _State(ElasticState):
 
     @property
     def stiffness(self) -> FloatArray:
-        """Its stiffness."""
+        """Stiffness of the spring."""
         return self._one.sigma
 
     @property

@@ -42,7 +42,7 @@ COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 
 
 INTERNAL = ("internal_phi", "internal_velocity", "internal_acceleration")
-"""Rows that say what moves inside damped transmissions, as the fields of `InternalMotion`."""
+"""Rows of the motion inside damped transmissions, as the fields of `InternalMotion`."""
 
 
 def usual_block(joints: int) -> int:
@@ -53,7 +53,7 @@ def usual_block(joints: int) -> int:
 
 @dataclass(frozen=True)
 class Stop(Stored):
-    """From when on, s, the deflections of a joint cannot be integrated, and why."""
+    """The time, s, from which on the deflections of a joint cannot be integrated, and the reason."""
 
     time: float
     reason: str
@@ -114,7 +114,7 @@ class InverseDynamics(RowKernel):
         return RowLayout(self.shapes())
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Of the variables it gives, at one instant, by name."""
+        """Return the shapes of the results at one instant, by name."""
         joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
         return {
             variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
@@ -158,7 +158,6 @@ class InverseDynamics(RowKernel):
         }
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
-        """What moves inside a joint, if its transmission is damped."""
         if index not in self.internal:
             return None
         from vsacli.actuators.damped_springs import InternalMotion
@@ -170,19 +169,21 @@ class InverseDynamics(RowKernel):
 
 
 def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:
-    """A function of a joint to be called with arrays, where neither its name, its row nor its link counts.
+    """Wrap `function(joint, ...)` so that joints with equal actuators share one traced body.
+
+    Name, DH row and link are ignored in the comparison.
 
     Args:
         function: takes the joint first.
         joint: the joint.
-        further: what else of it counts, though joints may be equal without it.
+        further: keys to compare in addition.
     """
     counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
     return Keyed((function, *counting, *further), partial(function, joint))
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
-    """Of a joint that moves nothing, the recursion finds a plain zero; the actuator takes rows of samples."""
+    """Return a row of samples also for a joint that moves nothing: the recursion finds a plain zero."""
     return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
 
 
@@ -218,7 +219,7 @@ def block_of(
     integrated: FloatArray | None = None,
     internal: Mapping[int, InternalMotion] = MappingProxyType({}),
 ) -> Block:
-    """What a kernel of inverse dynamics finds for a block of steps.
+    """Compute a block of samples by a kernel of inverse dynamics.
 
     Args:
         kernel: what is computed, and in which block it comes.
@@ -243,7 +244,7 @@ def block_of(
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
-    """Where motions inside damped transmissions begin, with the rates that follow, by index of the joint."""
+    """Return initial motions inside damped transmissions, with their rates, by index of the joint."""
     damped = {
         index: joint
         for index, joint in enumerate(robot.joints)
@@ -263,7 +264,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
 
 
 def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """The rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
+    """Yield the rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
     for array in of_joints:
         yield from array if array.ndim > 1 else [array]
 
@@ -279,7 +280,7 @@ def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
 
 
 def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
-    """A trajectory for a robot: the same, with what its devices do that are not commanded.
+    """Return a trajectory for a robot, with default signals of the devices that are not commanded.
 
     Raises:
         InputError: it has another number of joints than the robot, or lacks a stiffness that one takes.
@@ -307,6 +308,6 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
 
 
 def command_of(index: int, commanded: Mapping[str, FloatArray]) -> Command:
-    """The part of one joint in variables by name, each (samples, joints)."""
+    """Return the command of one joint from variables by name, each (samples, joints)."""
     names = (name for name in Command.names(COMMANDED) if name in commanded)
     return Command.of({name: commanded[name][:, index] for name in names})
