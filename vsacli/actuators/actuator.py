@@ -55,9 +55,10 @@ class Carried(NamedTuple):
 
     Attributes:
         tau_e: torque on the link.
-        size: of the torques that it is the sum of.
+        size: sum of the absolute torques of which tau_e is the sum.
         stiffness: of the joint.
-        stiffness_size: of what that is the sum of; rounding of the deflections changes it by eps times this.
+        stiffness_size: the same for the terms of the stiffness, which rounding of the deflections changes by
+            eps times this.
         tau_spring: torque against each motor, (motors, samples).
     """
 
@@ -72,9 +73,9 @@ class SpringLoad(NamedTuple):
     """The load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
 
     Attributes:
-        name: which it is.
+        name: of the spring.
         deflection: of the spring; of a mechanism, between motor 1 and link.
-        torque: that of the deflection.
+        torque: of the spring at that deflection.
         energy: in it, J.
         max_deflection: largest admissible |deflection|.
     """
@@ -159,7 +160,7 @@ class Actuator(ABC):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest phi for which the springs' laws hold; or what `Elasticity.ranged` gives."""
+        """Lowest and highest phi, or values of `Elasticity.ranged`, for which the springs' laws hold."""
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property

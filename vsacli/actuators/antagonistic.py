@@ -59,6 +59,7 @@ class Antagonistic(Actuator):
         """Yield the problem of a coupling with a domain: the distance of the motors has no flag."""
         if self.coupling is None:
             return
+        # The distance of the motors is no result variable that a limit could bound: a coupling has no end.
         if self.coupling.domain != (-math.inf, math.inf):
             low, high = self.coupling.domain
             ends = f"holds from {low:.4g} to {high:.4g} only, but the motors may be any distance apart"
@@ -79,12 +80,12 @@ class Antagonistic(Actuator):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Motors and springs alike on both sides."""
+        """Return equal motors and springs on both sides."""
         return {"motor": Motor.example(joint_type), "spring": EXAMPLE_SPRING[joint_type]}
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """Cubic springs; what is known of a single motor holds for neither of two."""
+        """Return two cubic springs; constants of a single motor hold for neither of two."""
         from vsacli.actuators.laws.cubic import Cubic
 
         k, k_c = constants.spring
@@ -108,7 +109,7 @@ class Antagonistic(Actuator):
 
     @property
     def co_contracts(self) -> bool:
-        """Unless a spring between the motors takes a part of what they exert."""
+        """False with a spring between the motors, which takes a part of their torques."""
         return self.coupling is None
 
     @property
@@ -133,7 +134,7 @@ class Antagonistic(Actuator):
         return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
-        """Deflections on the actuator's branch, their rates, and motor accelerations."""
+        """Compute deflections on the actuator's branch, their rates, and motor accelerations."""
         solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
         stiffness = command.commanded["stiffness"]
         phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
@@ -147,9 +148,9 @@ class Antagonistic(Actuator):
         }
 
     def _moved(self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray) -> OfJoint:
-        """Motion of both motors and torques of both springs at given deflections, (62)-(72).
+        """Compute motion of both motors and torques of both springs at given deflections, (62)-(72).
 
-        NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
         """
         (energy_1, one), (energy_2, two) = (
             law.energy_and_state(side) for law, side in zip(self.laws, phi, strict=True)
@@ -243,6 +244,6 @@ class Antagonistic(Actuator):
 
 
 def _between(coupling: SpringLaw, phi: FloatArray) -> FloatArray:
-    """Torque of a spring between the motors against each of them, (2, samples)."""
+    """Return the torque of a spring between the motors against each of them, (2, samples)."""
     torque = coupling.torque(phi[0] - phi[1])
     return np.stack((torque, -torque))

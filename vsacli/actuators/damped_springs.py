@@ -1,4 +1,4 @@
-"""Springs with a damper beside them, as in CompAct: the link feels tau_l = T(phi) + d w.
+"""Springs with a parallel damper, as in CompAct: the link feels tau_l = T(phi) + d w.
 
 Here w is the velocity of the damper, the sum of theta_k' - q' over the motors that a spring lies behind, and
 T the torque of the springs. The motors' velocities follow from w and from the rate of the stiffness,
@@ -45,7 +45,7 @@ class InternalMotion(NamedTuple):
     Attributes:
         phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
             a guess from which the stiffness is found.
-        velocity: w, the rate of the spread, (samples,); what follows from the damping if None.
+        velocity: w, the rate of the spread, (samples,); None: it follows from the damping.
         acceleration: its derivative, (samples,), likewise.
     """
 

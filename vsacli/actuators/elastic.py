@@ -115,7 +115,7 @@ class Elastic(Actuator):
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
     def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
-        """The deflection at which the spring carries tau_e, and its derivatives."""
+        """Compute the deflection at which the spring carries tau_e, and its derivatives."""
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> OfJoint:
@@ -134,9 +134,9 @@ class Elastic(Actuator):
         )
 
     def _nonlinear(self, command: Command) -> OfJoint:
-        """The root of tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
+        """Solve tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
 
-        NaN where tau_e cannot be carried; what needs 1/sigma also where that is zero.
+        NaN where tau_e cannot be carried; derivatives, which need 1/sigma, also where sigma is zero.
         """
         law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)

@@ -44,7 +44,7 @@ class Rigid(Actuator):
         return (self.motor.at_joint,)
 
     def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
-        """No deflection; there is no stiffness, and so no derivative of one."""
+        """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
             stiffness=none,

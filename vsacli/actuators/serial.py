@@ -1,6 +1,6 @@
 """One motor that carries the load, and one that sets the springs behind it: MACCEPA, AwAS, levers, cams.
 
-The springs' potential takes the place of (14) and (61)-(72); a mechanism says what it is.
+The springs' potential, which the mechanism defines, takes the place of (14) and (61)-(72).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, v
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
-"""Deflection, rad (m), whose torque is large beside rounding; a motor that carries the load alone passes
-through zero, where its own torque measures nothing."""
+"""Deflection, rad (m), whose torque is large compared with rounding. A motor that carries the load alone
+passes through zero, where its own torque is no measure."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Serial(Actuator):
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
-        """Motors alike, and the mechanism of this name; by default the first that drives such joints."""
+        """Return equal motors and the named mechanism; by default the first that drives such joints."""
         word = mechanism or next(name for name, each in MECHANISMS.items() if joint_type in each.joint_types)
         example = {"type": word, **MECHANISMS[word].example(joint_type)}
         return {"motor": Motor.example(joint_type), "mechanism": example}
@@ -134,7 +134,7 @@ class Serial(Actuator):
 
     @property
     def spring_group(self) -> Hashable:
-        """Joints with equal mechanisms are computed together."""
+        """See `Actuator.spring_group`; joints with equal mechanisms are computed together."""
         return self.mechanism
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
@@ -142,9 +142,9 @@ class Serial(Actuator):
         return np.stack((phi[0] + q, phi[1]))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
-        """Deflection and setting on the mechanism's branch, their rates, and motor accelerations.
+        """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
-        NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
         """
         stiffness, dstiffness, ddstiffness = (
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
@@ -178,11 +178,11 @@ class Serial(Actuator):
     def carried(self, of_joint: OfJoint) -> Carried:
         """Return torque and stiffness of the mechanism.
 
-        Its stiffness may be a difference, next to zero while neither part is; phi and the setting then
-        decide on it by their last digits.
+        Its stiffness may be a difference of two large terms, next to zero. The last digits of phi and of the
+        setting then decide on it.
         """
-        state, rows = self._state_of(of_joint), self._state_of(of_joint).rows
-        size = np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
+        state = self._state_of(of_joint)
+        rows, size = state.rows, np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
         turned = np.abs(rows.stiffness_1 * of_joint["phi"][0]) + np.abs(
             rows.stiffness_2 * of_joint["theta"][1]
         )

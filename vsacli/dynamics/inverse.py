@@ -42,7 +42,7 @@ COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 
 
 INTERNAL = ("internal_phi", "internal_velocity", "internal_acceleration")
-"""Rows that say what moves inside damped transmissions, as the fields of `InternalMotion`."""
+"""Rows of the motion inside damped transmissions, as the fields of `InternalMotion`."""
 
 
 def usual_block(joints: int) -> int:
@@ -175,7 +175,7 @@ def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) 
     Args:
         function: takes the joint first.
         joint: the joint.
-        further: what else of it counts, though joints may be equal without it.
+        further: keys to compare in addition.
     """
     counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
     return Keyed((function, *counting, *further), partial(function, joint))
