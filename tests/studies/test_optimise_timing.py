@@ -11,7 +11,8 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
 from samples.remedies import pendulum, rest_to_rest
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
-from vsacli.studies.search.paced_motion import PACE_ORDERS, Speeds, retimed
+from vsacli.studies.search.paced_motion import PACE_ORDERS, retimed
+from vsacli.studies.search.path_commands import Speeds
 from vsacli.studies.search.splines import SplineSpace
 
 

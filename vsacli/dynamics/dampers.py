@@ -6,7 +6,7 @@ from each motor that a spring lies behind to the link, as the springs pass their
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +22,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 
-def damper_torque(
-    damping: tuple[Scalar, Scalar, Scalar], rates: tuple[Scalar, Scalar, Scalar]
-) -> TorqueDerivatives:
+def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
     """D v and its first two derivatives.
 
     Args:

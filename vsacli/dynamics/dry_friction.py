@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +13,7 @@ from vsacli.compute.vector import Scalar, exact, mul, sub
 from vsacli.dynamics.chain import TorqueDerivatives
 
 
-def joint_friction(
-    friction: Friction | None, rates: tuple[Scalar, Scalar, Scalar, Scalar]
-) -> TorqueDerivatives:
+def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> TorqueDerivatives:
     """F tanh(q'/w) + F_o and its derivatives, of which tanh' = 1 - tanh^2.
 
     Args:

@@ -260,13 +260,18 @@ def joint_state(
         damping: of its damper, with two derivatives; counts if that lies between the links.
     """
     dh = joint.dh
-    damper = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
-    resistance = TorqueDerivatives(*map(add, damper, joint_friction(joint.friction, rates)))
+    resistance = link_resistance(joint, rates, damping)
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)
     cos, sin = (trigonometric(name, dh.theta) for name in ("cos", "sin"))
     return JointState(cos, sin, q + dh.d, rates, resistance)
+
+
+def link_resistance(joint: Joint, rates: Sequence[Scalar], damping: Sequence[Scalar]) -> TorqueDerivatives:
+    """Return the torque of dry friction and of a damper between the links; arguments as of `joint_state`."""
+    damper = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
+    return TorqueDerivatives(*map(add, damper, joint_friction(joint.friction, rates)))
 
 
 def link_damped(robot: Robot) -> bool:

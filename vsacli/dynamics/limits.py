@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
@@ -22,7 +24,7 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
     if joint.damper is not None:
         checks.append(LimitCheck(Flag.DAMPING_LIMIT, DAMPING.key, None, joint.damper.range))
     checks += joint.actuator.limits()
-    return [check for check in checks if np.isfinite(check.range).any()]
+    return [check for check in checks if any(map(math.isfinite, check.range))]
 
 
 def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:

@@ -20,7 +20,8 @@ from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
-from vsacli.studies.search.loads import Load, Passage, joined
+from vsacli.studies.search.loads import Instants, Load, Passage, joined
+from vsacli.studies.search.path_commands import PathCommands, Speeds
 from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
 from vsacli.studies.search.task import Combination, Form, Task, constant_change, preload_path
 
@@ -53,8 +54,8 @@ class CombinedSearch:
         self.task, self.form = task, form
         watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
         self._choices = _choices(task.acceptance.robot, watched if preloads else None)
-        self._watched, self._factors = watched, Factors.of(task.trajectory)
-        self._found: dict[int, Combination] = {}
+        self._factors = Factors.of(task.trajectory)
+        self._watch(watched)
         self._impossible = task.impossible.setdefault((form, preloads), set())
 
     @property
@@ -79,9 +80,13 @@ class CombinedSearch:
             refused = None if found is None or self.form is not constant_change else self._refused(found)
             if refused is None:
                 return found
-            self._watched = joined([self._watched, refused])
-            self._found.clear()
+            self._watch(joined([self._watched, refused]))
         return None
+
+    def _watch(self, passage: Passage) -> None:
+        """Let these samples judge from now on."""
+        self._watched, self._path = passage, PathCommands(self.task.acceptance.robot, passage.motion)
+        self._found: dict[int, Combination] = {}
 
     def _refused(self, found: Combination) -> Passage | None:
         """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
@@ -191,7 +196,10 @@ class CombinedSearch:
             ImpossibleError: some joint is refused whatever its stiffness.
         """
         acceptance = self.task.acceptance
-        loads = self._watched.slowed(factor).loads(acceptance.robot)
+        watched = self._watched
+        instants = Instants(watched.motion.time, watched.factor * factor)
+        commands = self._path.at(Speeds.even(factor, len(instants.time)))
+        loads = [Load(instants.time, command, instants) for command in commands]
         joints = list(enumerate(zip(self._choices, loads, strict=True)))
         for index, (choices, load) in joints:
             if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):

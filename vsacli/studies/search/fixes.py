@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,21 +77,27 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         tried = _tried(asked, found_causes)
     return Suggestions(
         near_singular,
-        slow_down=_part(tried.found.slower, "slow_down", tried.failed),
-        stiffness_offset=_part(tried.found.offset, "stiffness_offset", tried.failed),
-        stiffness_profile=_part(tried.found.profile, "stiffness_profile", tried.failed),
-        transition=_part(tried.found.transition, "transition", tried.failed),
+        **{name: tried.part(name) for name in ALONE},
         causes=tuple(found_causes.values()),
         remedies=tuple(tried.chosen),
     )
 
 
 class _Tried(NamedTuple):
-    """The result of a search, the fixes worth choosing, and samples between that fall short."""
+    """The results of searches by name, the fixes worth choosing, and those that fall short between them."""
 
-    found: _Found
+    found: Mapping[str, list[Remedy] | NotPossible]
     chosen: list[Remedy]
     failed: list[Remedy]
+
+    def part(self, name: str) -> Any:
+        """Return the only change of the fix that a search of `ALONE` found, or why there is none."""
+        found = self.found.get(name)
+        if not isinstance(found, list):
+            return found
+        if any(found[0] is each for each in self.failed):
+            return NotPossible(("what keeps every limit at the steps exceeds one between them",))
+        return getattr(found[0], name)
 
 
 def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
@@ -98,7 +105,7 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))
-        return _Tried(_Found(reasons, reasons, reasons, None, []), [], [])
+        return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
     asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
     tried = _searched(asked)
     if tried.chosen or not isinstance(task.trajectory.times, RecordedTimes):
@@ -108,72 +115,53 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
 
 
 def _searched(asked: Task) -> _Tried:
-    """Return the result of searches in which instants that fall short join the samples."""
+    """Return the result of searches in which instants that fall short join the samples.
+
+    A search is repeated only if a fix that it found falls short.
+    """
+    searches = {**ALONE, **COMBINED}
+    if not has_transitions(asked.trajectory):
+        del searches["transition"]
+    found: dict[str, list[Remedy] | NotPossible] = {}
+    confirmed: list[Remedy] = []
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
-        found = _Found.of(replace(asked, acceptance=rule))
-        chosen, failed, short = _worth_choosing(found.remedies, asked)
-        return _Tried(found, chosen, failed), short if failed else None
+        task = replace(asked, acceptance=rule)
+        for name in [each for each in searches if each not in found]:
+            try:
+                found[name] = list(searches[name](task))
+            except ImpossibleError as error:
+                found[name] = NotPossible(error.reasons)
+        by_search = {name: each for name in searches if isinstance(each := found[name], list)}
+        chosen, failed, short = _worth_choosing(chain(*by_search.values()), asked, confirmed)
+        tried = _Tried(dict(found), chosen, failed)
+        for name, remedies in by_search.items():
+            if any(each is other for each in remedies for other in failed):
+                del found[name]
+        return tried, short if failed else None
 
     tried, _ = asked.acceptance.confirmed(attempt)
     return tried
 
 
-class _Found(NamedTuple):
-    """The result of a search: each kind of change on its own, and combinations."""
-
-    slower: Remedy | NotPossible
-    offset: Remedy | NotPossible
-    profile: Remedy | NotPossible
-    transition: Remedy | NotPossible | None
-    combined: list[Remedy]
-
-    @classmethod
-    def of(cls, task: Task) -> Self:
-        """Return the fixes of a task at its samples."""
-        return cls(
-            _attempt(lambda: task.with_constants(_slow_down(task))),
-            _attempt(lambda: task.with_constants(task.constants())),
-            _attempt(lambda: task.with_profiles(AS_IT_IS)),
-            _attempt(task.with_transition) if has_transitions(task.trajectory) else None,
-            list(_combined(task)),
-        )
-
-    @property
-    def remedies(self) -> list[Remedy]:
-        """All of them."""
-        alone = (self.slower, self.offset, self.profile, self.transition)
-        return [*(each for each in alone if isinstance(each, Remedy)), *self.combined]
-
-
-def _slow_down(task: Task) -> Combination:
+def _slow_down(task: Task) -> Iterator[Remedy]:
     factor = smallest_slow_down(task.acceptance, task.trajectory)
-    return Combination(factor, {}, {}, task.cost.of_factor(factor))
+    yield task.with_constants(Combination(factor, {}, {}, task.cost.of_factor(factor)))
 
 
-def _attempt(find: Callable[[], Remedy]) -> Remedy | NotPossible:
-    try:
-        return find()
-    except ImpossibleError as error:
-        return NotPossible(error.reasons)
+def _constants(task: Task) -> Iterator[Remedy]:
+    search = CombinedSearch(task)
+    combinations = search.smallest(), search.fastest()
+    return (task.with_constants(found) for found in combinations if found is not None)
 
 
-def _part(found: Remedy | NotPossible | None, name: str, failed: Sequence[Remedy]) -> Any:
-    """Return the only change of a remedy, or why there is none."""
-    if not isinstance(found, Remedy):
-        return found
-    if any(found is each for each in failed):
-        return NotPossible(("what keeps every limit at the steps exceeds one between them",))
-    return getattr(found, name)
-
-
-def _combined(task: Task) -> Iterator[Remedy]:
-    """Remedies that may take several kinds of change."""
-    constant, least = CombinedSearch(task), CombinedSearch(task, least_change)
-    smallest = constant.smallest()
-    yield from (task.with_constants(found) for found in (smallest, constant.fastest()) if found is not None)
+def _profiles(task: Task) -> Iterator[Remedy]:
+    least = CombinedSearch(task, least_change)
     profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
-    yield from profiles or _with_profiles(task, smallest)
+    yield from profiles or _with_profiles(task, CombinedSearch(task).smallest())
+
+
+def _other_preloads(task: Task) -> Iterator[Remedy]:
     exchanged = CombinedSearch(task, preloads=True)
     found = exchanged.smallest() if exchanged.exchangeable else None
     if found is not None and found.preloads:
@@ -188,8 +176,27 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Re
             yield task.with_profiles(found)
 
 
+_Search = Callable[[Task], Iterable[Remedy]]
+"""Function from a task to fixes that hold at its samples, or an ImpossibleError."""
+
+ALONE: Mapping[str, _Search] = {
+    "slow_down": _slow_down,
+    "stiffness_offset": lambda task: [task.with_constants(task.constants())],
+    "stiffness_profile": lambda task: [task.with_profiles(AS_IT_IS)],
+    "transition": lambda task: [task.with_transition()],
+}
+"""Searches for one kind of change, by its name in `Suggestions`."""
+
+COMBINED: Mapping[str, _Search] = {
+    "constants": _constants,
+    "profiles": _profiles,
+    "preloads": _other_preloads,
+}
+"""Searches for fixes that may take several kinds of change."""
+
+
 def _worth_choosing(
-    candidates: Iterable[Remedy], task: Task
+    candidates: Iterable[Remedy], task: Task, confirmed: list[Remedy]
 ) -> tuple[list[Remedy], list[Remedy], FloatArray]:
     """Return fixes that a run confirms and no simpler one replaces, another preload last.
 
@@ -202,9 +209,11 @@ def _worth_choosing(
     instants = [np.empty(0)]
     for remedy in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
         if not any(_superfluous(remedy, beside) for beside in chosen):
-            short = task.falls_short(remedy)
+            known = any(remedy is each for each in confirmed)
+            short = None if known else task.falls_short(remedy)
             (chosen if short is None else failed).append(remedy)
             instants += [] if short is None else [short]
+    confirmed += chosen
     ordered = sorted(chosen, key=lambda each: (each.preload is not None, each.size))
     return ordered, failed, np.concatenate(instants)
 
