@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vsacli.compute.control_flow import cell_of
-from vsacli.compute.duals import FREQUENT, Dual, seeds, tangent_of, tangents_of
-from vsacli.compute.function_slopes import FLAT, SLOPES
+from vsacli.compute.duals import FLAT, FREQUENT, SLOPES, Dual, seeds, tangent_of, tangents_of
 from vsacli.compute.vector import exact, trigonometric
 
 POINTS = np.array([0.21, 0.47, 0.83])

@@ -27,7 +27,7 @@ from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import Equations
-from vsacli.control.simulation.sliding import Sliding
+from vsacli.control.simulation.stick_slip import StickSlip
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import Plant, State, state_derivative
 from vsacli.robot.model import Robot
@@ -65,7 +65,7 @@ def pushed(
     loop = ClosedLoop(robot, Push(force), Reference(step_of(0.0, duration=float(times[-1]))))
     laws = loop.plant.drivetrain.friction
     assert laws is not None
-    slides = Sliding(loop, laws)
+    slides = StickSlip(loop, laws)
     springs = loop.plant.drivetrain.sprung.sum()
     start = loop.packing.pack(np.array([q]), np.array([dq]), np.full(springs, q), np.full(springs, dq))
     start = slides.start(0.0, start)

@@ -71,7 +71,7 @@ def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None =
     np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
     assert conversion.residual.position < BOUND
     # The rules on plausible numbers find nothing, even if the placeholders are taken for real.
-    assert implausible(dataclasses.replace(robot, placeholder=False).facts, ()) == ()
+    assert implausible(dataclasses.replace(robot, placeholder=False).checked, ()) == ()
 
 
 def ends(urdf: Urdf) -> Iterator[str]:

@@ -9,14 +9,14 @@ import numpy as np
 from vsacli.base.tables import ReportText
 from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.pages import measured_page
-from vsacli.results.pages.document import Facts, InputText
+from vsacli.results.pages.document import InputText, PageTexts
 
 WICKED = "<img src=x onerror=alert(1)><script>alert(2)</script></script><b>$$x$$\"'"
 
 
-def without_words() -> Facts:
+def without_words() -> PageTexts:
     """Nothing to say."""
-    return Facts("title", "label", "", "", ReportText("", [], []), [], [])
+    return PageTexts("title", "label", "", "", ReportText("", [], []), [], [])
 
 
 def wicked_page(file: Path) -> Path:
@@ -25,7 +25,7 @@ def wicked_page(file: Path) -> Path:
     curves = [MeasuredCurve(WICKED, "N m", 0.1, time, np.sin(time), np.sin(time) + 0.1)]
     report = ReportText(WICKED, [("a", WICKED), (WICKED, "b")], [WICKED])
     inputs = [InputText(WICKED, "0" * 64, WICKED, WICKED), InputText(WICKED, "0" * 64, None, WICKED)]
-    facts = Facts(
+    facts = PageTexts(
         WICKED, WICKED, WICKED, "bad", report, [(WICKED, WICKED)], inputs, table=[(WICKED,), (WICKED,)]
     )
     file.write_text(measured_page(facts, {WICKED: curves}, WICKED), encoding="utf-8")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.analysis.between import Between
+from vsacli.analysis.between_samples import Between
 from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, BalanceCheck, SelfCheck, ladder
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED

@@ -110,10 +110,10 @@ def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import Facts, printable, source_text
+    from vsacli.results.pages.document import PageTexts, printable, source_text
 
     report = printable(comparison.as_text())
-    facts = Facts(
+    facts = PageTexts(
         title=report.headline,
         label=one_line(f"{comparison.result}, {comparison.recording}"),
         verdict="",

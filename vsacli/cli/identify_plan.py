@@ -70,7 +70,6 @@ def plan(
 
 
 def _noise(given: tuple[float, ...] | None) -> Noise:
-    """Return the noise of the sensors."""
     from vsacli.studies.identification.excitation import USUAL_NOISE, Noise
 
     if given is None:

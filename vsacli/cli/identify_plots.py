@@ -42,14 +42,14 @@ def identification_page(found: Identification, columns: str | None) -> str:
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import Facts, printable, source_text, tone_of
+    from vsacli.results.pages.document import PageTexts, printable, source_text, tone_of
 
     report = printable(found.as_text())
     provenance = [
         ("vsacli version", __version__),
         *([] if columns is None else [("columns", one_line(columns))]),
     ]
-    facts = Facts(
+    facts = PageTexts(
         title=report.headline.rpartition(":")[0],
         label=found.robot,
         verdict=found.verdict,

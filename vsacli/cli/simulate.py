@@ -214,7 +214,6 @@ def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFi
 
 
 def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
-    """Return the simulation that the options describe."""
     from vsacli.control.simulation import (
         GoalTolerance,
         InitialError,

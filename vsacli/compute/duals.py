@@ -17,7 +17,6 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.control_flow import cell_of, cell_on
-from vsacli.compute.function_slopes import FLAT, SLOPES
 from vsacli.compute.vector import Scalar, add, exact, mul, sub, trigonometric, trigonometric_of
 
 Tangents = Mapping[int, Any]
@@ -57,7 +56,7 @@ class Dual(NDArrayOperatorsMixin):
     def __array_function__(
         self, function: Callable[..., Any], _types: Any, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        if function in ALIKE:
+        if function in SHAPE_FUNCTIONS:
             return function(*map(value_of, arguments), **options)
         if function not in ARRANGED:
             raise NotImplementedError(f"numpy.{function.__name__} carries no derivatives along")
@@ -157,7 +156,6 @@ def _sum_of(first: Any, second: Any) -> Dual:
 
 
 def _difference_of(first: Any, second: Any) -> Dual:
-    """Return a difference."""
     if not isinstance(second, Dual):
         return Dual(sub(first.value, second), first.tangents)
     tangents = dict(tangents_of(first))
@@ -222,6 +220,48 @@ def _(position: Dual, count: int) -> IndexArray:
     return cell_of(position.value, count)
 
 
+Slopes = Callable[..., Sequence[Callable[[], Any]]]
+"""Function from result and operands of a function to its derivatives by each operand, computed if needed."""
+
+SLOPES: Mapping[np.ufunc, Slopes] = {
+    np.divide: lambda r, _a, b: (lambda: 1.0 / b, lambda: -r / b),
+    np.power: lambda r, a, b: (lambda: b * a ** (b - 1.0), lambda: r * np.log(a)),
+    np.negative: lambda _r, _a: (lambda: -1.0,),
+    np.positive: lambda _r, _a: (lambda: 1.0,),
+    np.absolute: lambda _r, a: (lambda: np.sign(a),),
+    np.square: lambda _r, a: (lambda: 2.0 * a,),
+    np.sqrt: lambda r, _a: (lambda: 0.5 / r,),
+    np.reciprocal: lambda r, _a: (lambda: -r * r,),
+    np.exp: lambda r, _a: (lambda: r,),
+    np.expm1: lambda r, _a: (lambda: r + 1.0,),
+    np.log: lambda _r, a: (lambda: 1.0 / a,),
+    np.log1p: lambda _r, a: (lambda: 1.0 / (1.0 + a),),
+    np.sin: lambda _r, a: (lambda: np.cos(a),),
+    np.cos: lambda _r, a: (lambda: -np.sin(a),),
+    np.tan: lambda r, _a: (lambda: 1.0 + r * r,),
+    np.arcsin: lambda _r, a: (lambda: 1.0 / np.sqrt(1.0 - a * a),),
+    np.arccos: lambda _r, a: (lambda: -1.0 / np.sqrt(1.0 - a * a),),
+    np.arctan: lambda _r, a: (lambda: 1.0 / (1.0 + a * a),),
+    np.arctan2: lambda _r, a, b: (lambda: b / (a * a + b * b), lambda: -a / (a * a + b * b)),
+    np.hypot: lambda r, a, b: (lambda: a / r, lambda: b / r),
+    np.sinh: lambda _r, a: (lambda: np.cosh(a),),
+    np.cosh: lambda _r, a: (lambda: np.sinh(a),),
+    np.tanh: lambda r, _a: (lambda: 1.0 - r * r,),
+    np.arcsinh: lambda _r, a: (lambda: 1.0 / np.sqrt(1.0 + a * a),),
+    np.maximum: lambda _r, a, b: (lambda: 1.0 * (a >= b), lambda: 1.0 * (a < b)),
+    np.minimum: lambda _r, a, b: (lambda: 1.0 * (a <= b), lambda: 1.0 * (a > b)),
+    np.copysign: lambda r, a, _b: (lambda: np.sign(a) * np.sign(r), lambda: 0.0),
+}
+"""The functions of NumPy that carry derivatives along."""
+
+FLAT = frozenset(
+    {
+        *(np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal),
+        *(np.isfinite, np.isnan, np.isinf, np.sign, np.signbit, np.floor, np.ceil, np.rint),
+    }
+)
+"""Functions whose results do not change with their operands, but for jumps."""
+
 FREQUENT: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
     np.add: _sum_of,
     np.subtract: _difference_of,
@@ -229,7 +269,7 @@ FREQUENT: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
 }
 """Functions without the detour by slopes."""
 
-ALIKE = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim, np.searchsorted})
+SHAPE_FUNCTIONS = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim, np.searchsorted})
 """Functions whose results are shapes and places, which do not change with what numbers are."""
 
 

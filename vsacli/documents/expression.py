@@ -428,7 +428,6 @@ def conversion_factor(text: str, expected: str) -> float:
 
 
 def _parsed(text: str) -> _Unit:
-    """Return the unit that a text stands for."""
     expression = parse(text.translate(_SPELLINGS), _UNITS)
     unit: _Unit = expression.value({name: _Unit(*BASES[name]) for name in expression.names}, {}, int)
     return unit

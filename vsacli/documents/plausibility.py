@@ -27,7 +27,7 @@ _Subject = TypeVar("_Subject")
 _EXPRESSION_OF_ANGLE = re.compile("deg|pi")
 
 
-class Slip(NamedTuple):
+class OtherUnit(NamedTuple):
     """Another unit in which a number may have been written.
 
     Attributes:
@@ -76,7 +76,7 @@ class Rule(NamedTuple, Generic[_Subject]):
         low: least size that passes.
         high: sizes from here on do not pass.
         usual: a common size, towards which another unit is looked for.
-        slips: other units that the value may be in.
+        units: other units that the value may be in.
         advice: what to look at if none of them fits.
         in_angles: whether a value written with `deg` or `pi` passes, as its writer knew the unit.
         explained_by: names of rules; if one of them finds something, this one is not asked.
@@ -91,7 +91,7 @@ class Rule(NamedTuple, Generic[_Subject]):
     low: float = 0.0
     high: float = math.inf
     usual: float = 1.0
-    slips: tuple[Slip, ...] = ()
+    units: tuple[OtherUnit, ...] = ()
     advice: str = "check its unit"
     in_angles: bool = False
     explained_by: tuple[str, ...] = ()
@@ -100,38 +100,38 @@ class Rule(NamedTuple, Generic[_Subject]):
         """Return whether a size is as usual, or nothing is known of it."""
         return math.isnan(size) or self.low <= size < self.high
 
-    def slip(self, measured: Measured) -> Slip | None:
+    def other_unit(self, measured: Measured) -> OtherUnit | None:
         """Return the unit in which the number would be nearest to a common one; None without such a unit."""
         sizes = {
-            slip: measured.size * slip.factor**slip.power
-            for slip in self.slips
-            if slip.instead_of in ("", measured.unit)
+            other: measured.size * other.factor**other.power
+            for other in self.units
+            if other.instead_of in ("", measured.unit)
         }
-        fitting = [slip for slip, size in sizes.items() if size and self.admits(size)]
-        return min(fitting, key=lambda slip: abs(math.log(sizes[slip] / self.usual)), default=None)
+        fitting = [other for other, size in sizes.items() if size and self.admits(size)]
+        return min(fitting, key=lambda other: abs(math.log(sizes[other] / self.usual)), default=None)
 
-    def sentence(self, measured: Measured, slip: Slip | None) -> str:
-        """Return the warning: field, value, finding, and the likely slip."""
-        path = _of_slip(measured.path, slip)
+    def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
+        """Return the warning: field, value, finding, and the likely unit."""
+        path = _of_unit(measured.path, other)
         known = path == measured.path and not math.isnan(measured.value)
         value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
         # Three digits, with a power of ten only where there would be many zeros.
         found = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
         advice = self.advice
-        if slip is not None:
-            advice = _guess(measured, slip) if known else f"is it in {slip.unit}?"
+        if other is not None:
+            advice = _guess(measured, other) if known else f"is it in {other.unit}?"
         return f"{'.'.join(map(str, path))}{value} {found}; {advice}"
 
 
-def _guess(measured: Measured, slip: Slip) -> str:
-    meant = f"did you mean {measured.value:.6g} {slip.unit}"
-    if measured.unit in ANGLES and slip.unit == "deg":
+def _guess(measured: Measured, other: OtherUnit) -> str:
+    meant = f"did you mean {measured.value:.6g} {other.unit}"
+    if measured.unit in ANGLES and other.unit == "deg":
         return f"{meant}?"
-    return f"{meant}, which is {measured.value * slip.factor:.6g} {measured.unit}?"
+    return f"{meant}, which is {measured.value * other.factor:.6g} {measured.unit}?"
 
 
-def _of_slip(path: NumberPath, slip: Slip | None) -> NumberPath:
-    return (*path[:-1], *slip.field) if slip and slip.field else path
+def _of_unit(path: NumberPath, other: OtherUnit | None) -> NumberPath:
+    return (*path[:-1], *other.field) if other and other.field else path
 
 
 Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
@@ -239,9 +239,9 @@ def findings(
 
 def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
     """Return the warning about a number."""
-    slip = rule.slip(measured)
+    other = rule.other_unit(measured)
     said = written.said(measured) if written is not None else None
     if written is None or said is None:
-        return Problem("", 0, rule.sentence(measured, slip))
-    line = written.line(_of_slip(measured.path, slip))
-    return Problem(written.path, line, rule.sentence(said, slip))
+        return Problem("", 0, rule.sentence(measured, other))
+    line = written.line(_of_unit(measured.path, other))
+    return Problem(written.path, line, rule.sentence(said, other))

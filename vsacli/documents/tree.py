@@ -19,6 +19,7 @@ from vsacli.documents.source import Problems
 
 MAX_SHOWN = 40
 MAX_LEVELS = 20
+TOO_DEEP = f"nested more than {MAX_LEVELS} levels deep"
 MAX_NODES = 100_000
 """Keys and values after each alias was replaced by its content."""
 
@@ -160,6 +161,9 @@ def _fail_with_syntax(error: yaml.MarkedYAMLError, text: str, problems: Problems
     mark, start = error.problem_mark, error.context_mark
     lines = text.rstrip().splitlines() or [""]
     index = min(mark.line if mark else 0, len(lines) - 1)
+    # libyaml has a limit of its own, which its scanner may meet before the events are here
+    if "nesting depth" in str(error.problem):
+        problems.fail(index + 1, TOO_DEEP)
     column = f" at column {mark.column + 1}" if mark and mark.line == index else ""
     message = f"not valid YAML{column}: {error.problem}"
     if error.context:
@@ -307,7 +311,7 @@ class _Builder:
 
     def _check_limits(self, line: int, nodes: int, levels: int) -> None:
         if len(self._open) + levels > MAX_LEVELS:
-            self._problems.fail(line, f"nested more than {MAX_LEVELS} levels deep")
+            self._problems.fail(line, TOO_DEEP)
         if self._nodes + nodes > MAX_NODES:
             self._problems.fail(
                 line, f"more than {MAX_NODES:,} keys and values, counting what aliases stand for"

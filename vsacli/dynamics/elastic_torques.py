@@ -241,7 +241,6 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
 
 
 def _state_of(joint: Joint) -> Keyed:
-    """`joint_state` of a joint."""
     return Keyed((joint.type, joint.dh, joint.friction, joint.damper), partial(joint_state, joint))
 
 

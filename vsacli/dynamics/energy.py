@@ -255,12 +255,10 @@ def _joint_flow(
 
 
 def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:
-    """Return the rows of the motors of each joint."""
     return [rows[first : first + SIDES] for first in range(0, len(rows), SIDES)]
 
 
 def _at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
-    """Return the rows at one end of the intervals."""
     half = len(rows) // 2
     return _by_joint(rows[end * half : (end + 1) * half])
 

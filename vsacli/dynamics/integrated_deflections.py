@@ -96,7 +96,7 @@ def _root(actuator: Actuator, command: Command) -> PairSolution:
 
 
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
-    """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
+    """Singular is, too, where det A has another sign than on the joint's branch: it was zero before."""
     solution = _root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
@@ -113,7 +113,7 @@ spline's third derivative, 1e-16 over the cube of the sample distance. Pieces ar
 smooth recordings is far smaller."""
 
 CHECKS = 64
-"""Times at which each step is checked, and into which the search for the end of the way divides it."""
+"""Times at which each step is checked, and into which the search for the end of the course divides it."""
 
 
 class Pieces(NamedTuple):
@@ -235,7 +235,7 @@ TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Course:
     """Deflections of some joints over a part of the trajectory."""
 
     joints: list[int]
@@ -255,7 +255,7 @@ class IntegratedDeflections:
     """
 
     stops: tuple[Stop | None, ...]
-    _ways: tuple[_Way, ...] = field(repr=False)
+    _courses: tuple[_Course, ...] = field(repr=False)
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -265,10 +265,10 @@ class IntegratedDeflections:
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start
-        for way in self._ways:
-            here = (way.solution.t_min <= elapsed) & (elapsed <= way.solution.t_max)
+        for course in self._courses:
+            here = (course.solution.t_min <= elapsed) & (elapsed <= course.solution.t_max)
             if here.any():
-                for joint, deflections in zip(way.joints, way.deflections(elapsed[here]), strict=True):
+                for joint, deflections in zip(course.joints, course.deflections(elapsed[here]), strict=True):
                     phi[joint][:, here] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
@@ -301,13 +301,13 @@ def integrate_deflections(
     hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
     found = zip(task.joints, hindrances.tolist(), strict=True)
     stops = {joint: Stop(first + time, REASONS[reason]) for joint, reason in found if reason}
-    ways = []
+    courses = []
     while time < end and len(stops) < len(task.joints):
         going = [joint for joint in task.joints if joint not in stops]
         integration = Integration(task, tuple(going), pieces, time, phi[going, :, 0])
         if integration.times[-1] > time:
             time = integration.times[-1]
-            ways.append(_Way(going, integration.solution()))
-            phi[going] = ways[-1].deflections(np.array([time]))
+            courses.append(_Course(going, integration.solution()))
+            phi[going] = courses[-1].deflections(np.array([time]))
         stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
-    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(ways), first)
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(courses), first)

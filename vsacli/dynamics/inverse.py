@@ -141,6 +141,7 @@ class InverseDynamics(RowKernel):
             driving = behind_link(drive, joint, self.limits[index])
             driven = call(rows[0], driving, command, self.near_singular, phi, internal)
             found.append({**command.arrays(), **driven})
+            _check_limits(self.limits[index], found[-1])
         if self.robot.has(VARIABLES["dissipated_power"]):
             for joint, of_joint in zip(self.robot.joints, found, strict=True):
                 of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
@@ -167,6 +168,13 @@ class InverseDynamics(RowKernel):
         deflections = np.stack(given[INTERNAL[0]][SIDES * place : SIDES * (place + 1)])
         rates = [None, None] if self.driven else [given[name][place] for name in INTERNAL[1:]]
         return InternalMotion(deflections, *rates)
+
+
+def _check_limits(limits: Sequence[LimitCheck], of_joint: OfJoint) -> None:
+    """Refuse a limit on a variable that no joint computes, which would be skipped without a word."""
+    for check in limits:
+        if check.variable not in of_joint:
+            raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
 def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:

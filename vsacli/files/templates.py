@@ -17,7 +17,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.search.loads import Passage
+from vsacli.studies.search.loads import TaskSamples
 from vsacli.studies.search.scans import smallest_slow_down
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.file import load_trajectory
@@ -38,7 +38,7 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
     acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
     if not acceptance.refused_joints(trajectory).any():
         return usual, ""
-    reasons = "; ".join(acceptance.reasons(Passage.of(trajectory, 0, trajectory.samples)))
+    reasons = "; ".join(acceptance.reasons(TaskSamples.of(trajectory, 0, trajectory.samples)))
     try:
         duration = usual * smallest_slow_down(acceptance, trajectory)
     except ImpossibleError as error:

@@ -89,7 +89,6 @@ def _failed(path: str, error: InputError) -> Checked:
 
 
 def _usable(path: str, summary: str, warnings: Iterable[Problem] = (), notes: Iterable[str] = ()) -> Checked:
-    """Return a usable file with warnings and notes on it."""
     messages = [Message(WARNING, path, warning.line, warning.message) for warning in warnings]
     return Checked(path, summary, (*messages, *(Message(NOTE, path, 0, text) for text in notes)))
 

@@ -26,7 +26,7 @@ from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint, Pose
 
 if TYPE_CHECKING:
-    from vsacli.robot.plausibility.facts import Facts
+    from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
 OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
@@ -122,12 +122,12 @@ class Robot:
         return tuple(dict.fromkeys(sources))
 
     @property
-    def facts(self) -> Facts:
-        """Facts about the robot for rules on plausible numbers."""
+    def checked(self) -> CheckedRobot:
+        """The robot as the rules of plausibility see it."""
         from vsacli.documents.record_values import numbers
-        from vsacli.robot.plausibility.facts import Facts
+        from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
-        return Facts(self.joints, self.base, self.gravity, tuple(numbers(self)), self.placeholder)
+        return CheckedRobot(self.joints, self.base, self.gravity, tuple(numbers(self)), self.placeholder)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -143,7 +143,7 @@ class Robot:
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings(massless=massless))
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
-        return (*(Problem("", 0, warning) for warning in whole), *implausible(self.facts, self.sources))
+        return (*(Problem("", 0, warning) for warning in whole), *implausible(self.checked, self.sources))
 
 
 def check_robot(value: object) -> None:

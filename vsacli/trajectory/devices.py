@@ -55,7 +55,6 @@ def _with_least_damping(trajectory: Trajectory, robot: Robot) -> Trajectory:
 
 
 def _damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[FloatArray]:
-    """Damping of a joint with its derivatives at times."""
     commanded = trajectory.at(time).commanded
     return [commanded[name][:, joint] for name in DAMPING.names]
 

@@ -23,7 +23,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import with_devices
-from vsacli.trajectory.plausibility import Facts, implausible
+from vsacli.trajectory.plausibility import CheckedTrajectory, implausible
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -214,7 +214,7 @@ def declared_trajectory(
     times, profiles = _slowed(document.slow_down, declared, _profiles(document, declared, recordings))
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
-    facts = Facts(robot, tuple(numbers(document, joints.types)), times, motion)
+    checked = CheckedTrajectory(robot, tuple(numbers(document, joints.types)), times, motion)
     return Trajectory(
         times,
         profiles[POSITION.key],
@@ -224,7 +224,7 @@ def declared_trajectory(
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
             *_warnings(document, declared, joints),
-            *implausible(facts, source),
+            *implausible(checked, source),
         ],
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
         sources=[source, *(recording.source for recording in recordings)],

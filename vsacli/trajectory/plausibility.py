@@ -14,7 +14,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import Problem
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity
-from vsacli.documents.plausibility import Measured, Rule, Slip, Written, findings
+from vsacli.documents.plausibility import Measured, OtherUnit, Rule, Written, findings
 from vsacli.documents.record_values import Entry, Number
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
@@ -29,7 +29,7 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.facts import BodySizes, ratio
+from vsacli.robot.plausibility.checked_robot import BodySizes, ratio
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETRES, TOO_SOFT, Corridor, corridor
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
@@ -50,7 +50,12 @@ AMPLITUDES = frozenset(("sine", "cosine"))
 """Keys of amplitudes about a stiffness, which are no stiffness."""
 
 PER_SECOND = "per second"
-UNITS_OF_TIME = (Slip("ms", 1e-3, -1), Slip("us", 1e-6, -1), Slip("min", 60, -1), Slip("h", 3600, -1))
+UNITS_OF_TIME = (
+    OtherUnit("ms", 1e-3, -1),
+    OtherUnit("us", 1e-6, -1),
+    OtherUnit("min", 60, -1),
+    OtherUnit("h", 3600, -1),
+)
 UNITS_OF_STIFFNESS = (*TOO_SOFT, NEWTON_MILLIMETRES)
 
 SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs")
@@ -60,15 +65,15 @@ FAST = ("fast motions of revolute joints", "fast motions of prismatic joints")
 """Rules, also of the robot, that explain findings of others."""
 
 
-def implausible(facts: Facts, source: Source) -> tuple[Problem, ...]:
+def implausible(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
     """Return the findings of the rules, with the lines of the trajectory file."""
-    known = strange_of_robot(facts.robot.facts, facts.robot.sources)
-    return findings(TRAJECTORY_RULES, facts, Written(source), known)
+    known = strange_of_robot(checked.robot.checked, checked.robot.sources)
+    return findings(TRAJECTORY_RULES, checked, Written(source), known)
 
 
 @dataclass(frozen=True)
-class Facts:
-    """The facts on a trajectory that rules use.
+class CheckedTrajectory:
+    """A trajectory as the rules of plausibility see it.
 
     Attributes:
         robot: that is to execute it.
@@ -134,66 +139,66 @@ class Facts:
             yield Measured(longest.path, longest.value, unit, float(sizes[joint]), names)
 
 
-def _positions(facts: Facts, unit: str) -> Iterator[Measured]:
+def _positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
     """Positions in a unit, in turns or reaches of the robot, but for those within the limits of the joint."""
-    for measured, joint in facts.of_joints(units.POSITION):
-        low, high = facts.robot.joints[joint].limits.position
+    for measured, joint in checked.of_joints(units.POSITION):
+        low, high = checked.robot.joints[joint].limits.position
         if measured.unit == unit and not -math.inf < low <= measured.value <= high < math.inf:
-            in_reaches = ratio(measured.size, facts.sizes.extent)
+            in_reaches = ratio(measured.size, checked.sizes.extent)
             yield measured._replace(size=turns(measured.value) if unit == "rad" else in_reaches)
 
 
-def _slowness(facts: Facts) -> Iterator[Measured]:
+def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
     """Mean velocity of the joint that moves most, prismatic ones in reaches of the robot."""
-    if facts.moved is not None and facts.duration > LONG:
-        way = np.abs(np.diff(facts.moved[0])).sum(axis=1) / facts.travels
+    if checked.moved is not None and checked.duration > LONG:
+        way = np.abs(np.diff(checked.moved[0])).sum(axis=1) / checked.travels
         if way.any():
-            yield from facts.paced(units.TIME, way / facts.duration)
+            yield from checked.paced(units.TIME, way / checked.duration)
 
 
-def _velocities(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
+def _velocities(checked: CheckedTrajectory, *, revolute: bool) -> Iterator[Measured]:
     """Yield the largest of joints of a type."""
-    if facts.moved is not None:
-        sizes = np.where(facts.revolute == revolute, np.abs(facts.moved[1]).max(axis=1), 0.0)
-        yield from facts.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")
+    if checked.moved is not None:
+        sizes = np.where(checked.revolute == revolute, np.abs(checked.moved[1]).max(axis=1), 0.0)
+        yield from checked.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")
 
 
-def _accelerations(facts: Facts, quantity: Quantity) -> Iterator[Measured]:
+def _accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
     """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
-    if facts.moved is not None and not facts.robot.placeholder:
-        levers = np.where(facts.revolute, facts.sizes.levers, 1.0)
-        yield from facts.paced(quantity, np.abs(facts.moved[2]).max(axis=1) * levers)
+    if checked.moved is not None and not checked.robot.placeholder:
+        levers = np.where(checked.revolute, checked.sizes.levers, 1.0)
+        yield from checked.paced(quantity, np.abs(checked.moved[2]).max(axis=1) * levers)
 
 
-def _rate(facts: Facts, periods: float) -> Iterator[Measured]:
+def _rate(checked: CheckedTrajectory, periods: float) -> Iterator[Measured]:
     """Yield the samples in a number of seconds."""
-    for path, quantity, value, _ in facts.numbers:
+    for path, quantity, value, _ in checked.numbers:
         if quantity == units.RATE and path == ("rate",):
             yield Measured(path, value, PER_SECOND, value * periods)
 
 
-def _wrenches(facts: Facts, *, forces: bool) -> Iterator[Measured]:
+def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
     """Components over the weight of the robot, moments over that at its reach."""
-    scale = facts.sizes.weight * (1.0 if forces else facts.sizes.extent)
+    scale = checked.sizes.weight * (1.0 if forces else checked.sizes.extent)
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
-    for path, quantity, value, _ in facts.numbers if not facts.robot.placeholder else ():
+    for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
         if quantity == units.WRENCH and isinstance(path[-1], Entry) and (path[-1].number < 3) == forces:
             size = ratio(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
 
-def _commanded(facts: Facts) -> Iterator[tuple[Measured, Joint, Corridor]]:
+def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, Corridor]]:
     """Yield every stiffness but amplitudes, with its joint, and the stiffness of the springs at rest."""
-    for measured, number in facts.of_joints(units.STIFFNESS) if not facts.robot.placeholder else ():
-        found = facts.corridors[number]
+    for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
+        found = checked.corridors[number]
         if found is not None and AMPLITUDES.isdisjoint(measured.path):
             ends = {"lower": f"{found.lower:.4g}", "upper": f"{found.upper:.4g}", "unit": measured.unit}
-            yield measured._replace(beside=ends), facts.robot.joints[number], found
+            yield measured._replace(beside=ends), checked.robot.joints[number], found
 
 
-def _above_lowest(facts: Facts, *, linear: bool) -> Iterator[Measured]:
+def _above_lowest(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:
     """Over the lowest, at joints whose springs all have a linear part, or at the others."""
-    for measured, joint, found in _commanded(facts):
+    for measured, joint, found in _commanded(checked):
         laws = getattr(joint.actuator, "spring", ())
         each_linear = bool(laws) and all(
             law.polynomial is not None for law in laws
@@ -202,87 +207,89 @@ def _above_lowest(facts: Facts, *, linear: bool) -> Iterator[Measured]:
             yield measured._replace(size=ratio(measured.size, found.lower))
 
 
-def _above_highest(facts: Facts) -> Iterator[Measured]:
-    for measured, _, found in _commanded(facts):
+def _above_highest(checked: CheckedTrajectory) -> Iterator[Measured]:
+    for measured, _, found in _commanded(checked):
         yield measured._replace(size=measured.size / found.upper)
 
 
-MOTION_RULES: tuple[Rule[Facts], ...] = (
-    Rule("positions of revolute joints", "`position`: all values", lambda facts: _positions(facts, "rad"),
+MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
+    Rule("positions of revolute joints", "`position`: all values", lambda checked: _positions(checked, "rad"),
         size="turns", high=1 + ROUNDED, usual=0.2,
         reason="few joints make more than a turn; positions within the limits of the joint pass",
-        finding="is {size} turns", slips=(DEGREES,), in_angles=True),
-    Rule("positions of prismatic joints", "`position`: all values", lambda facts: _positions(facts, "m"),
+        finding="is {size} turns", units=(DEGREES,), in_angles=True),
+    Rule("positions of prismatic joints", "`position`: all values", lambda checked: _positions(checked, "m"),
         size="times the reach of the robot", high=40, usual=0.1,
         reason="even the track under an arm is shorter; positions within the limits of the joint pass",
         finding="is {size} times the reach of the robot",
-        slips=(MILLIMETRES, CENTIMETRES), explained_by=SIZES),
+        units=(MILLIMETRES, CENTIMETRES), explained_by=SIZES),
     Rule("slow motions", "`duration`, `times`", _slowness,
         size=f"1/s, mean velocity in rad (reaches of the robot) of motions longer than {LONG:g} s",
         low=1e-3, usual=0.5, reason="a turn would take more than an hour and a half",
         finding="lets no joint move faster than {size} rad (reaches) a second in the mean",
-        slips=UNITS_OF_TIME),
+        units=UNITS_OF_TIME),
     Rule("fast motions of revolute joints", "`duration`, `times`",
-        lambda facts: _velocities(facts, revolute=True),
+        lambda checked: _velocities(checked, revolute=True),
         size="rad/s, largest velocity", high=FASTEST, usual=2, reason="limbs do not turn ten times a second",
-        finding="makes {joint} move at up to {size} {unit}", slips=UNITS_OF_TIME,
+        finding="makes {joint} move at up to {size} {unit}", units=UNITS_OF_TIME,
         advice="check it, and the positions", explained_by=POSITIONS),
     Rule("fast motions of prismatic joints", "`duration`, `times`",
-        lambda facts: _velocities(facts, revolute=False),
+        lambda checked: _velocities(checked, revolute=False),
         size="m/s, largest velocity", high=20, usual=0.5, reason="faster than linear motors for machines are",
-        finding="makes {joint} move at up to {size} {unit}", slips=UNITS_OF_TIME,
+        finding="makes {joint} move at up to {size} {unit}", units=UNITS_OF_TIME,
         advice="check it, and the positions", explained_by=POSITIONS),
-    Rule("accelerations", "`duration`, `times`", lambda facts: _accelerations(facts, units.TIME),
+    Rule("accelerations", "`duration`, `times`", lambda checked: _accelerations(checked, units.TIME),
         size="m/s^2, largest acceleration of what is farthest from the joint", high=300, usual=3,
         reason="thirty times gravity; the fastest parallel robots reach half of it",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
-        slips=tuple(slip._replace(power=-2) for slip in UNITS_OF_TIME), advice="check it, and the positions",
+        units=tuple(each._replace(power=-2) for each in UNITS_OF_TIME),
+        advice="check it, and the positions",
         explained_by=(*POSITIONS, *SIZES, *FAST)),
-    Rule("accelerations of sinusoids", "`frequency`", lambda facts: _accelerations(facts, units.RATE),
+    Rule("accelerations of sinusoids", "`frequency`", lambda checked: _accelerations(checked, units.RATE),
         size="m/s^2, largest acceleration of what is farthest from the joint", high=300, usual=3,
         reason="thirty times gravity; the fastest parallel robots reach half of it",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
-        slips=(Slip("rad/s", 0.5 / math.pi, 2),), advice="it counts periods in a second",
+        units=(OtherUnit("rad/s", 0.5 / math.pi, 2),), advice="it counts periods in a second",
         explained_by=(*POSITIONS, *SIZES, *FAST)),
-    Rule("numbers of steps", "`rate`", lambda facts: _rate(facts, facts.duration),
+    Rule("numbers of steps", "`rate`", lambda checked: _rate(checked, checked.duration),
         size="steps of the whole motion", low=10, usual=4000,
         reason="nothing can be seen between so few",
-        finding="makes but {size} steps of the whole motion", slips=(Slip("kHz", 1e3), Slip("1/ms", 1e3)),
+        finding="makes but {size} steps of the whole motion",
+        units=(OtherUnit("kHz", 1e3), OtherUnit("1/ms", 1e3)),
         advice="it is the number of samples in a second", explained_by=(*FAST, "accelerations")),
-    Rule("rates", "`rate`", lambda facts: _rate(facts, 1.0),
+    Rule("rates", "`rate`", lambda checked: _rate(checked, 1.0),
         size="samples per second", high=2e5, reason="no controller of a robot is so fast",
         finding="is {size} samples per second", advice="it is the number of samples in a second"),
 )  # fmt: skip
 
-EFFORT_RULES: tuple[Rule[Facts], ...] = (
-    Rule("forces on the end effector", "`wrench`", lambda facts: _wrenches(facts, forces=True),
+EFFORT_RULES: tuple[Rule[CheckedTrajectory], ...] = (
+    Rule("forces on the end effector", "`wrench`", lambda checked: _wrenches(checked, forces=True),
         size=f"over the weight of the robot; above 1 only from {COMMON_FORCE:g} N on",
         low=1e-4, high=10, usual=0.2, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot",
-        slips=(Slip("kN", 1e3), Slip("g", 9.81e-3), Slip("mN", 1e-3)), explained_by=SIZES),
-    Rule("moments on the end effector", "`wrench`", lambda facts: _wrenches(facts, forces=False),
+        units=(OtherUnit("kN", 1e3), OtherUnit("g", 9.81e-3), OtherUnit("mN", 1e-3)), explained_by=SIZES),
+    Rule("moments on the end effector", "`wrench`", lambda checked: _wrenches(checked, forces=False),
         size=f"over the weight of the robot at its reach; above 1 only from {COMMON_MOMENT:g} N m on",
         low=1e-5, high=10, usual=0.02, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot at its reach",
-        slips=(Slip("kN m", 1e3), Slip("N mm", 1e-3), Slip("N cm", 1e-2)), explained_by=SIZES),
+        units=(OtherUnit("kN m", 1e3), OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2)), explained_by=SIZES),
     Rule("stiffness beside linear parts of springs", "`stiffness`: all values",
-        lambda facts: _above_lowest(facts, linear=True),
+        lambda checked: _above_lowest(checked, linear=True),
         size="over the lowest that cubic and polynomial springs give at rest",
         low=LOWEST_SHARE, high=20, usual=1.5,
         reason="below there is no way, and far above the linear part of the springs would not matter",
         finding="is {size} times the lowest that the springs give without load, {lower} {unit}",
-        slips=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
+        units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
     Rule("stiffness beside other springs", "`stiffness`: all values",
-        lambda facts: _above_lowest(facts, linear=False),
+        lambda checked: _above_lowest(checked, linear=False),
         size="over the lowest that springs of other laws give at rest", low=LOWEST_SHARE, high=1000, usual=3,
         reason="below there is no way; of the robots that come along none goes beyond 300",
         finding="is {size} times the lowest that the springs give without load, {lower} {unit}",
-        slips=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
+        units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
     Rule("stiffness beyond the springs", "`stiffness`: all values", _above_highest,
         size="over the highest that the springs give at rest", high=5, usual=0.5,
         reason="there is no way to so much",
         finding="is {size} times the highest that the springs give without load, {upper} {unit}",
-        slips=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
+        units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
 )  # fmt: skip
 
 TRAJECTORY_RULES = (*MOTION_RULES, *EFFORT_RULES)

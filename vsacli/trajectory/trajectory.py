@@ -244,7 +244,7 @@ class Trajectory:
 
     @property
     def fits(self) -> tuple[dict[str, Any], ...]:
-        """Facts on the splines behind the samples; see `SampledProfile.summary`."""
+        """Properties of the splines behind the samples; see `SampledProfile.summary`."""
         return tuple(estimate.summary() for estimate in self.estimates.values())
 
     @property

@@ -129,7 +129,7 @@ def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> 
     return PairSolution.unbounded(lower, np.maximum(phi_1, 0), np.minimum(phi_2, 0), lower_critical=False)
 
 
-def alike(number: float, other: float) -> bool:
+def same_number(number: float, other: float) -> bool:
     """Return whether two numbers of springs are one, also where it is a symbol, known when a program runs."""
     return number is other or number == other
 

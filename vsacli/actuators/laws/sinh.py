@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, alike
+from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, same_number
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, number
@@ -21,7 +21,7 @@ class Sinh(SpringLaw):
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """Return the closed pair of two springs of the same a."""
-        return SinhPair(self, other) if isinstance(other, Sinh) and alike(other.a, self.a) else None
+        return SinhPair(self, other) if isinstance(other, Sinh) and same_number(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Torque and stiffness from one exponential function, and a^2 times either."""

@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, SpringState, alike, tendon_solution
+from vsacli.actuators.laws.law import (
+    Pair,
+    PairSolution,
+    SpringLaw,
+    SpringState,
+    same_number,
+    tendon_solution,
+)
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, number
@@ -187,7 +194,7 @@ class Exponential(Tendon):
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """Return the closed pair with a tendon of the same a on side 2."""
         second = other.law if isinstance(other, Mirrored) else None
-        if isinstance(second, Exponential) and alike(second.a, self.a):
+        if isinstance(second, Exponential) and same_number(second.a, self.a):
             return ExponentialPair(self, second)
         return None
 

@@ -127,7 +127,7 @@ class _RowAllocation:
         """Return a row, or a constant as values of a kind have it."""
         if isinstance(operand, Symbol):
             return self._row[operand.index]
-        kind = _kind_of_constant(operand, kind)
+        kind = kind if kind is Kind.BITS else kind_of(operand)
         name = self._constant_names.setdefault((kind, repr(operand)), f"c{len(self._constant_names)}")
         self.constants[name] = np.array(operand, dtype=DTYPES[kind])
         return name
@@ -149,11 +149,6 @@ class _RowAllocation:
             dead = self._last_use[operand.index] == number and operand.index not in self._returned
             if dead and operand.operation != "input":
                 self._free[operand.kind].append(self._row[operand.index])
-
-
-def _kind_of_constant(constant: float | int | bool, wanted: Kind) -> Kind:
-    """Return the kind of the operation; comparisons have truth values for numbers."""
-    return wanted if wanted is Kind.BITS else kind_of(constant)
 
 
 def _unpacking(letter: str, count: int, whole: str) -> str:

@@ -16,7 +16,7 @@ from vsacli.base.json_records import Stored
 from vsacli.control.simulation.compiled_loop import dop853_with_stages
 from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress
 from vsacli.control.simulation.loop_equations import Edge, Equations
-from vsacli.control.simulation.sliding import Sliding, Switch
+from vsacli.control.simulation.stick_slip import StickSlip, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
 EXPLICIT = "DOP853"
@@ -92,7 +92,7 @@ class Integrator:
         equations: Equations,
         tolerances: Tolerances,
         progress: Progress,
-        sliding: Sliding | None = None,
+        sliding: StickSlip | None = None,
     ) -> None:
         self.equations, self._sliding = equations, sliding
         self._tolerances = tolerances

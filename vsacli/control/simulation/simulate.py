@@ -27,7 +27,7 @@ from vsacli.control.simulation.joint_tracking import GoalTolerance, joint_tracki
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
-from vsacli.control.simulation.sliding import sliding
+from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State

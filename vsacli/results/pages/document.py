@@ -1,7 +1,7 @@
 """One HTML file: the template of the project around texts, numbers and scripts, closed to the network.
 
-A page carries BokehJS, which draws its plots, as the Python package `bokeh` brings it. Texts are `Facts` of
-each file: its report, its provenance, and its inputs.
+A page carries BokehJS, which draws its plots, as the Python package `bokeh` brings it. Each
+file has its `PageTexts`: its report, its provenance, and its inputs.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class RemedyText(NamedTuple):
     command: str
 
 
-class Facts(NamedTuple):
+class PageTexts(NamedTuple):
     """The texts on a page about a file.
 
     Attributes:
@@ -122,14 +122,14 @@ class InputText(NamedTuple):
 
 
 def rendered(
-    library: Library, title: str, facts: Sequence[Facts], data: Mapping[str, Any], packed: Packed
+    library: Library, title: str, texts: Sequence[PageTexts], data: Mapping[str, Any], packed: Packed
 ) -> str:
     """Return the page.
 
     Args:
         library: that draws its plots.
         title: of the page.
-        facts: texts on each file.
+        texts: texts on each file.
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
@@ -141,7 +141,7 @@ def rendered(
     template = environment.from_string((folder / TEMPLATE).read_text(encoding="utf-8"))
     return template.render(
         title=title,
-        facts=facts,
+        texts=texts,
         data=as_script({**data, "library": library.name}),
         arrays=packed.texts,
         style=(folder / STYLE).read_text(encoding="utf-8"),
@@ -157,7 +157,7 @@ def _hash(script: str) -> str:
 
 
 def tone_of(verdict: str) -> str:
-    """Return the look of a verdict, as of `Facts`."""
+    """Return the look of a verdict, as of `PageTexts`."""
     return "good" if verdict == "ok" else "fair" if verdict in FAIR else "bad"
 
 

@@ -25,7 +25,7 @@ from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.charts.reduction import marked_spans
 from vsacli.results.charts.stored import BOUNDS, StoredCharts
 from vsacli.results.pages.document import (
-    Facts,
+    PageTexts,
     RemedyText,
     input_text,
     plotting_library,
@@ -126,9 +126,9 @@ def result_page(
         "span": [0.0, max(float(file.time[-1]) for file in files) - start],
         "sections": sections,
     }
-    facts = [_facts(*each) for each in zip(files, labels, reports, remedies, strict=True)]
+    texts = [_texts(*each) for each in zip(files, labels, reports, remedies, strict=True)]
     names = [name for file in files for name in (file.robot_name, file.trajectory_name)]
-    return rendered(library, ", ".join(dict.fromkeys(names)), facts, data, packed)
+    return rendered(library, ", ".join(dict.fromkeys(names)), texts, data, packed)
 
 
 def sections_of(variables: Collection[str]) -> Iterator[Section]:
@@ -161,11 +161,11 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
     }
 
 
-def _facts(file: StoredResult, label: str, report: ReportText, remedy: RemedyText | None) -> Facts:
+def _texts(file: StoredResult, label: str, report: ReportText, remedy: RemedyText | None) -> PageTexts:
     ended = "" if file.complete else ", ended early"
     first, last = file.time[[0, -1]].tolist()
     steps = "1 step" if file.samples == 1 else f"{file.samples} steps"
-    return Facts(
+    return PageTexts(
         title=f"{file.robot_name}, {label}: {steps}, {first:g} to {last:g} s{ended}",
         label=label,
         verdict=file.verdict.replace("_", " "),
@@ -246,12 +246,12 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
 
 
 def measured_page(
-    facts: Facts, curves: Mapping[str, Sequence[MeasuredCurve]], computed: str = "computed"
+    texts: PageTexts, curves: Mapping[str, Sequence[MeasuredCurve]], computed: str = "computed"
 ) -> str:
     """Return the page of measured signals, as HTML.
 
     Args:
-        facts: texts on them; the label is the title of the page.
+        texts: texts on them; the label is the title of the page.
         curves: by the headings of their sections; all share an axis of time.
         computed: name of the curves compared with the measured ones.
 
@@ -263,7 +263,7 @@ def measured_page(
     data = {
         "kind": "over time",
         "joints": [],
-        "files": [{"label": facts.label, "troubles": {}, "doubtful": [], "chain": None}],
+        "files": [{"label": texts.label, "troubles": {}, "doubtful": [], "chain": None}],
         "start": 0.0,
         "span": [
             min((float(curve.time[0]) for curve in every), default=0.0),
@@ -279,7 +279,7 @@ def measured_page(
             for number, (heading, section) in enumerate(curves.items())
         ],
     }
-    return rendered(library, facts.label, [facts], data, packed)
+    return rendered(library, texts.label, [texts], data, packed)
 
 
 def _measured(curve: MeasuredCurve, computed: str, packed: Packed) -> Iterator[dict[str, Any]]:

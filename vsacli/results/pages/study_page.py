@@ -11,7 +11,7 @@ from vsacli.base.arrays import IndexArray, evenly
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
 from vsacli.results.charts.study_points import StudyPoints
-from vsacli.results.pages.document import Facts, input_text, plotting_library, rendered
+from vsacli.results.pages.document import PageTexts, input_text, plotting_library, rendered
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.study_table import StoredStudy
 
@@ -39,8 +39,8 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
             for table, label in zip(tables, labels, strict=True)
         ],
     }
-    facts = [_facts(table, report) for table, report in zip(tables, reports, strict=True)]
-    return rendered(library, ", ".join(dict.fromkeys(labels)), facts, data, packed)
+    texts = [_texts(table, report) for table, report in zip(tables, reports, strict=True)]
+    return rendered(library, ", ".join(dict.fromkeys(labels)), texts, data, packed)
 
 
 def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
@@ -78,10 +78,10 @@ def _drawn(points: StudyPoints) -> IndexArray:
     return np.unique(np.concatenate(chosen))
 
 
-def _facts(table: StoredStudy, report: ReportText) -> Facts:
+def _texts(table: StoredStudy, report: ReportText) -> PageTexts:
     made = table.provenance()
     feasible = int(StudyPoints(table).feasible.sum())
-    return Facts(
+    return PageTexts(
         title=f"{table.study_name}: {table.rows} runs of {table.robot_name}",
         label=table.study_name,
         verdict=f"{feasible} of {table.rows} feasible",

@@ -10,21 +10,21 @@ from vsacli.documents.plausibility import Written, findings, strange
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
+from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES
-from vsacli.robot.plausibility.facts import Facts
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
-def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:
+def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
     """Return the findings of the rules, with lines of the robot file: the first of the sources."""
-    return findings(ROBOT_RULES, facts, _written(sources))
+    return findings(ROBOT_RULES, checked, _written(sources))
 
 
-def strange_of_robot(facts: Facts, sources: Sequence[Source]) -> frozenset[str]:
+def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Names of the rules that find something."""
-    return frozenset(strange(ROBOT_RULES, facts, _written(sources)))
+    return frozenset(strange(ROBOT_RULES, checked, _written(sources)))
 
 
 def _written(sources: Sequence[Source]) -> Written | None:

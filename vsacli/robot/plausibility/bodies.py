@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vsacli.documents.plausibility import Measured, Rule, Slip
-from vsacli.robot.plausibility.facts import Facts, density_of_sphere, joint_path, ratio
+from vsacli.documents.plausibility import Measured, OtherUnit, Rule
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio
 
 TURN = 2 * math.pi
 ROUNDED = 1e-3
@@ -21,13 +21,13 @@ FASTEST = 60.0
 UNLIMITED_ANGLE = 1e4
 """rad; who writes larger ones into limits wants none."""
 
-DEGREES = Slip("deg", math.pi / 180)
-DEGREES_PER_SECOND = Slip("deg/s", math.pi / 180)
-RPM = Slip("rpm", math.pi / 30)
-MILLIMETRES = Slip("mm", 1e-3)
-CENTIMETRES = Slip("cm", 1e-2)
-GRAMS = Slip("g", 1e-3, power=2.5)
-"""Slip of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
+DEGREES = OtherUnit("deg", math.pi / 180)
+DEGREES_PER_SECOND = OtherUnit("deg/s", math.pi / 180)
+RPM = OtherUnit("rpm", math.pi / 30)
+MILLIMETRES = OtherUnit("mm", 1e-3)
+CENTIMETRES = OtherUnit("cm", 1e-2)
+GRAMS = OtherUnit("g", 1e-3, power=2.5)
+"""Units of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
 
 INERTIA_POWER = -1.5
 """Power of the inertia in the density of the sphere, at a given mass."""
@@ -35,19 +35,19 @@ INERTIA_POWER = -1.5
 UNITS_OF_INERTIA = {"kg mm^2": 1e-6, "kg cm^2": 1e-4, "g cm^2": 1e-7, "g mm^2": 1e-9}
 SLIPS_OF_DENSITY = (
     GRAMS,
-    Slip("t", 1e3, power=2.5),
-    *(Slip(unit, size, INERTIA_POWER, field=("inertia",)) for unit, size in UNITS_OF_INERTIA.items()),
+    OtherUnit("t", 1e3, power=2.5),
+    *(OtherUnit(unit, size, INERTIA_POWER, field=("inertia",)) for unit, size in UNITS_OF_INERTIA.items()),
 )
 SLIPS_OF_GRAVITY = (
-    Slip("mm/s^2", 1e-3),
-    Slip("km/s^2", 1e3),
-    Slip("cm/s^2", 1e-2),
-    Slip("ft/s^2", 0.3048),
+    OtherUnit("mm/s^2", 1e-3),
+    OtherUnit("km/s^2", 1e3),
+    OtherUnit("cm/s^2", 1e-2),
+    OtherUnit("ft/s^2", 0.3048),
 )
 SIZES = ("lengths", "densities of links", "sizes of links", "mass of the robot")
 """Rules on what the sizes of a robot follow from; where one of them finds something, these mean little."""
 
-Measure: TypeAlias = Callable[[Facts], Iterator[Measured]]
+Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
 
 
 def turns(angle: float) -> float:
@@ -58,117 +58,120 @@ def turns(angle: float) -> float:
 
 
 def _numbers(
-    unit: str, *keys: str, without: tuple[str, ...] = (), size: Callable[[Facts, float], float] | None = None
+    unit: str,
+    *keys: str,
+    without: tuple[str, ...] = (),
+    size: Callable[[CheckedRobot, float], float] | None = None,
 ) -> Measure:
     """Return every number in a unit with one of these keys on its path and none of those; size |value|."""
 
-    def measure(facts: Facts) -> Iterator[Measured]:
-        for number in facts.of_unit(unit):
+    def measure(checked: CheckedRobot) -> Iterator[Measured]:
+        for number in checked.of_unit(unit):
             on_path = {*number.path}
             if (not keys or on_path & {*keys}) and not on_path & {*without}:
-                yield number if size is None else number._replace(size=size(facts, number.value))
+                yield number if size is None else number._replace(size=size(checked, number.value))
 
     return measure
 
 
-def _in_extents(facts: Facts, length: float) -> float:
-    return ratio(abs(length), facts.sizes.extent)
+def _in_extents(checked: CheckedRobot, length: float) -> float:
+    return ratio(abs(length), checked.sizes.extent)
 
 
-def _range(_: Facts, angle: float) -> float:
+def _range(_: CheckedRobot, angle: float) -> float:
     return turns(angle) if abs(angle) < UNLIMITED_ANGLE else math.nan
 
 
-def _velocity(_: Facts, velocity: float) -> float:
+def _velocity(_: CheckedRobot, velocity: float) -> float:
     """NaN for powers of ten from 100 on, which mean no limit."""
     size = abs(velocity)
     return math.nan if size >= 100 and math.log10(size).is_integer() else size
 
 
-def _lengths(facts: Facts) -> Iterator[Measured]:
-    largest = float(np.max(facts.sizes.gyrations))
+def _lengths(checked: CheckedRobot) -> Iterator[Measured]:
+    largest = float(np.max(checked.sizes.gyrations))
     in_gyrations = _numbers("m", "dh", "com", "tool", size=lambda _, length: ratio(abs(length), largest))
-    return (number._replace(beside={"gyration": f"{largest:.3g}"}) for number in in_gyrations(facts))
+    return (number._replace(beside={"gyration": f"{largest:.3g}"}) for number in in_gyrations(checked))
 
 
-def _links(size: Callable[[Facts, int], float]) -> Measure:
+def _links(size: Callable[[CheckedRobot, int], float]) -> Measure:
     """Return the mass of each link, with a size made from its index."""
 
-    def measure(facts: Facts) -> Iterator[Measured]:
-        for index, joint in enumerate(facts.joints):
+    def measure(checked: CheckedRobot) -> Iterator[Measured]:
+        for index, joint in enumerate(checked.joints):
             path = joint_path(index, joint, "link", "mass")
-            yield Measured(path, joint.link.mass, "kg", size(facts, index))
+            yield Measured(path, joint.link.mass, "kg", size(checked, index))
 
     return measure
 
 
-def _gyration(facts: Facts, index: int) -> float:
+def _gyration(checked: CheckedRobot, index: int) -> float:
     """Over the reach from the base frame on, since single wheels and rotors have little of their own."""
-    return ratio(float(facts.sizes.gyrations[index]), facts.sizes.reach + math.hypot(*facts.base.xyz))
+    return ratio(float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz))
 
 
-def _crowding(facts: Facts) -> Iterator[Measured]:
+def _crowding(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the heaviest link, in the name of all, unless none has a mass, which the robot says by itself."""
-    crowding = _links(lambda facts, _: ratio(facts.sizes.mass, facts.sizes.extent**3))
-    heaviest = max(crowding(facts), key=lambda measured: measured.value)
+    crowding = _links(lambda checked, _: ratio(checked.sizes.mass, checked.sizes.extent**3))
+    heaviest = max(crowding(checked), key=lambda measured: measured.value)
     if heaviest.value > 0:
-        yield heaviest._replace(beside={"extent": f"{facts.sizes.extent:.3g}"})
+        yield heaviest._replace(beside={"extent": f"{checked.sizes.extent:.3g}"})
 
 
 def _gravity(size: Callable[[float], float]) -> Measure:
     """Return the magnitude of gravity, with a size made from it."""
 
-    def measure(facts: Facts) -> Iterator[Measured]:
-        value = math.hypot(*facts.gravity)
+    def measure(checked: CheckedRobot) -> Iterator[Measured]:
+        value = math.hypot(*checked.gravity)
         yield Measured(("gravity",), value, "m/s^2", size(value))
 
     return measure
 
 
-def _upward(facts: Facts) -> Iterator[Measured]:
-    upward = facts.gravity[2]
-    if not any(facts.base.rpy):
-        yield Measured(("gravity",), upward, "m/s^2", ratio(upward, math.hypot(*facts.gravity)))
+def _upward(checked: CheckedRobot) -> Iterator[Measured]:
+    upward = checked.gravity[2]
+    if not any(checked.base.rpy):
+        yield Measured(("gravity",), upward, "m/s^2", ratio(upward, math.hypot(*checked.gravity)))
 
 
-BODY_RULES: tuple[Rule[Facts], ...] = (
+BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("fixed angles", "`alpha`, `theta`, `rpy`",
         _numbers("rad", without=("limits", "actuator"), size=lambda _, angle: turns(angle)),
         size="turns", high=1 + ROUNDED, usual=0.25,
         reason="an angle at which something is mounted is less than a turn",
-        finding="is {size} turns", slips=(DEGREES,), in_angles=True),
+        finding="is {size} turns", units=(DEGREES,), in_angles=True),
     Rule("ranges of revolute joints", "`limits.position`",
         _numbers("rad", "limits", size=_range),
         size="turns", high=2 + ROUNDED, usual=0.25,
         reason="few joints make more than two turns; from 10,000 rad on it means no limit",
-        finding="is {size} turns", slips=(DEGREES,), in_angles=True),
+        finding="is {size} turns", units=(DEGREES,), in_angles=True),
     Rule("ranges of prismatic joints", "`limits.position`", _numbers("m", "limits", size=_in_extents),
         size="times the reach of the robot", high=40, usual=0.1,
         reason="even the track under an arm is shorter than so many arms",
-        finding="is {size} times the reach of the robot", slips=(MILLIMETRES, CENTIMETRES)),
+        finding="is {size} times the reach of the robot", units=(MILLIMETRES, CENTIMETRES)),
     Rule("velocities of revolute joints", "`limits.velocity`", _numbers("rad/s", "limits", size=_velocity),
         size="rad/s", high=FASTEST, usual=3,
         reason="limbs do not turn so fast; powers of ten from 100 on mean no limit",
         finding="is about ten turns a second or more",
-        slips=(DEGREES_PER_SECOND, RPM), in_angles=True),
+        units=(DEGREES_PER_SECOND, RPM), in_angles=True),
     Rule("velocities of prismatic joints", "`limits.velocity`", _numbers("m/s", "limits"),
         size="m/s", high=20, usual=0.5, reason="faster than linear motors are",
-        finding="is faster than linear motors are", slips=(Slip("mm/s", 1e-3),)),
+        finding="is faster than linear motors are", units=(OtherUnit("mm/s", 1e-3),)),
     Rule("lengths", "`dh.a`, `dh.d`, `com`, `tool.xyz`", _lengths,
         size="times the largest radius of gyration", high=30, usual=0.8,
         reason="masses lie along the rows that hold them; of 349 chains of real robots none has more than 8",
         finding="is {size} times the largest radius of gyration of a link, {gyration} m",
-        slips=(MILLIMETRES, CENTIMETRES)),
+        units=(MILLIMETRES, CENTIMETRES)),
     Rule("place of the base", "`base.xyz`", _numbers("m", "base", size=_in_extents),
         size="times the reach of the robot", high=100,
         reason="a robot stands in a room, whose origin is not so far away",
-        finding="is {size} times the reach of the robot", slips=(MILLIMETRES,)),
+        finding="is {size} times the reach of the robot", units=(MILLIMETRES,)),
     Rule("densities of links", "`mass`, `inertia`",
-        _links(lambda facts, index: density_of_sphere(facts.joints[index].link)),
+        _links(lambda checked, index: density_of_sphere(checked.joints[index].link)),
         size="kg/m^3, of the solid sphere with the same mass and sum of moments",
         low=2e-3, high=25000, usual=400,
         reason="osmium has 22,600, and the spheres of 349 chains of real robots have 0.006 to 11,000",
-        finding="makes a link as dense as a solid sphere of {size} kg/m^3", slips=SLIPS_OF_DENSITY),
+        finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY),
     Rule("sizes of links", "`mass`, `inertia`", _links(_gyration),
         size="radius of gyration over the reach of the robot, from the base frame on", high=3,
         reason="a link is not larger than the whole robot; in 349 chains of real robots none exceeds 1.9",
@@ -179,12 +182,12 @@ BODY_RULES: tuple[Rule[Facts], ...] = (
         size="kg/m^3, of a cube as long as the reach", low=1e-4, high=1e4, usual=30,
         reason="the cube is almost empty: 349 chains of real robots have 0.3 to 510, iron has 7900",
         finding="makes, with the other links, {size} kg/m^3 of a cube as long as the reach, {extent} m",
-        slips=(Slip("g", 1e-3), Slip("t", 1e3)), advice="check the units of masses and lengths",
+        units=(OtherUnit("g", 1e-3), OtherUnit("t", 1e3)), advice="check the units of masses and lengths",
         explained_by=("lengths", "densities of links", "sizes of links")),
     Rule("size of gravity", "`gravity`", _gravity(lambda size: size or math.nan),
         size="m/s^2, if there is any", low=0.02, high=30, usual=9.81,
         reason="on Jupiter it is 25, on Ceres 0.28",
-        finding="is that of no planet or moon", slips=SLIPS_OF_GRAVITY),
+        finding="is that of no planet or moon", units=SLIPS_OF_GRAVITY),
     Rule("gravity as a direction", "`gravity`", _gravity(lambda size: abs(size - 1)),
         size="distance of its length from 1 m/s^2", low=1e-3,
         reason="a direction is not enough; no planet has just this",

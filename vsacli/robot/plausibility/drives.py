@@ -11,17 +11,17 @@ from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.base import units
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
-from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, FASTEST, RPM, SIZES, Measure
-from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
 
 TINY = 0.1
 """m; the rotors of shorter robots, fingers say, outweigh them by far behind their gears."""
 
-DAMPING_IN_MILLIMETRES = Slip("N mm s/rad", 1e-3)
-OTHER_TORQUES = (Slip("N mm", 1e-3), Slip("N cm", 1e-2), Slip("mN m", 1e-3))
+DAMPING_IN_MILLIMETRES = OtherUnit("N mm s/rad", 1e-3)
+OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
 WHICH_SIDE = "with `gear_ratio` it is that of the motor's shaft, without that on the joint's side"
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 """Rules on what the motors' sizes behind the gear follow from, and what they are compared with."""
@@ -30,7 +30,7 @@ GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 class _Driven(NamedTuple):
     """A motor with its joint. A property is NaN without a bound (`torque`, `velocity`), gravity (`load`)."""
 
-    facts: Facts
+    checked: CheckedRobot
     number: int
     joint: Joint
     at: NumberPath
@@ -55,17 +55,17 @@ class _Driven(NamedTuple):
     @property
     def link_inertia(self) -> float:
         """Inertia of the link alone about its joint."""
-        return float(self.facts.sizes.inertias[self.number])
+        return float(self.checked.sizes.inertias[self.number])
 
     @property
     def scale(self) -> float:
         """The weight of the robot at its reach."""
-        return self.facts.sizes.scale(self.joint)
+        return self.checked.sizes.scale(self.joint)
 
     @property
     def load(self) -> float:
         """Largest torque of the weight of the stretched arm at the joint."""
-        return float(self.facts.sizes.loads[self.number]) if any(self.facts.gravity) else math.nan
+        return float(self.checked.sizes.loads[self.number]) if any(self.checked.gravity) else math.nan
 
     @property
     def velocity(self) -> float:
@@ -90,10 +90,10 @@ def _bounded(value: float) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-def _all_motors(facts: Facts) -> Iterator[_Driven]:
-    for number, joint in facts.driven:
+def _all_motors(checked: CheckedRobot) -> Iterator[_Driven]:
+    for number, joint in checked.driven:
         for at, motor in motors(joint):
-            yield _Driven(facts, number, joint, at, motor)
+            yield _Driven(checked, number, joint, at, motor)
 
 
 def _motors(
@@ -108,8 +108,8 @@ def _motors(
         carrying: whether to pass over motors that do not move with their joint.
     """
 
-    def measure(facts: Facts) -> Iterator[Measured]:
-        for driven in _all_motors(facts):
+    def measure(checked: CheckedRobot) -> Iterator[Measured]:
+        for driven in _all_motors(checked):
             if unit in ("", driven.unit(name)) and (driven.carries or not carrying):
                 value = getattr(driven.motor, name) or math.nan
                 yield driven.measured(name, _bounded(abs(value)) if size is None else size(driven))
@@ -118,7 +118,7 @@ def _motors(
 
 
 def _heavy_rotor(driven: _Driven) -> float:
-    sizes = driven.facts.sizes
+    sizes = driven.checked.sizes
     lever = sizes.extent if driven.joint.is_revolute else 1.0
     return ratio(driven.behind.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
 
@@ -145,9 +145,9 @@ def _damping(number: int, joint: Joint, size: float) -> Measured:
     return Measured(path, joint.damping, units.DAMPING.unit(joint.type), size)
 
 
-def _braking(facts: Facts) -> Iterator[Measured]:
+def _braking(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the torque of damping at the largest velocity, over the largest torque; 0 without a limit."""
-    for driven in _all_motors(facts):
+    for driven in _all_motors(checked):
         joint, motor = driven.joint, driven.behind
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
         if velocity < FASTEST and driven.carries:
@@ -156,9 +156,9 @@ def _braking(facts: Facts) -> Iterator[Measured]:
             yield _damping(driven.number, joint, joint.damping * velocity / torque)
 
 
-def _joint_damping(facts: Facts) -> Iterator[Measured]:
-    for number, joint in enumerate(facts.joints):
-        yield _damping(number, joint, ratio(joint.damping, facts.sizes.scale(joint)))
+def _joint_damping(checked: CheckedRobot) -> Iterator[Measured]:
+    for number, joint in enumerate(checked.joints):
+        yield _damping(number, joint, ratio(joint.damping, checked.sizes.scale(joint)))
 
 
 class _Rubbing(NamedTuple):
@@ -173,23 +173,23 @@ class _Rubbing(NamedTuple):
     max_torque: float = math.nan
 
 
-def _rubbing(facts: Facts) -> Iterator[_Rubbing]:
-    for driven in _all_motors(facts):
+def _rubbing(checked: CheckedRobot) -> Iterator[_Rubbing]:
+    for driven in _all_motors(checked):
         friction, joint, gear = driven.motor.friction, driven.joint, abs(driven.motor.gear_ratio or 1.0)
         if friction is not None:
             path, unit, bound = driven.path("friction"), driven.unit("max_torque"), driven.motor.max_torque
             yield _Rubbing(path, friction, joint, driven.scale, unit, gear, _bounded(bound))
-    for number, joint in enumerate(facts.joints):
+    for number, joint in enumerate(checked.joints):
         if joint.friction is not None:
             path, unit = joint_path(number, joint, "friction"), units.TORQUE.unit(joint.type)
-            yield _Rubbing(path, joint.friction, joint, facts.sizes.scale(joint), unit)
+            yield _Rubbing(path, joint.friction, joint, checked.sizes.scale(joint), unit)
 
 
 def _coulomb(size: Callable[[_Rubbing, float], float]) -> Measure:
     """Coulomb friction as it is written, once if it is the same in both directions."""
 
-    def measure(facts: Facts) -> Iterator[Measured]:
-        for rubbing in _rubbing(facts):
+    def measure(checked: CheckedRobot) -> Iterator[Measured]:
+        for rubbing in _rubbing(checked):
             backward, forward = rubbing.friction.coulomb
             sides = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
             for side, torque in sides.items():
@@ -199,14 +199,14 @@ def _coulomb(size: Callable[[_Rubbing, float], float]) -> Measure:
     return measure
 
 
-def _widths(facts: Facts) -> Iterator[Measured]:
-    for rubbing in _rubbing(facts):
+def _widths(checked: CheckedRobot) -> Iterator[Measured]:
+    for rubbing in _rubbing(checked):
         if rubbing.joint.is_revolute:
             width = rubbing.friction.width
             yield Measured((*rubbing.path, "width"), width, "rad/s", width / rubbing.gear)
 
 
-GEAR_RULES: tuple[Rule[Facts], ...] = (
+GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("gear ratios", "`gear_ratio`", _motors("gear_ratio", unit="1"),
         size="turns of the motor to one of the joint", low=1, high=5000, usual=100,
         reason="gears of joints reduce; several stages reach some thousands",
@@ -215,11 +215,11 @@ GEAR_RULES: tuple[Rule[Facts], ...] = (
     Rule("gear ratios of prismatic joints", "`gear_ratio`", _motors("gear_ratio", unit="rad/m"),
         size="rad/m", low=5, high=1e5, usual=600,
         reason="a screw of 0.06 mm a turn has 100,000, a wheel of 0.4 m diameter 5",
-        finding="turns the motor by {size} rad for each metre", slips=(Slip("rad/mm", 1e3),),
+        finding="turns the motor by {size} rad for each metre", units=(OtherUnit("rad/mm", 1e3),),
         advice="of a screw it is 2*pi over the travel of a turn in m, e.g. 2*pi/0.020"),
 )  # fmt: skip
 
-MOTOR_RULES: tuple[Rule[Facts], ...] = (
+MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("light rotors", "`motor.inertia`",
         _motors("inertia", lambda m: ratio(m.behind.inertia, m.link_inertia), carrying=True),
         size="on the joint's side of the gear, over the inertia of the link about its joint", low=0.005,
@@ -232,23 +232,23 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         high=100, usual=0.1,
         reason="such a motor would feel nothing of the robot; those shorter than 0.1 m are passed over",
         finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
-        slips=(Slip("kg cm^2", 1e-4), Slip("g cm^2", 1e-7), Slip("kg mm^2", 1e-6)),
+        units=(OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6)),
         advice=WHICH_SIDE, explained_by=GEARS),
     Rule("damping of motors", "`motor.damping`",
         _motors("damping", lambda m: m.motor.damping / m.motor.inertia),
         size="1/s, over the inertia of the motor", high=500,
         reason="a motor that is let go runs on for more than 2 ms",
         finding="stops the motor alone at a rate of {size} 1/s",
-        slips=(DAMPING_IN_MILLIMETRES, Slip("N m s/krpm", 0.03 / math.pi)),
+        units=(DAMPING_IN_MILLIMETRES, OtherUnit("N m s/krpm", 0.03 / math.pi)),
         advice="check the units of damping and inertia"),
     Rule("velocities of motors", "`max_velocity`", _motors("max_velocity", unit="rad/s", carrying=True),
         size="rad/s, as written", high=2500, usual=400, reason="robots have no faster motors",
-        finding="is more than 24,000 turns a minute", slips=(RPM, DEGREES_PER_SECOND), in_angles=True),
+        finding="is more than 24,000 turns a minute", units=(RPM, DEGREES_PER_SECOND), in_angles=True),
     Rule("velocities of motors behind the gear", "`max_velocity`",
         _motors("max_velocity", _output_velocity, unit="rad/s", carrying=True),
         size="rad/s, on the joint's side of the gear", high=FASTEST, usual=4,
         reason="limbs do not turn so fast",
-        finding="is, on the joint's side of the gear, {size} rad/s", slips=(RPM, DEGREES_PER_SECOND),
+        finding="is, on the joint's side of the gear, {size} rad/s", units=(RPM, DEGREES_PER_SECOND),
         advice="with `gear_ratio` it would be that of the motor's shaft",
         explained_by=(*GEARS, "velocities of motors")),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
@@ -256,7 +256,7 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         size="on the joint's side of the gear, over the limit of the joint", high=8,
         reason="the limit of a joint is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
-        slips=(RPM, DEGREES_PER_SECOND), advice="check the units of both", in_angles=True,
+        units=(RPM, DEGREES_PER_SECOND), advice="check the units of both", in_angles=True,
         explained_by=(*GEARS, "velocities of motors", "velocities of motors behind the gear")),
     Rule("weak motors", "`max_torque`",
         _motors("max_torque", lambda m: ratio(m.torque, m.load), carrying=True),
@@ -270,57 +270,57 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         size="on the joint's side of the gear, over the weight of the robot at its reach",
         high=300, usual=0.5, reason="it would lift 300 such robots",
         finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
-        slips=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=GEARS),
+        units=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=GEARS),
 )  # fmt: skip
 
-RESISTANCE_RULES: tuple[Rule[Facts], ...] = (
+RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("damping beside torque", "`damping`, `motor.damping`", _braking,
         size="torque that it takes at the largest velocity, over the largest torque of the motors",
         high=1, usual=0.05,
         reason="the joint could not go as fast as its limits say",
         finding="takes, at the largest velocity of the joint, {size} times the largest torque of its motors",
-        slips=(DAMPING_IN_MILLIMETRES._replace(instead_of="N m s/rad"),),
+        units=(DAMPING_IN_MILLIMETRES._replace(instead_of="N m s/rad"),),
         explained_by=(*GEARS, "velocities of motors", "velocities of motors and joints", "weak motors")),
     Rule("damping of joints", "`damping`", _joint_damping,
         size="torque at 1 rad/s (force at 1 m/s) over the weight of the robot at its reach",
         high=500, usual=1e-3,
         reason="the robot could hardly move; placeholders in descriptions of real robots come to 50",
         finding="brakes, at 1 rad/s or 1 m/s, with {size} times the weight of the robot at its reach",
-        slips=(DAMPING_IN_MILLIMETRES,), explained_by=(*SIZES, "damping beside torque")),
+        units=(DAMPING_IN_MILLIMETRES,), explained_by=(*SIZES, "damping beside torque")),
     Rule("dry friction beside torque", "`motor.friction.coulomb`",
         _coulomb(lambda rubbing, torque: torque / rubbing.max_torque),
         size="over the largest torque of the motor", high=1, usual=0.1,
         reason="such a motor could not move at all",
-        finding="is {size} times the largest torque of the motor", slips=OTHER_TORQUES, explained_by=GEARS),
+        finding="is {size} times the largest torque of the motor", units=OTHER_TORQUES, explained_by=GEARS),
     Rule("dry friction beside weight", "`friction.coulomb`, `motor.friction.coulomb`",
         _coulomb(lambda rubbing, torque: ratio(torque * rubbing.gear, rubbing.scale)),
         size="on the joint's side of the gear, over the weight of the robot at its reach",
         high=100, usual=0.05, reason="a hundred such robots would hang on the joint without moving it",
         finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
-        slips=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=(*SIZES, *GEARS, "dry friction beside torque")),
+        units=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=(*SIZES, *GEARS, "dry friction beside torque")),
     Rule("widths of friction", "`friction.width`, `motor.friction.width` of revolute joints", _widths,
         size="rad/s, on the joint's side of the gear", high=3, usual=0.05,
         reason="that is as fast as joints go, so that it would be viscous friction",
         finding="smooths friction over {size} rad/s on the joint's side of the gear",
-        slips=(DEGREES_PER_SECOND, RPM), explained_by=GEARS),
+        units=(DEGREES_PER_SECOND, RPM), explained_by=GEARS),
 )  # fmt: skip
 
-WINDING_RULES: tuple[Rule[Facts], ...] = (
+WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("torque constants", "`torque_constant`", _motors("torque_constant"),
         size="N m/A", low=1e-4, high=30, usual=0.1,
         reason="the smallest motors have 0.0003 N m/A, direct drives as wide as a door a few",
-        finding="is that of no motor", slips=(Slip("mN m/A", 1e-3), Slip("N cm/A", 1e-2)),
+        finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),
         advice="from volts per 1000 turns a minute it is 0.00955 N m/A for each of them"),
     Rule("resistances of windings", "`resistance`", _motors("resistance"),
         size="ohm", low=1e-3, high=1000,
         reason="large motors have some milliohm, those of watches hundreds of ohm",
-        finding="is that of no winding of a robot's motor", slips=(Slip("mohm", 1e-3),)),
+        finding="is that of no winding of a robot's motor", units=(OtherUnit("mohm", 1e-3),)),
     Rule("voltages at the largest velocity", "`torque_constant`, `max_velocity`, `max_voltage`",
         _motors("torque_constant", _speed_voltage),
         size="that the velocity makes, over the largest voltage", high=5, usual=0.8,
         reason="the motor could not go a fifth as fast as its limit says",
         finding="makes {size} times the largest voltage at the motor's largest velocity",
-        slips=(Slip("mN m/A", 1e-3),), explained_by=("velocities of motors", "torque constants")),
+        units=(OtherUnit("mN m/A", 1e-3),), explained_by=("velocities of motors", "torque constants")),
 )  # fmt: skip
 
 DRIVE_RULES = (*GEAR_RULES, *MOTOR_RULES, *RESISTANCE_RULES, *WINDING_RULES)

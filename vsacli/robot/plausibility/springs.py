@@ -13,29 +13,29 @@ from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
-from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETRES, SIZES, TURN
-from vsacli.robot.plausibility.facts import Facts, joint_path, ratio, written_once
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
 SMALL_SHARE = 0.003
 """Small angle as a share of half a turn: half a degree."""
 
 TOO_SOFT = (
-    Slip("N m/deg", 180 / math.pi, instead_of="N m/rad"),
-    Slip("kN m/rad", 1e3, instead_of="N m/rad"),
-    Slip("N/mm", 1e3, instead_of="N/m"),
+    OtherUnit("N m/deg", 180 / math.pi, instead_of="N m/rad"),
+    OtherUnit("kN m/rad", 1e3, instead_of="N m/rad"),
+    OtherUnit("N/mm", 1e3, instead_of="N/m"),
 )
-NEWTON_MILLIMETRES = Slip("N mm/rad", 1e-3, instead_of="N m/rad")
-TOO_STIFF = (NEWTON_MILLIMETRES, Slip("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
+NEWTON_MILLIMETRES = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
+TOO_STIFF = (NEWTON_MILLIMETRES, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller, or a larger number than in the expected one."""
 
 SLIPS_OF_DAMPING = (
-    Slip("N mm s/rad", 1e-3, instead_of="N m s/rad"),
-    Slip("N m s/deg", 180 / math.pi, instead_of="N m s/rad"),
-    Slip("N s/mm", 1e3, instead_of="N s/m"),
+    OtherUnit("N mm s/rad", 1e-3, instead_of="N m s/rad"),
+    OtherUnit("N m s/deg", 180 / math.pi, instead_of="N m s/rad"),
+    OtherUnit("N s/mm", 1e3, instead_of="N s/m"),
 )
 
 
@@ -58,48 +58,48 @@ def _unit(joint: Joint) -> str:
     return units.STIFFNESS.unit(joint.type)
 
 
-def _travel(facts: Facts, joint: Joint) -> float:
+def _travel(checked: CheckedRobot, joint: Joint) -> float:
     """Return a radian, or for a prismatic joint the reach of the robot, m."""
-    return 1.0 if joint.is_revolute else facts.sizes.extent
+    return 1.0 if joint.is_revolute else checked.sizes.extent
 
 
-def _corridors(facts: Facts) -> Iterator[tuple[int, Joint, Corridor]]:
+def _corridors(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
     """Yield the joints whose stiffness can be commanded, with their indices."""
-    for index, joint in facts.driven:
+    for index, joint in checked.driven:
         found = corridor(joint)
         if found is not None:
             yield index, joint, found
 
 
-def _soft_ends(facts: Facts) -> Iterator[Measured]:
+def _soft_ends(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the stiffness of antagonistic springs at rest over the weight at full reach."""
-    for index, joint, found in _corridors(facts):
-        size = ratio(found.lower * _travel(facts, joint), facts.sizes.scale(joint))
+    for index, joint, found in _corridors(checked):
+        size = ratio(found.lower * _travel(checked, joint), checked.sizes.scale(joint))
         beside = {"stiffness": f"{found.lower:.4g} {_unit(joint)}"}
         yield Measured(joint_path(index, joint, "actuator", "spring"), math.nan, _unit(joint), size, beside)
 
 
-def _stiff_transmissions(facts: Facts) -> Iterator[Measured]:
+def _stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Stiffness at rest over the weight at full reach, per rad."""
-    for joint, measured, held in _single_springs(facts):
+    for joint, measured, held in _single_springs(checked):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(float(held["stiffness"][0]), facts.sizes.scale(joint)))
+            yield measured._replace(size=ratio(float(held["stiffness"][0]), checked.sizes.scale(joint)))
 
 
-def _soft_transmissions(facts: Facts) -> Iterator[Measured]:
+def _soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield a rad, or the reach, over the deflection under what the weight can ask, if there is any."""
-    for joint, measured, held in _single_springs(facts) if any(facts.gravity) else ():
-        yield measured._replace(size=ratio(_travel(facts, joint), float(held["phi"][0, 1])))
+    for joint, measured, held in _single_springs(checked) if any(checked.gravity) else ():
+        yield measured._replace(size=ratio(_travel(checked, joint), float(held["phi"][0, 1])))
 
 
-def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, OfJoint]]:
+def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, OfJoint]]:
     """Yield each joint without commanded stiffness: its spring at rest and under the largest weight.
 
     What is measured is the stiffness or the law; its size is to be replaced.
     """
-    for number, joint in facts.driven:
+    for number, joint in checked.driven:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
-            command = Command.at_rest(np.array([0.0, facts.sizes.loads[number]]), np.zeros(2))
+            command = Command.at_rest(np.array([0.0, checked.sizes.loads[number]]), np.zeros(2))
             held = joint.actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
             constant = getattr(joint.actuator, "stiffness", None)
             path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
@@ -107,40 +107,40 @@ def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, OfJoint]]:
             yield joint, Measured(path, value, _unit(joint), math.nan), held
 
 
-def _springs(facts: Facts) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
+def _springs(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
     """Yield the springs with their joints, as they are written."""
-    for number, joint in facts.driven:
+    for number, joint in checked.driven:
         path = joint_path(number, joint, "actuator", "spring")
         for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
             yield joint, at, law
 
 
-def _hardening(facts: Facts, share: float, *, of_pairs: bool = False) -> Iterator[Measured]:
+def _hardening(checked: CheckedRobot, share: float, *, of_pairs: bool = False) -> Iterator[Measured]:
     """Stiffness at a share of half a turn (of the reach), or where the law ends before, over that at rest.
 
     If asked for, only that of pairs, whose stiffness is chosen by it.
     """
-    for joint, path, law in _springs(facts):
+    for joint, path, law in _springs(checked):
         if not law.is_linear and ("stiffness" in joint.actuator.commanded or not of_pairs):
-            unit, full = ("rad", HALF_TURN) if joint.is_revolute else ("m", facts.sizes.extent)
+            unit, full = ("rad", HALF_TURN) if joint.is_revolute else ("m", checked.sizes.extent)
             deflection = min(law.domain[1], share * full)
             rest, there = law.stiffness(np.array([0.0, deflection])).tolist()
             size = there / rest if rest else math.nan
             yield Measured(path, math.nan, "", size, {"deflection": f"{deflection:.3g} {unit}"})
 
 
-def _deflections(facts: Facts) -> Iterator[Measured]:
-    for joint, path, law in _springs(facts):
+def _deflections(checked: CheckedRobot) -> Iterator[Measured]:
+    for joint, path, law in _springs(checked):
         ends = {"max_deflection": law.max_deflection, "file": law.domain[1]}
         for name, end in ends.items():
             if math.isfinite(end) and (name == "max_deflection" or law.sources):
-                unit, full = ("rad", TURN) if joint.is_revolute else ("m", 2 * facts.sizes.extent)
+                unit, full = ("rad", TURN) if joint.is_revolute else ("m", 2 * checked.sizes.extent)
                 yield Measured((*path, name), end, unit, ratio(end, full))
 
 
-def _stiffness_limits(facts: Facts) -> Iterator[Measured]:
+def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
     """Limits over the lowest at rest; a lower limit below all that springs give does no harm."""
-    for index, joint, found in _corridors(facts):
+    for index, joint, found in _corridors(checked):
         beside = {"lower": f"{found.lower:.4g}", "unit": _unit(joint)}
         for side, limit in enumerate(joint.limits.stiffness):
             size = ratio(limit, found.lower)
@@ -158,41 +158,41 @@ def _least_stiffness(joint: Joint) -> float:
     return float(held["stiffness"][0])
 
 
-def _largest_dampings(facts: Facts) -> Iterator[Measured]:
+def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range over twice the root of inertia times stiffness."""
-    for number, joint in facts.driven:
+    for number, joint in checked.driven:
         if joint.damper is not None and joint.actuator.sprung:
-            product = float(facts.sizes.moved[number]) * _least_stiffness(joint)
+            product = float(checked.sizes.moved[number]) * _least_stiffness(joint)
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
             path = joint_path(number, joint, "damper", "range", Entry(1))
             yield Measured(path, damping, units.DAMPING.unit(joint.type), size)
 
 
-SPRING_RULES: tuple[Rule[Facts], ...] = (
+SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("stiff springs", "`spring`", _soft_ends,
         size="stiffness of the pair at rest, times 1 rad (the reach), over the robot's weight at its reach",
         high=1000, usual=4,
         reason="such a pair yields by a thousandth under the whole weight; shipped robots have 0.03 to 100",
         finding="makes {stiffness} at rest, {size} times the robot's weight at its reach per rad (per reach)",
-        slips=TOO_STIFF, explained_by=SIZES),
+        units=TOO_STIFF, explained_by=SIZES),
     Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _stiff_transmissions,
         size="stiffness at rest times 1 rad, of revolute joints, over the weight of the robot at its reach",
         high=5000, usual=300,
         reason="with strain wave gears even light arms stay below; prismatic joints may be stiffer",
         finding="is {size} times the weight of the robot at its reach per rad",
-        slips=TOO_STIFF, advice="if it does not yield, take `type: rigid`", explained_by=SIZES),
+        units=TOO_STIFF, advice="if it does not yield, take `type: rigid`", explained_by=SIZES),
     Rule("soft transmissions", "`stiffness`, `spring` of elastic joints", _soft_transmissions,
         size="1 rad or the reach over the deflection under what the weight of the stretched arm can ask",
         low=4, usual=50, reason="the arm would hang down",
         finding="yields by more than 0.25 rad (of the reach) to what the weight of the stretched arm can ask",
-        slips=TOO_SOFT, explained_by=SIZES),
-    Rule("hardening of springs", "`spring`", lambda facts: _hardening(facts, 1.0, of_pairs=True),
+        units=TOO_SOFT, explained_by=SIZES),
+    Rule("hardening of springs", "`spring`", lambda checked: _hardening(checked, 1.0, of_pairs=True),
         size="stiffness at a deflection of half a turn (of the reach), over that at rest", low=1.5,
         reason="a pair that hardly hardens cannot change its stiffness",
         finding="is at {deflection} but {size} times as stiff as at rest",
         advice="check the units of its constants: rad, not deg (m, not mm)"),
-    Rule("early hardening of springs", "`spring`", lambda facts: _hardening(facts, SMALL_SHARE),
+    Rule("early hardening of springs", "`spring`", lambda checked: _hardening(checked, SMALL_SHARE),
         size=f"stiffness at {SMALL_SHARE:g} of half a turn (of the reach), over that at rest", high=2,
         reason="springs of shipped robots take forty times the deflection to become twice as stiff",
         finding="is already at {deflection} {size} times as stiff as at rest",
@@ -201,17 +201,17 @@ SPRING_RULES: tuple[Rule[Facts], ...] = (
         size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="springs in joints do not wind up so far",
         finding="is a deflection of more than half a turn (than the reach)",
-        slips=(DEGREES, MILLIMETRES), in_angles=True),
+        units=(DEGREES, MILLIMETRES), in_angles=True),
     Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
         size="over the lowest that the springs give at rest", low=1, high=500, usual=2,
         reason="below 1 nothing is within the limits, and springs do not become so much stiffer",
         finding="is {size} times the lowest that the springs give, {lower} {unit}",
-        slips=(*TOO_SOFT, *TOO_STIFF), advice="check the units of limits and springs"),
+        units=(*TOO_SOFT, *TOO_STIFF), advice="check the units of limits and springs"),
     Rule("ranges of dampers", "`damper.range`", _largest_dampings,
         size="over 2 sqrt(I sigma), with the inertia of the stretched arm and the least stiffness",
         low=1e-3, high=100, usual=0.7,
         reason="below a thousandth nothing is calmed, above a hundred the joint creeps",
         finding="gives the stretched arm on its springs a damping ratio of {size}",
-        slips=SLIPS_OF_DAMPING, explained_by=SIZES,
+        units=SLIPS_OF_DAMPING, explained_by=SIZES,
         advice="check the units of damping, stiffness and inertia"),
 )  # fmt: skip

@@ -79,7 +79,7 @@ def _link_lines(link: Link) -> Iterator[str]:
 
 
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
-    """Return the source of the numbers in a field of an actuator, with facts of the URDF on a motor."""
+    """Return the source of the numbers in a field of an actuator, with what the URDF says of a motor."""
     joint, load = conversion.chain.joints[index], conversion.loads[index]
     origin = conversion.placeholders.origin(field, joint, load)
     known = " and ".join(_known(joint.urdf))

@@ -35,8 +35,8 @@ from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP
 from vsacli.studies.identification.motor_equations import MotorSystem, group_of, motor_names
 from vsacli.studies.identification.recordings import MOTOR, POSITION, TORQUE, Record
 from vsacli.studies.measured.agreement import Agreement, straight_line
+from vsacli.studies.measured.likely_causes import exchanged, likely_causes
 from vsacli.studies.measured.pairing import exactness, tame
-from vsacli.studies.measured.slips import exchanged, slips
 
 ELSEWHERE = 0.5
 """Distance, over the size of the deflections, from which on they are on another branch."""
@@ -76,7 +76,7 @@ def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: S
     torques = [each for index in sprung for each in _torques(robot, index, record, signals)]
     if torques:
         agreements, ratios = zip(*torques, strict=True)
-        yield from slips(_followed(agreements), ratios)
+        yield from likely_causes(_followed(agreements), ratios)
     for index in sprung:
         yield from _positions(robot, index, record, signals)
         yield from _branch(robot, index, signals)

@@ -28,8 +28,8 @@ from vsacli.robot.model import Robot
 from vsacli.studies.measured.measured_columns import Measured, known_columns, preferred, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.faults import wraps
-from vsacli.trajectory.recorded.grain import Grain
 from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.quantization import Quantization
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import (
     GAP_STEPS,
@@ -235,8 +235,8 @@ def _doubtful_clauses(column: Column) -> Iterator[str]:
 
 def _cut(column: Column) -> Iterator[str]:
     """Noisy readings that come to an end at the same largest, or smallest, value again and again."""
-    grain = Grain.of(column.time, column.values)
-    if not np.median(grain.noise) > NOISY * np.ptp(column.values):
+    quantization = Quantization.of(column.time, column.values)
+    if not np.median(quantization.noise) > NOISY * np.ptp(column.values):
         return
     for end in (np.max, np.min):
         last = end(column.values)

@@ -17,6 +17,7 @@ from vsacli.documents.columns_file import load_columns
 from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
+from vsacli.studies.measured.likely_causes import NOTABLE, WILD, exchanged_places, likely_causes
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
     Measured,
@@ -27,7 +28,6 @@ from vsacli.studies.measured.measured_columns import (
     stand_ins,
 )
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, interpolated
-from vsacli.studies.measured.slips import NOTABLE, WILD, exchanged_places, slips
 
 POSITIONS = ("q", "theta")
 """Variables by which a recording is aligned if it has any: torques depend on the model, positions were
@@ -81,7 +81,7 @@ def compare(
     notes = (
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.begins_at),
-        *slips(signals, _gear_ratios(recorded, result)),
+        *likely_causes(signals, _gear_ratios(recorded, result)),
         *_left_out(recorded, behind),
     )
     return Comparison(

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.studies.measured.likely_causes import exchanged_places
 from vsacli.studies.measured.line_fit import LineFit, fit_line
 from vsacli.studies.measured.pairing import (
     FEWEST_SAMPLES,
@@ -27,7 +28,6 @@ from vsacli.studies.measured.pairing import (
     tame,
     unlikeness,
 )
-from vsacli.studies.measured.slips import exchanged_places
 
 MOST_POINTS = 200_000
 """Points of the grid on which the shift is looked for first; the computed signal is known between them."""

@@ -29,7 +29,7 @@ from vsacli.dynamics.limits import limit_checks, limit_flags, open_steps
 from vsacli.dynamics.uncertainty import deviations, probed_times
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.loads import Instants, Load, Passage, evenly_chosen, joined
+from vsacli.studies.search.loads import Instants, Load, TaskSamples, evenly_chosen, joined
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -97,37 +97,37 @@ class Acceptance:
             between = np.union1d(between, short)
         return found, False
 
-    def refused(self, passage: Passage) -> BoolArray:
+    def refused(self, part: TaskSamples) -> BoolArray:
         """Return the steps that are not accepted, (samples, joints)."""
-        block = compute_block(self.robot, passage.motion, self.near_singular)
+        block = compute_block(self.robot, part.motion, self.near_singular)
         values = map(block.of_joint, range(len(self.robot.joints)))
         by_joint = [
-            self._refused(joint, of_joint, passage.instants)
+            self._refused(joint, of_joint, part.instants)
             for joint, of_joint in zip(self.robot.joints, values, strict=True)
         ]
         refused = np.stack(by_joint, axis=1)
         refused[:, list(self.ignored)] = False
         return refused
 
-    def passages(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[Passage]:
+    def parts(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[TaskSamples]:
         """Yield the samples of a task, or of a slower one, in blocks; then the instants between samples."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
-            yield Passage.of(trajectory, start, start + samples, factor)
+            yield TaskSamples.of(trajectory, start, start + samples, factor)
         if self.between.size:
-            yield Passage.between(trajectory, self.between, factor)
+            yield TaskSamples.between(trajectory, self.between, factor)
 
-    def watched(self, trajectory: Trajectory, steps: int) -> Passage:
+    def watched(self, trajectory: Trajectory, steps: int) -> TaskSamples:
         """Return at most this many samples of a task, and the instants between samples that count."""
-        passages = [evenly_chosen(trajectory, steps)]
+        parts = [evenly_chosen(trajectory, steps)]
         if self.between.size:
-            passages.append(Passage.between(trajectory, self.between))
-        return joined(passages)
+            parts.append(TaskSamples.between(trajectory, self.between))
+        return joined(parts)
 
     def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
         """Return the joints with any step that is not accepted, (joints,)."""
         joints: BoolArray = np.any(
-            [np.any(self.refused(passage), axis=0) for passage in self.passages(trajectory, factor)], axis=0
+            [np.any(self.refused(part), axis=0) for part in self.parts(trajectory, factor)], axis=0
         )
         return joints
 
@@ -138,17 +138,17 @@ class Acceptance:
     def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
         """Return how each joint, by index, exceeds a limit of its position at any speed, if it does."""
         found: dict[int, Trouble] = {}
-        for passage in self.passages(trajectory):
+        for part in self.parts(trajectory):
             for index, joint in enumerate(self.robot.joints):
-                values = {"q": passage.motion.q[:, index]}
-                trouble = self._limit_trouble(joint, values, passage.motion.time, passage.instants)
+                values = {"q": part.motion.q[:, index]}
+                trouble = self._limit_trouble(joint, values, part.motion.time, part.instants)
                 if trouble is not None:
                     found.setdefault(index, trouble)
         return found
 
-    def reasons(self, passage: Passage) -> tuple[str, ...]:
+    def reasons(self, part: TaskSamples) -> tuple[str, ...]:
         """Return the worst trouble of each joint that is not accepted throughout."""
-        joints = enumerate(zip(self.robot.joints, passage.loads(self.robot), strict=True))
+        joints = enumerate(zip(self.robot.joints, part.loads(self.robot), strict=True))
         found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
         return tuple(reason for reason in found if reason)
 

@@ -20,7 +20,7 @@ from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
-from vsacli.studies.search.loads import Instants, Load, Passage, joined
+from vsacli.studies.search.loads import Instants, Load, TaskSamples, joined
 from vsacli.studies.search.path_commands import PathCommands, Speeds
 from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
 from vsacli.studies.search.task import Combination, Form, Task, constant_change, preload_path
@@ -83,20 +83,20 @@ class CombinedSearch:
             self._watch(joined([self._watched, refused]))
         return None
 
-    def _watch(self, passage: Passage) -> None:
+    def _watch(self, part: TaskSamples) -> None:
         """Let these samples judge from now on."""
-        self._watched, self._path = passage, PathCommands(self.task.acceptance.robot, passage.motion)
+        self._watched, self._path = part, PathCommands(self.task.acceptance.robot, part.motion)
         self._found: dict[int, Combination] = {}
 
-    def _refused(self, found: Combination) -> Passage | None:
+    def _refused(self, found: Combination) -> TaskSamples | None:
         """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
         acceptance = self.task.acceptance_with(found)
         change = np.zeros(self.task.trajectory.joints)
         change[list(found.constants)] = list(found.constants.values())
-        for passage in acceptance.passages(self.task.trajectory.stretched(found.factor), found.factor):
-            steps = np.flatnonzero(np.any(acceptance.refused(passage.stiffened(change)), axis=1))
+        for part in acceptance.parts(self.task.trajectory.stretched(found.factor), found.factor):
+            steps = np.flatnonzero(np.any(acceptance.refused(part.stiffened(change)), axis=1))
             if steps.size:
-                return passage.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
+                return part.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
         return None
 
     def _fastest(self) -> Combination | None:
@@ -149,7 +149,7 @@ class CombinedSearch:
             return None
         if number not in self._found:
             try:
-                self._found[number] = self._mended(self._factors.factor(number))
+                self._found[number] = self._fixed(self._factors.factor(number))
             except ImpossibleError:
                 self._impossible.add(number)
                 return None
@@ -171,11 +171,11 @@ class CombinedSearch:
                 break
         return found
 
-    def _refusing(self, passage: Passage) -> BoolArray:
+    def _refusing(self, part: TaskSamples) -> BoolArray:
         """Return the steps at which no stiffness of some joint is accepted, (samples,)."""
         acceptance = self.task.acceptance
-        impossible = np.zeros(len(passage.factor), dtype=np.bool_)
-        loads = passage.loads(acceptance.robot)
+        impossible = np.zeros(len(part.factor), dtype=np.bool_)
+        loads = part.loads(acceptance.robot)
         for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
             joint = choices[""]
             if index in acceptance.ignored:
@@ -189,7 +189,7 @@ class CombinedSearch:
                 impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
         return impossible
 
-    def _mended(self, factor: float) -> Combination:
+    def _fixed(self, factor: float) -> Combination:
         """Return the changes of all joints at a factor.
 
         Raises:
@@ -252,7 +252,7 @@ class CombinedSearch:
         return math.ceil(number * share)
 
 
-def _choices(robot: Robot, watched: Passage | None) -> list[dict[str, Joint]]:
+def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
     """Return the variants of each joint by the word for its preload, "" if unchanged.
 
     Args:

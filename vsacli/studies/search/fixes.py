@@ -231,7 +231,7 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
     acceptance = task.acceptance
     refused = np.flatnonzero(acceptance.refused_joints(task.trajectory)).tolist()
     steps = acceptance.watched(task.trajectory, WATCHED_STEPS)
-    moving, resting = (passage.loads(acceptance.robot) for passage in (steps, steps.slowed(math.inf)))
+    moving, resting = (part.loads(acceptance.robot) for part in (steps, steps.slowed(math.inf)))
     beyond = acceptance.beyond_position(task.trajectory)
     for index in refused:
         joint = acceptance.robot.joints[index]
@@ -304,7 +304,6 @@ def _what(trouble: Trouble, *, resting: bool = False) -> str:
 
 
 def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
-    """Return the stiffness that helps at rest."""
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
     if asked.min() == asked.max():
         relation = "at least" if offset > 0 else "at most"

@@ -36,7 +36,7 @@ class Instants(NamedTuple):
         return Instants(self.time[steps], self.factor[steps])
 
 
-class Passage(NamedTuple):
+class TaskSamples(NamedTuple):
     """Some steps of a task, as they are or changed.
 
     Attributes:
@@ -48,7 +48,7 @@ class Passage(NamedTuple):
     factor: FloatArray
 
     @classmethod
-    def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> Passage:
+    def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> TaskSamples:
         """Return the steps start..stop-1 of a task, or of one that was stretched by a factor."""
         motion = trajectory.block(start, stop)
         if factor != 1:
@@ -56,7 +56,7 @@ class Passage(NamedTuple):
         return cls(motion, np.full(len(motion.time), factor))
 
     @classmethod
-    def between(cls, trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Passage:
+    def between(cls, trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> TaskSamples:
         """Instants between the steps of a task, or of one that was stretched by a factor.
 
         Args:
@@ -73,13 +73,13 @@ class Passage(NamedTuple):
         """Times of the samples in the task."""
         return Instants(self.motion.time, self.factor)
 
-    def slowed(self, factor: float) -> Passage:
+    def slowed(self, factor: float) -> TaskSamples:
         """Return the same passed more slowly, at rest if the factor is infinite."""
         slower = self.motion.mapped(self.motion.time, lambda array, order: array / factor**order)
-        return Passage(slower, self.factor * factor)
+        return TaskSamples(slower, self.factor * factor)
 
-    def stiffened(self, change: FloatArray) -> Passage:
-        """Return the passage with an addition to the stiffness of each joint, (joints,) N m/rad (N/m)."""
+    def stiffened(self, change: FloatArray) -> TaskSamples:
+        """Return the part with an addition to the stiffness of each joint, (joints,) N m/rad (N/m)."""
         motion, arrays = self.motion, self.motion.of_joints
         arrays[STIFFNESS.key] = arrays[STIFFNESS.key] + change
         return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
@@ -91,36 +91,36 @@ class Passage(NamedTuple):
         commands = (command_of(index, commanded) for index in range(len(robot.joints)))
         return [Load(motion.time, command, self.instants) for command in commands]
 
-    def select(self, steps: IndexArray) -> Passage:
+    def select(self, steps: IndexArray) -> TaskSamples:
         """Return some of the steps, by index."""
         motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
-        return Passage(motion, self.factor[steps])
+        return TaskSamples(motion, self.factor[steps])
 
 
 def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Motion:
-    """Return the motion at instants, as of `Passage.between`, with the times of the trajectory."""
+    """Return the motion at instants, as of `TaskSamples.between`, with the times of the trajectory."""
     return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
 
 
-def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
+def evenly_chosen(trajectory: Trajectory, steps: int) -> TaskSamples:
     """Return at most this many samples of a trajectory, both ends included."""
     chosen = evenly(trajectory.samples, steps)
     samples = usual_block(trajectory.joints)
     return joined(
-        Passage.of(trajectory, start, start + samples).select(inside - start)
+        TaskSamples.of(trajectory, start, start + samples).select(inside - start)
         for start in range(0, trajectory.samples, samples)
         if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
     )
 
 
-def joined(passages: Iterable[Passage]) -> Passage:
-    """Return the steps of several passages, one after the other."""
-    motions, factors = zip(*passages, strict=True)
+def joined(parts: Iterable[TaskSamples]) -> TaskSamples:
+    """Return the steps of several parts, one after the other."""
+    motions, factors = zip(*parts, strict=True)
     variables = [motion.variables() for motion in motions]
     arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
     last = motions[-1].wrench
     wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
-    return Passage(Motion.of(arrays["time"], arrays, wrench), np.concatenate(factors))
+    return TaskSamples(Motion.of(arrays["time"], arrays, wrench), np.concatenate(factors))
 
 
 @dataclass(frozen=True, eq=False)

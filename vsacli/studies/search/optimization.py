@@ -352,7 +352,6 @@ def _joints(
 
 
 def _together(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> TotalCost:
-    """Return the costs of all joints together."""
     if not criterion.relative:
         before, after = (
             criterion.together([getattr(each, when) for each in joints.values()])

@@ -18,7 +18,7 @@ from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, stiffness_text
 from vsacli.studies.search.changed_motion import rate_of, with_stiffness
 from vsacli.studies.search.fixed_text import changes_of_steps
-from vsacli.studies.search.loads import Load, Passage, joined
+from vsacli.studies.search.loads import Load, TaskSamples, joined
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.steps import Chain, stepwise
 from vsacli.trajectory.trajectory import Trajectory
@@ -153,7 +153,7 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
 
 
-def _scan_start(acceptance: Acceptance, few: Passage, factors: Factors) -> int | None:
+def _scan_start(acceptance: Acceptance, few: TaskSamples, factors: Factors) -> int | None:
     """Return a number up to which the scan would find one of a few steps refused; None if it always would.
 
     It tries many factors at once, which costs hardly more than one of them.
@@ -173,7 +173,7 @@ def _scan_start(acceptance: Acceptance, few: Passage, factors: Factors) -> int |
 class SlowDownCandidates:
     """Stretching by the factors of a task, judged at watched steps; see `Candidates`."""
 
-    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Passage) -> None:
+    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: TaskSamples) -> None:
         self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
         self._factors = Factors.of(trajectory)
 
@@ -191,10 +191,10 @@ class SlowDownCandidates:
         Those of the first block with others are watched from now on.
         """
         factor = self._factors.factor(number)
-        for passage in self._acceptance.passages(self._trajectory.stretched(factor), factor):
-            steps = np.flatnonzero(np.any(self._acceptance.refused(passage), axis=1))
+        for part in self._acceptance.parts(self._trajectory.stretched(factor), factor):
+            steps = np.flatnonzero(np.any(self._acceptance.refused(part), axis=1))
             if steps.size:
-                further = passage.select(steps[evenly(len(steps), WATCHED_STEPS)])
+                further = part.select(steps[evenly(len(steps), WATCHED_STEPS)])
                 self._watched = joined([self._watched, further.slowed(1 / factor)])
                 return False
         return True
@@ -446,5 +446,5 @@ class _Transitions:
         return not refused.size
 
     def _refused(self, number: int, elapsed: FloatArray) -> FloatArray:
-        passage = Passage.between(self.trajectory(number), elapsed)
-        return elapsed[np.any(self._acceptance.refused(passage), axis=1)]
+        part = TaskSamples.between(self.trajectory(number), elapsed)
+        return elapsed[np.any(self._acceptance.refused(part), axis=1)]

@@ -25,7 +25,7 @@ from vsacli.studies.search.changed_motion import (
     with_kept_rate,
     with_raised_stiffness,
 )
-from vsacli.studies.search.loads import Load, Passage, joint_loads
+from vsacli.studies.search.loads import Load, TaskSamples, joint_loads
 from vsacli.studies.search.nearest_profile import Change, nearest_change
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
@@ -329,7 +329,7 @@ class Task:
         parts = max(1, min(FINER, MOST_INSTANTS // len(steps)))
         elapsed = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()
         refused = [
-            part[acceptance.refused(Passage.between(trajectory, part, factor)).any(axis=1)]
+            part[acceptance.refused(TaskSamples.between(trajectory, part, factor)).any(axis=1)]
             for part in np.array_split(elapsed, 1 + len(elapsed) // usual_block(trajectory.joints))
         ]
         found = np.concatenate(refused)

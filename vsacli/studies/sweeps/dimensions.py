@@ -273,7 +273,6 @@ class Entries:
 
 @contextmanager
 def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
-    """Note the problem of an entry."""
     try:
         yield
     except InputError as error:

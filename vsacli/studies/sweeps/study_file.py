@@ -135,7 +135,6 @@ def _way(node: Node) -> Way:
 
 
 def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
-    """Return the variation of a mapping."""
     key = next(iter(entries))
     if LINKED in entries:
         texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}

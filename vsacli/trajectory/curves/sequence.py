@@ -275,7 +275,6 @@ class Sequence(Formula):
         return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
 
     def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
-        """Yield each part with its profile."""
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
         here = next(part.begins for part in self.parts if part.begins is not None)
         for part, piece in zip(self.parts, pairwise(ends), strict=True):

@@ -133,7 +133,7 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
 
 
 def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
-    """Return the facts on a fit, as JSON values.
+    """Return the properties of a fit, as JSON values.
 
     Args:
         value: name of the signal.

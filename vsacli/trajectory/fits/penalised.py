@@ -51,7 +51,6 @@ class Model:
 
     @property
     def _segment(self) -> IndexArray:
-        """Index of the segment of each penalty."""
         return segment_of(len(self.penalties), self.segments)
 
     @property

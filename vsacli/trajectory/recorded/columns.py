@@ -19,12 +19,12 @@ from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
 
-Way = dict[str, dict[int, str]]
+Naming = dict[str, dict[int, str]]
 """Names of the columns of each quantity, by index of the joint (wrench axis)."""
 
 _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
-_WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
+_WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
 RATE_INSTEAD = "rows at equal steps need their rate instead: rate in a trajectory or columns file"
 
@@ -69,13 +69,13 @@ def known_columns(joints: CommandedJoints) -> set[str]:
     return _known(_of_every_joint(joints))
 
 
-def _of_every_joint(joints: CommandedJoints) -> list[Way]:
-    """Both ways to name columns, as if each joint took every signal."""
+def _of_every_joint(joints: CommandedJoints) -> list[Naming]:
+    """Return both ways to name columns, as if each joint took every signal."""
     return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
 
 
-def _known(ways: Sequence[Way]) -> set[str]:
-    return {TIME, *_all(_WRENCH_WAY), *(column for way in ways for column in _all(way))}
+def _known(namings: Sequence[Naming]) -> set[str]:
+    return {TIME, *_all(_WRENCH_NAMING), *(column for naming in namings for column in _all(naming))}
 
 
 def column_layout(
@@ -87,7 +87,7 @@ def column_layout(
 ) -> ColumnLayout:
     """Return the places of the quantities in a table.
 
-    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
+    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one naming
     throughout. Those of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
 
     Args:
@@ -104,10 +104,10 @@ def column_layout(
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
     of_every_joint = _of_every_joint(joints)
-    ways = [_columns(pattern, joints) for pattern in _PATTERNS]
-    used = [way for way in ways if any(column in names for column in _all(way))]
-    way = used[0] if used else ways[0]
-    expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
+    namings = [_columns(pattern, joints) for pattern in _PATTERNS]
+    used = [naming for naming in namings if any(column in names for column in _all(naming))]
+    naming = used[0] if used else namings[0]
+    expected = [TIME, *_all(naming), *(_all(_WRENCH_NAMING) if WRENCH in wanted else ())]
 
     known = _known(of_every_joint)
     if _is_foreign(names, known):
@@ -116,28 +116,37 @@ def column_layout(
         raise InputError.one(message, file, line)
     problems = list(_strangers(names, expected, known, file))
     problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
-    way = way | _WRENCH_WAY
-    if len(used) == len(ways):
-        examples = " and ".join(repr(next(column for column in names if column in _all(way))) for way in ways)
+    naming = naming | _WRENCH_NAMING
+    if len(used) == len(namings):
+        examples = " and ".join(
+            repr(next(column for column in names if column in _all(naming))) for naming in namings
+        )
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
     else:
-        problems += _gaps(names, way, {signal.names[0] for signal in wanted})
+        problems += _gaps(names, naming, {signal.names[0] for signal in wanted})
     units = [unit for _, unit in headings]
-    columns = dict(_measured(names, units, way, joints, problems))
+    columns = dict(_measured(names, units, naming, joints, problems))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
-    return _layout(names, columns, way, _of_signals(of_every_joint))
+    of_signals = {
+        key: {column for each in of_every_joint for name in signal.names for column in each[name].values()}
+        for key, signal in COMMANDED.items()
+    }
+    return _layout(names, columns, naming, of_signals)
 
 
 def _layout(
-    names: Sequence[str], columns: Mapping[str, Column], way: Way, of_signals: Mapping[str, Collection[str]]
+    names: Sequence[str],
+    columns: Mapping[str, Column],
+    naming: Naming,
+    of_signals: Mapping[str, Collection[str]],
 ) -> ColumnLayout:
     """Return the places of quantities, once all columns of the joints that take a signal are found."""
     return ColumnLayout(
         time=columns[TIME],
         quantities={
             name: {index: columns[column] for index, column in of_joints.items()}
-            for name, of_joints in way.items()
+            for name, of_joints in naming.items()
             if all(column in columns for column in of_joints.values())
         },
         unused={
@@ -147,7 +156,7 @@ def _layout(
     )
 
 
-def _columns(pattern: str, joints: CommandedJoints) -> Way:
+def _columns(pattern: str, joints: CommandedJoints) -> Naming:
     """Return the columns of the joints, those of each signal for the joints that take it."""
     return {
         name: {
@@ -159,16 +168,8 @@ def _columns(pattern: str, joints: CommandedJoints) -> Way:
     }
 
 
-def _of_signals(ways: Sequence[Way]) -> dict[str, set[str]]:
-    """Return all columns of each commanded signal, by its key."""
-    return {
-        key: {column for way in ways for name in signal.names for column in way[name].values()}
-        for key, signal in COMMANDED.items()
-    }
-
-
-def _all(way: Way) -> list[str]:
-    return [column for columns in way.values() for column in columns.values()]
+def _all(naming: Naming) -> list[str]:
+    return [column for columns in naming.values() for column in columns.values()]
 
 
 def _strangers(
@@ -209,10 +210,10 @@ def _remedy(file: str) -> str:
     )
 
 
-def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:
+def _gaps(header: Sequence[str], naming: Naming, needed: Collection[str]) -> Iterator[str]:
     if TIME not in header:
         yield f"there is no column {TIME!r}; {RATE_INSTEAD}"
-    for name, columns in way.items():
+    for name, columns in naming.items():
         absent = [column for column in columns.values() if column not in header]
         if not absent:
             continue
@@ -229,14 +230,14 @@ def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[
 def _measured(
     names: Sequence[str],
     units: Sequence[str | None],
-    way: Way,
+    naming: Naming,
     joints: CommandedJoints,
     problems: list[str],
 ) -> Iterator[tuple[str, Column]]:
     """Yield the columns that are used, by name; notes units that cannot be converted."""
     types = tuple(joints.types.values())
     expected = {TIME: VARIABLES[TIME].quantity.unit("")}
-    for quantity, columns in way.items():
+    for quantity, columns in naming.items():
         for index, column in columns.items():
             expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, types)
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):

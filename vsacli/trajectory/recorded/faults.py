@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.trajectory.recorded.grain import ORDER, Grain
+from vsacli.trajectory.recorded.quantization import ORDER, Quantization
 from vsacli.trajectory.recorded.thresholds import (
     ABRUPT_SHARE,
     END_SAMPLES,
@@ -69,14 +69,14 @@ class Faults:
         return int(np.argmax(self.sizes))
 
 
-def outliers(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Samples, or up to three together, that a smooth curve through their neighbours misses by far."""
-    size = np.abs(grain.differences)
+    size = np.abs(quantization.differences)
     centres = np.arange(len(size)) + ORDER // 2
-    off = size > _noticeable(grain, centres)
+    off = size > _noticeable(quantization, centres)
     events = _events(centres[off], size[off])
-    isolated = [_isolated(time, values, event, grain) for event in events]
-    found = dict(_at_ends(values, grain))
+    isolated = [_isolated(time, values, event, quantization) for event in events]
+    found = dict(_at_ends(values, quantization))
     for event, samples in zip(events, isolated, strict=True):
         alike = [there for other, there in zip(events, isolated, strict=True) if 3 * other.size >= event.size]
         if len(list(filter(None, alike))) >= LEAST_SHARE * len(alike):
@@ -107,25 +107,27 @@ def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
     return list(map(_Event, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
 
 
-def _at_ends(values: FloatArray, grain: Grain) -> Iterator[tuple[int, float]]:
+def _at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
     """Yield the first and the last sample if the next ones predict it far worse than they do each other."""
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
         near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
         error, *others = np.abs(near @ END_WEIGHTS)
-        least = float(_noticeable(grain, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
+        least = float(_noticeable(quantization, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
         if error > max(END_SHARE * max(others), least):
             yield end, float(error)
 
 
-def _isolated(time: FloatArray, values: FloatArray, event: _Event, grain: Grain) -> list[tuple[int, float]]:
+def _isolated(
+    time: FloatArray, values: FloatArray, event: _Event, quantization: Quantization
+) -> list[tuple[int, float]]:
     """Return outliers: samples off the polynomial through all others near them, with their distances."""
     if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
     near, kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
-    least = float(_noticeable(grain, np.array([event.first]))[0])
+    least = float(_noticeable(quantization, np.array([event.first]))[0])
     place = time[first : last + 1] - time[first]
     powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
     found: list[tuple[int, float]] = []
@@ -149,7 +151,7 @@ def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[Fl
     return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
 
 
-def held(values: FloatArray, grain: Grain) -> int:
+def held(values: FloatArray, quantization: Quantization) -> int:
     """Return the number of rows that repeat each value; 1 if it is not always the same."""
     changes = np.flatnonzero(values[1:] != values[:-1])
     rows = np.diff(changes)
@@ -158,23 +160,23 @@ def held(values: FloatArray, grain: Grain) -> int:
     usual = int(np.median(rows))
     alike = np.count_nonzero(rows == usual) >= HELD_SHARE * len(rows)
     jump = float(np.median(np.abs(values[changes + 1] - values[changes])))
-    return usual if alike and usual <= HELD_ROWS and jump >= QUANTA * grain.quantum else 1
+    return usual if alike and usual <= HELD_ROWS and jump >= QUANTA * quantization.quantum else 1
 
 
-def frozen(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+def frozen(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Stretches of equal samples in a motion that goes on meanwhile, as a jump or an abrupt stop shows."""
     first, last = _equal_runs(values, FROZEN_STEPS)
     ends = (first == 0) | (last == len(values) - 1)
     inner = (first >= SPEED_SAMPLES) & (last + 1 + SPEED_SAMPLES < len(values))
     stuck = np.zeros(len(first), dtype=bool)
-    stuck[inner] = _catches_up(time, values, grain, first[inner], last[inner])
+    stuck[inner] = _catches_up(time, values, quantization, first[inner], last[inner])
     for run in np.flatnonzero(ends & (last - first >= FROZEN_AT_END_STEPS)).tolist():
-        stuck[run] = _stops_abruptly(values, grain, int(first[run]), int(last[run]))
+        stuck[run] = _stops_abruptly(values, quantization, int(first[run]), int(last[run]))
     return _stretches(time, first[stuck], last[stuck])
 
 
 def _catches_up(
-    time: FloatArray, values: FloatArray, grain: Grain, first: IndexArray, last: IndexArray
+    time: FloatArray, values: FloatArray, quantization: Quantization, first: IndexArray, last: IndexArray
 ) -> BoolArray:
     """Return whether after each run the signal jumps to where the speeds before and after it lead."""
     after = last + 1
@@ -185,32 +187,34 @@ def _catches_up(
     share = np.divide(jump, expected, out=np.zeros_like(jump), where=expected != 0)
     low, high = JUMP_SHARE
     onward = before_speed * after_speed > 0
-    return np.asarray(onward & (np.abs(jump) >= _noticeable(grain, first)) & (low <= share) & (share <= high))
+    return np.asarray(
+        onward & (np.abs(jump) >= _noticeable(quantization, first)) & (low <= share) & (share <= high)
+    )
 
 
 def _speed(time: FloatArray, values: FloatArray, start: IndexArray, stop: IndexArray) -> FloatArray:
     return np.asarray((values[stop] - values[start]) / (time[stop] - time[start]))
 
 
-def _stops_abruptly(values: FloatArray, grain: Grain, first: int, last: int) -> bool:
+def _stops_abruptly(values: FloatArray, quantization: Quantization, first: int, last: int) -> bool:
     """Return whether a run at an end of the record begins, or ends, at full speed."""
     reach = SPEED_SAMPLES + 1
     near = values[max(0, first - reach) : first + 1] if first else values[last : last + reach + 1][::-1]
     steps = np.diff(near)
     if len(steps) < reach:
         return False
-    noticeable = float(_noticeable(grain, np.array([first if first else last]))[0])
+    noticeable = float(_noticeable(quantization, np.array([first if first else last]))[0])
     least = max(noticeable, ABRUPT_SHARE * float(np.abs(steps).mean()))
     return bool((np.all(steps > 0) or np.all(steps < 0)) and abs(steps[-1]) >= least)
 
 
-def saturated(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+def saturated(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Stretches at the largest or smallest value that are cut out of a motion which goes on beyond it."""
     first, last = _equal_runs(values, SATURATED_STEPS)
     extreme = (values[first] == values.max()) | (values[first] == values.min())
     inner = extreme & (first >= 3) & (last + 3 < len(values))
     first, last = first[inner], last[inner]
-    least = _noticeable(grain, first)
+    least = _noticeable(quantization, first)
     beyond = [_overshoot(values, first, -1) >= least, _overshoot(values, last, 1) >= least]
     cut = beyond[0] & beyond[1]
     return _stretches(time, first[cut], last[cut])
@@ -241,9 +245,9 @@ def wraps(values: FloatArray) -> Faults | None:
     return Faults(samples, samples, steps[lone]) if samples.size else None
 
 
-def _noticeable(grain: Grain, samples: IndexArray) -> FloatArray:
+def _noticeable(quantization: Quantization, samples: IndexArray) -> FloatArray:
     """Return the smallest change above noise and steps of the numbers near samples."""
-    return np.maximum(NOISE_DEVIATIONS * grain.noise_at(samples), QUANTA * grain.quantum)
+    return np.maximum(NOISE_DEVIATIONS * quantization.noise_at(samples), QUANTA * quantization.quantum)
 
 
 def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:

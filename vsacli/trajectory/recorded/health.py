@@ -13,8 +13,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.trajectory.recorded.faults import Faults, frozen, held, outliers, saturated, wraps
-from vsacli.trajectory.recorded.grain import ORDER, Grain
 from vsacli.trajectory.recorded.problems import SampleProblem
+from vsacli.trajectory.recorded.quantization import ORDER, Quantization
 from vsacli.trajectory.recorded.samples import Samples
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
@@ -72,27 +72,27 @@ def column_faults(
     """
     if np.ptp(values) == 0:
         return
-    grain = Grain.of(time, values)
-    if (rows := held(values, grain)) > 1:
+    quantization = Quantization.of(time, values)
+    if (rows := held(values, quantization)) > 1:
         yield (
             0,
             f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}",
         )
         return
-    if off := outliers(time, values, grain):
+    if off := outliers(time, values, quantization):
         extent = _extent(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
         yield (
             off.at,
             f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
             f" derivatives follow such outliers; delete {'the row' if off.count == 1 else 'these rows'}",
         )
-    if stuck := frozen(time, values, grain):
+    if stuck := frozen(time, values, quantization):
         yield (
             stuck.at,
             f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, while the motion goes on:"
             " these samples were lost; delete the rows, or record again",
         )
-    if cut := saturated(time, values, grain):
+    if cut := saturated(time, values, quantization):
         at = f"{values[cut.first[0]]:.4g}{unit}"
         yield (
             cut.at,

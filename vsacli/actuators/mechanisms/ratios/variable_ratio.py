@@ -151,7 +151,6 @@ class VariableRatio(Mechanism):
         return found - ratio, 1 - found * slope, bent
 
     def _end(self, tau_e: FloatArray, scale: float) -> _End:
-        """Return the end of the branch at a scale."""
         below, above = self._limits
         torque = tau_e / scale
         under, over = torque < below.torque, torque > above.torque

@@ -21,7 +21,7 @@ class Switch:
     terminal = True
     direction = -1.0
 
-    def __init__(self, sliding: Sliding, motor: int) -> None:
+    def __init__(self, sliding: StickSlip, motor: int) -> None:
         self._sliding, self._motor = sliding, motor
 
     def __call__(self, time: float, vector: FloatArray) -> float:
@@ -33,7 +33,7 @@ class Switch:
         return self._sliding.switched(time, vector, self._motor)
 
 
-class Sliding:
+class StickSlip:
     """Keeps `slip` of a closed loop: from one switch to the next its equations of motion are smooth.
 
     A motor slides one way until its velocity is zero. There it is held until that takes more than its
@@ -125,7 +125,7 @@ class Sliding:
         return friction
 
 
-def sliding(loop: ClosedLoop) -> Sliding | None:
+def sliding(loop: ClosedLoop) -> StickSlip | None:
     """Return the friction of a robot with sharp laws; None if it has none."""
     laws = loop.plant.drivetrain.friction
-    return None if laws is None or not laws.sharp.any() else Sliding(loop, laws)
+    return None if laws is None or not laws.sharp.any() else StickSlip(loop, laws)

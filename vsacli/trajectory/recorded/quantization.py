@@ -28,7 +28,7 @@ CHUNK = 1024 * BLOCK
 
 
 @dataclass(frozen=True, eq=False)
-class Grain:
+class Quantization:
     """The meaningless changes of a column.
 
     Attributes:
@@ -44,7 +44,7 @@ class Grain:
     noise: FloatArray
 
     @classmethod
-    def of(cls, time: FloatArray, values: FloatArray) -> Grain:
+    def of(cls, time: FloatArray, values: FloatArray) -> Quantization:
         """Return the resolution of a column with more than four samples, (samples,)."""
         differences = _differences(time, values)
         whole = len(differences) // BLOCK * BLOCK

@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from vsacli import inverse_dynamics
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin
-from vsacli.analysis.between import SAMPLES_ONLY, SCANNED
+from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
 from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
@@ -182,7 +182,7 @@ def test_what_is_found_does_not_depend_on_the_blocks(
     block_samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of a run that is looked at around its steps, as if it were a long one."""
-    monkeypatch.setattr("vsacli.analysis.between.SCANNED", 0)
+    monkeypatch.setattr("vsacli.analysis.between_samples.SCANNED", 0)
     robot, trajectory = three_joints(rate=21.0)
     whole = inverse_dynamics(robot, trajectory)
     run = Run(robot, trajectory, block_samples=block_samples)

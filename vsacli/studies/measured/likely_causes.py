@@ -96,7 +96,7 @@ ALIKE = 0.98
 """Coefficient of correlation from which on the gain says something about units and signs."""
 
 NEAR = 0.05
-"""Relative distance at which a gain is taken for one that a slip makes."""
+"""Relative distance at which a gain is taken for that of a likely cause."""
 
 SURE = 5.0
 """Standard errors from which on a gain or an offset is named; of a million right columns one has that."""
@@ -108,7 +108,7 @@ WILD = 20.0
 """Largest error, in root mean squares of the others, from which on samples that were left out are named."""
 
 
-def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
+def likely_causes(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
     """Yield sentences on the likely slips of signals that do not agree, each naming its column.
 
     Args:
@@ -117,7 +117,7 @@ def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterato
     """
     for signal, ratio in zip(signals, gear_ratios, strict=True):
         if signal.follows is None:
-            yield from _slip_of(signal, ratio)
+            yield from _cause_of(signal, ratio)
     for variable in dict.fromkeys(signal.variable for signal in signals if signal.follows):
         moved = [signal for signal in signals if signal.variable == variable and signal.follows]
         pairs = ", ".join(f"{signal.column} is like {signal.follows} computed" for signal in moved)
@@ -129,7 +129,7 @@ def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterato
         yield f"{', '.join(still)} {verb} still as computed, {known}"
 
 
-def _gains_of_slips(gear_ratio: float) -> Mapping[str, float]:
+def _gains_of_causes(gear_ratio: float) -> Mapping[str, float]:
     """Return words for gains that slips of units, signs or sides of a gear make.
 
     Args:
@@ -148,8 +148,8 @@ def _gains_of_slips(gear_ratio: float) -> Mapping[str, float]:
     return slips
 
 
-def _slip_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
-    """Yield the likely slip of a signal that does not agree."""
+def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
+    """Yield the likely cause of a signal that does not agree."""
     if not agreement.samples:
         yield f"{agreement.column} has no computed value: its joint is infeasible or singular throughout"
         return
@@ -166,7 +166,7 @@ def _slip_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
         return
     gain, size = agreement.gain, abs(agreement.gain)
     looks = next(
-        (slip for slip, slipped in _gains_of_slips(gear_ratio).items() if abs(size / slipped - 1) < NEAR),
+        (cause for cause, gain in _gains_of_causes(gear_ratio).items() if abs(size / gain - 1) < NEAR),
         None,
     )
     if gain < 0:

@@ -24,8 +24,8 @@ SPHERE = 0.4
 
 
 @dataclass(frozen=True)
-class Facts:
-    """The facts on a robot that rules use.
+class CheckedRobot:
+    """A robot as the rules of plausibility see it.
 
     Attributes:
         joints: from the base to the tip.

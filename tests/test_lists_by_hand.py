@@ -1,0 +1,61 @@
+"""Lists that are kept by hand: an entry that is missing in one of them fails here."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import re
+
+import pytest
+from samples.command_line import REPOSITORY
+
+from vsacli import laws, load_robot
+from vsacli.actuators.motor import Motor
+from vsacli.dynamics import limits
+from vsacli.results.store.reader import RANGES, SIZES
+from vsacli.studies.search import fixed_text
+from vsacli.studies.sizing.sizing import KEPT
+from vsacli.trajectory.curves.closed_form import ClosedForm
+from vsacli.trajectory.curves.sequence import PARTS
+from vsacli.trajectory.curves.types import TYPES
+
+OF_PLACE = {"inertia", "gear_ratio", "damping", "friction"}
+"""Fields of a motor in a robot file that `size` writes from the place and the gear, or in another form."""
+
+NO_PARTS = {"sequence", "constant", "csv"}
+"""Types of positions that a sequence does not contain: itself, what `dwell` does, and recordings."""
+
+
+def test_figures_draw_every_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All limits of a joint with a damper, finite or not."""
+    monkeypatch.setattr(limits.math, "isfinite", lambda _: True)
+    robot = load_robot(REPOSITORY / "robots" / "maccepa_vd_1r.yaml")
+    checked = {check.variable for joint in robot.joints for check in limits.limit_checks(joint)}
+    assert checked == RANGES.keys() | SIZES.keys()
+
+
+def test_a_chosen_motor_keeps_every_field_of_motors() -> None:
+    assert {field.name for field in dataclasses.fields(Motor)} == {*KEPT, *OF_PLACE}
+
+
+def test_a_sequence_contains_every_type_of_position() -> None:
+    of_positions = {name for name, (_, uses) in TYPES.items() if "position" in uses}
+    assert PARTS.keys() == of_positions - NO_PARTS | {"dwell"}
+
+
+def test_fixed_files_have_a_formula_for_every_curve() -> None:
+    for name in ("polynomial", "via_points", "sinusoids", "steps", "sequence"):
+        importlib.import_module(f"vsacli.trajectory.curves.{name}")
+    known = set(re.findall(r"case (\w+)\(", inspect.getsource(fixed_text.formula)))
+    assert known == {each.__name__ for each in subclasses(ClosedForm) if not inspect.isabstract(each)}
+
+
+def subclasses(cls: type) -> set[type]:
+    """All classes of the package that derive from a class."""
+    own = {each for each in cls.__subclasses__() if each.__module__.startswith("vsacli.")}
+    return own.union(*map(subclasses, own))
+
+
+def test_every_law_is_offered() -> None:
+    assert {name.title().replace("_", "") for name in laws.LAWS} <= set(laws.__all__)
