@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.consistent_links import Told, consistent_links
+from vsacli.studies.identification.consistent_links import LinkEstimate, consistent_links
 from vsacli.studies.identification.regressor import all_parameters, base_parameters
 
 
@@ -23,11 +23,11 @@ def relinked(robot: Robot, links: list[Link]) -> Robot:
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
-def told(robot: Robot, of: Robot, share: float = 1e-3) -> Told:
+def told(robot: Robot, of: Robot, share: float = 1e-3) -> LinkEstimate:
     """The base parameters of another robot of the same chain, each known to a share."""
     base = base_parameters(robot)
     values = base.of(all_parameters(of))
-    return Told(base.shares, values, np.diag((share * np.abs(values) + 1e-6) ** 2))
+    return LinkEstimate(base.shares, values, np.diag((share * np.abs(values) + 1e-6) ** 2))
 
 
 def is_body(link: Link) -> bool:
@@ -59,7 +59,7 @@ def test_links_that_have_it_already_stay() -> None:
 
 def test_where_nothing_was_found_links_stay() -> None:
     robot = shipped_robot("puma_560")  # of whose links some are no bodies
-    bodies = consistent_links(robot, Told(np.zeros((0, 60)), np.zeros(0), np.zeros((0, 0))))
+    bodies = consistent_links(robot, LinkEstimate(np.zeros((0, 60)), np.zeros(0), np.zeros((0, 0))))
     assert bodies.within
     assert not bodies.links
 
@@ -101,11 +101,11 @@ def test_they_are_the_nearest_ones() -> None:
     assert nearest == pytest.approx(first + search.x @ unseen, abs=1e-3)
 
 
-def pendulum(inertia: float, error: float) -> tuple[Robot, Told]:
+def pendulum(inertia: float, error: float) -> tuple[Robot, LinkEstimate]:
     """One joint of whose link an inertia about the axis was found, and nothing else."""
     robot = shipped_robot("maccepa_1r")
     (shares,) = base_parameters(robot).shares
-    return robot, Told(shares[None], np.array([inertia]), np.array([[error**2]]))
+    return robot, LinkEstimate(shares[None], np.array([inertia]), np.array([[error**2]]))
 
 
 def test_an_inertia_below_zero_within_its_error_leaves_bodies() -> None:

@@ -51,7 +51,7 @@ def test_false_alarms_are_rare(tmp_path: Path) -> None:
     """Of 60 records one may be named by accident: 15 causes with a chance of 1e-4 each make 0.1 in 60."""
     records = [found(seed, None, tmp_path) for seed in range(FIRST, FIRST + 60)]
     assert sum(bool(structure(each)) for each in records) <= 1
-    numbers = [number for each in records for number in each.numbers if number.told]
+    numbers = [number for each in records for number in each.numbers if number.identifiable]
     assert np.mean([number.changed for number in numbers]) < 0.015  # 0.006 by Student's t of 24 cosines
 
 

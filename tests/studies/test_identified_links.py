@@ -104,7 +104,7 @@ def errors_of_base(links: Solution) -> FloatArray:
 def fitted(robot: Robot, found: list[Solution]) -> Robot:
     """The robot with all that was told."""
     numbers = (number for each in found for number in numbers_of(each))
-    told = {each.path: each.value for each in numbers if each.told and not each.sum}
+    told = {each.path: each.value for each in numbers if each.identifiable and not each.sum}
     bodies = found_links(robot, found[-1])
     assert bodies.within
     robot = robot.replace(told)

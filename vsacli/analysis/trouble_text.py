@@ -73,7 +73,7 @@ def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
     Where many joints have a kind, the others follow in a few words each.
     """
     kinds = dict.fromkeys(kind for joint in joints for kind in joint.worst)
-    told = {kind: _told([joint for joint in joints if kind in joint.worst], kind) for kind in kinds}
+    told = {kind: _worst_of([joint for joint in joints if kind in joint.worst], kind) for kind in kinds}
     for joint in joints:
         between = {worst.time for worst in joint.between.values()}
         for kind, worst in joint.worst.items():
@@ -90,7 +90,7 @@ def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
             yield of_joints(f"also {_words(kind)}: ", others, [joint.name for joint in joints])
 
 
-def _told(joints: Sequence[JointReport], kind: str) -> Sequence[JointReport]:
+def _worst_of(joints: Sequence[JointReport], kind: str) -> Sequence[JointReport]:
     """Return the joints with the most samples of a kind of trouble, or farthest beyond their limit."""
     if len(joints) <= MOST_TOLD + 1:
         return joints

@@ -254,8 +254,8 @@ class Joint:
 
     def warnings(self, *, massless: bool = False) -> Iterator[str]:
         """Yield warnings on link and springs; on no link if none has a mass."""
-        told = (NO_MASS, NO_INERTIA) if massless else ()
-        of_link = (warning for warning in self.link.warnings() if warning not in told)
+        said = (NO_MASS, NO_INERTIA) if massless else ()
+        of_link = (warning for warning in self.link.warnings() if warning not in said)
         yield from (f"link of joint {self.name}: {warning}" for warning in of_link)
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 

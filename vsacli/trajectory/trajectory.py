@@ -74,9 +74,9 @@ class Trajectory:
             if key in commanded or signal.device is None
         }
         profiles = [profile for _, profile in self.profiles()]
-        told = (*warnings, *(each for profile in profiles for each in profile.warnings))
+        messages = (*warnings, *(each for profile in profiles for each in profile.warnings))
         self.located_warnings = tuple(
-            each if isinstance(each, Problem) else Problem("", 0, each) for each in told
+            each if isinstance(each, Problem) else Problem("", 0, each) for each in messages
         )
         self.warnings = tuple(map(str, self.located_warnings))
         self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))

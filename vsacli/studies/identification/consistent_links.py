@@ -59,13 +59,13 @@ ARRIVED = 1e-6
 1/(1 + decrement) leave links bodies (S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 9.6)."""
 
 
-class Told(NamedTuple):
+class LinkEstimate(NamedTuple):
     """The result: combinations of standard parameters, their values and covariance.
 
     Attributes:
-        shares: of the parameters of all links in each, (told, parameters).
-        values: (told,).
-        covariance: (told, told).
+        shares: of the parameters of all links in each, (combinations, parameters).
+        values: (combinations,).
+        covariance: (combinations, combinations).
     """
 
     shares: FloatArray
@@ -78,7 +78,7 @@ class ConsistentLinks(NamedTuple):
 
     Attributes:
         links: of all joints, base to tip; none if nothing was found, or they are not within its errors.
-        off: by how many standard errors each value that was found is off from theirs, (told,).
+        off: by how many standard errors each value that was found is off from theirs, (combinations,).
     """
 
     links: tuple[Link, ...]
@@ -90,20 +90,20 @@ class ConsistentLinks(NamedTuple):
         return bool(np.all(np.abs(self.off) <= WITHIN))
 
 
-def consistent_links(robot: Robot, told: Told) -> ConsistentLinks:
+def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     """Links near a robot's that are bodies and have the values that were found.
 
     Args:
         robot: the robot as its file has it.
-        told: the result.
+        estimate: the result.
     """
-    if not len(told.values):
-        return ConsistentLinks((), told.values)
+    if not len(estimate.values):
+        return ConsistentLinks((), estimate.values)
     start = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
-    errors = SHARP * np.maximum(np.abs(told.values), 1.0)
-    root = np.asarray(np.linalg.cholesky(told.covariance + np.diag(errors**2)), dtype=np.float64)
-    found = _nearest(_Problem.of(told, root, start), start)
-    off = (told.shares @ found - told.values) / np.linalg.norm(root, axis=1)
+    errors = SHARP * np.maximum(np.abs(estimate.values), 1.0)
+    root = np.asarray(np.linalg.cholesky(estimate.covariance + np.diag(errors**2)), dtype=np.float64)
+    found = _nearest(_Problem.of(estimate, root, start), start)
+    off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
     nearest = ConsistentLinks((), off)
     if not nearest.within:
         return nearest  # they are next to no bodies: of the smallest mass, or flat
@@ -161,15 +161,15 @@ class _Problem(NamedTuple):
     inverse: FloatArray
 
     @classmethod
-    def of(cls, told: Told, root: FloatArray, start: FloatArray) -> _Problem:
+    def of(cls, estimate: LinkEstimate, root: FloatArray, start: FloatArray) -> _Problem:
         """Return the problem with identified values as coordinates, scaled by a root of their covariance."""
         from scipy.linalg import solve_triangular
 
-        q, r = map(np.asarray, np.linalg.qr(told.shares.T, mode="complete"))
-        count = len(told.values)
-        to_told = q[:, :count]
-        centre = to_told @ solve_triangular(r[:count], told.values, trans="T")
-        errors = to_told @ solve_triangular(r[:count], root, trans="T")
+        q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
+        count = len(estimate.values)
+        to_estimate = q[:, :count]
+        centre = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
+        errors = to_estimate @ solve_triangular(r[:count], root, trans="T")
         inverse = np.asarray(np.linalg.inv(pseudo_inertia(start.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
         return cls(centre, np.hstack((errors, q[:, count:])), count, inverse)
 
@@ -237,10 +237,10 @@ def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
 def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
     """Links that are bodies, nearest to the robot's, by the solution of a system of links."""
     assert isinstance(found.system, LinkSystem), "of links"
-    return consistent_links(robot, _told(found.system, found))
+    return consistent_links(robot, _estimate(found.system, found))
 
 
-def _told(system: LinkSystem, found: Solution) -> Told:
+def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
     """Return the identifiable base parameters, alone or in combinations, at the other values found."""
     fit, base = found.fit, system.base
     combined = {each.terms[0][0]: each.terms for each in fit.inseparable}
@@ -252,7 +252,7 @@ def _told(system: LinkSystem, found: Solution) -> Told:
     of_base = rows[:, : len(base.kept)]
     there = np.flatnonzero(of_base.any(axis=1))
     among = np.array(first)[there]
-    return Told(
+    return LinkEstimate(
         shares=of_base[there] @ base.shares,
         values=of_base[there] @ fit.solution[: len(base.kept)],
         covariance=fit.covariance[np.ix_(among, among)],

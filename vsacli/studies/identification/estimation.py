@@ -310,12 +310,12 @@ def fit_of(
     covariance = _covariance(system, step, left)
     errors = np.sqrt(np.diagonal(covariance))
     combinations = tuple(_combinations(split, solution, errors))
-    told = np.zeros(len(present), dtype=bool)
-    told[split.kept] = True
-    told[[at for each in combinations for at, _ in each.terms]] = False
+    identifiable = np.zeros(len(present), dtype=bool)
+    identifiable[split.kept] = True
+    identifiable[[at for each in combinations for at, _ in each.terms]] = False
     return Fit(
-        values=np.where(told, solution, before),
-        standard_errors=np.where(told, errors, np.nan),
+        values=np.where(identifiable, solution, before),
+        standard_errors=np.where(identifiable, errors, np.nan),
         solution=solution,
         covariance=covariance,
         condition=split.condition,

@@ -199,7 +199,7 @@ def _verdict(
     held = all(system.converged for system in systems) and (links is None or links.within)
     if any(map(_fails, residuals)) or not held or any(each.matters for each in explained):
         return MISFIT
-    return OK if all(number.told for system in systems for number in system.numbers) else UNTOLD
+    return OK if all(number.identifiable for system in systems for number in system.numbers) else UNTOLD
 
 
 def _fails(residual: Residual) -> bool:
@@ -275,7 +275,7 @@ def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
     """Yield the parameters in the order of the file, friction that it lacks included."""
     known = set(map(str, parameters(robot)))
     for number in (number for system in systems for number in system.numbers):
-        if number.told and not number.sum and (number.path in known or number.changed):
+        if number.identifiable and not number.sum and (number.path in known or number.changed):
             yield number
 
 

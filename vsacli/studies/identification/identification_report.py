@@ -67,7 +67,7 @@ class Number(Published):
     }
 
     @property
-    def told(self) -> bool:
+    def identifiable(self) -> bool:
         """Whether it was found."""
         return math.isfinite(self.standard_error)
 
@@ -75,12 +75,14 @@ class Number(Published):
     def off(self) -> float:
         """Standard errors by which it differs from that of the file; NaN if it was not told."""
         difference = self.value - self.before
-        return difference / self.standard_error if difference and self.told else 0.0 * self.standard_error
+        if not (difference and self.identifiable):
+            return 0.0 * self.standard_error
+        return difference / self.standard_error
 
     @property
     def changed(self) -> bool:
         """Whether it differs from that of the file by more than it may be off."""
-        return self.told and abs(self.value - self.before) > CHANGED * self.standard_error
+        return self.identifiable and abs(self.value - self.before) > CHANGED * self.standard_error
 
 
 @dataclass(frozen=True)
@@ -231,11 +233,12 @@ class Identification(Published):
 
     def _summary(self) -> str:
         """Return how many values agree with the file, disagree, or say nothing about it."""
-        told, changed = sum(each.told for each in self.numbers), sum(each.changed for each in self.numbers)
+        identifiable = sum(each.identifiable for each in self.numbers)
+        changed = sum(each.changed for each in self.numbers)
         counts = {
-            f"{'agrees' if told - changed == 1 else 'agree'} with the file": told - changed,
+            f"{'agrees' if identifiable - changed == 1 else 'agree'} with the file": identifiable - changed,
             f"{'differs' if changed == 1 else 'differ'} by more than {CHANGED:g} standard errors": changed,
-            "cannot be told": len(self.numbers) - told,
+            "cannot be told": len(self.numbers) - identifiable,
         }
         listed = ", ".join(f"{count} {words}" for words, count in counts.items() if count)
         return f"{len(self.numbers)} number{'s' if len(self.numbers) != 1 else ''}: {listed}"
@@ -245,7 +248,7 @@ class Identification(Published):
         for each in self.numbers:
             said = each.note or (_off(each.off) if each.changed else "as in the file")
             found = significant(each.value, each.standard_error)
-            error = f"{each.standard_error:.2g}" if each.told else "-"
+            error = f"{each.standard_error:.2g}" if each.identifiable else "-"
             rows.append((each.path, f"{each.before:.6g}", found, error, each.unit, said))
         return rows
 

@@ -226,8 +226,10 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
     """
     rates = np.gradient(signals.tau_motor, 1 / signals.rate, axis=0)
     beside = signals._replace(tau_motor=rates, noise=None)
-    told = [each for system in found for each in _delay_of(system, signals._replace(noise=None), beside)]
-    values, errors = np.array([each for each in told if np.isfinite(each).all()]).reshape(-1, 2).T
+    identifiable = [
+        each for system in found for each in _delay_of(system, signals._replace(noise=None), beside)
+    ]
+    values, errors = np.array([each for each in identifiable if np.isfinite(each).all()]).reshape(-1, 2).T
     if not len(values):
         return Delay(np.nan, np.nan)
     weights = 1 / errors**2
@@ -316,8 +318,8 @@ def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None
     slopes = np.concatenate([each.slopes[:, found.free] for each in equations])
     predicted = np.concatenate([each.predicted for each in equations])
     weight = np.concatenate([[1 / found.fit.residual_rms[name] for name in each.group] for each in equations])
-    told = np.flatnonzero(np.isfinite(found.fit.standard_errors))
-    if not told.size or found.fit.inseparable:
+    identifiable = np.flatnonzero(np.isfinite(found.fit.standard_errors))
+    if not identifiable.size or found.fit.inseparable:
         return None
     split = independence(slopes * weight[:, None], SEPARABLE)
     share = split.q.T @ (predicted * weight)
@@ -326,19 +328,19 @@ def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None
         return None  # equations have other numbers, which a gain does not change: so it leaves something
     by_gain = np.zeros(slopes.shape[1])
     by_gain[split.kept] = np.linalg.solve(split.r, share) / split.scale[split.kept]
-    return _fitted_factor(found, by_gain[told], told)
+    return _fitted_factor(found, by_gain[identifiable], identifiable)
 
 
-def _fitted_factor(found: Solution, by_gain: FloatArray, told: IndexArray) -> Factor | None:
+def _fitted_factor(found: Solution, by_gain: FloatArray, identifiable: IndexArray) -> Factor | None:
     """Return the factor with which numbers come nearest to the file, if they then agree with it."""
-    of_file = found.system.before[list(found.free)][told]
-    difference = found.fit.values[told] - of_file
-    covariance = found.fit.covariance[np.ix_(told, told)]
+    of_file = found.system.before[list(found.free)][identifiable]
+    difference = found.fit.values[identifiable] - of_file
+    covariance = found.fit.covariance[np.ix_(identifiable, identifiable)]
     weighted = np.linalg.solve(covariance, np.column_stack((by_gain, difference)))
     information = float(by_gain @ weighted[:, 0])
     share, error = float(by_gain @ weighted[:, 1]) / information, information**-0.5
     rest = difference - share * by_gain
-    off = float(rest @ np.linalg.solve(covariance, rest)) / max(len(told) - 1, 1)
+    off = float(rest @ np.linalg.solve(covariance, rest)) / max(len(identifiable) - 1, 1)
     factor = Factor(1 / (1 - share), error / (1 - share) ** 2)
     return factor if factor.differs(1.0) and off < WITHIN**2 else None
 

@@ -68,7 +68,7 @@ def compare(
         with open_stored(result) as stored:
             return compare(stored, recording, begins_at, columns)
     places = known_columns(result, stand_ins(_variables(result)))
-    recorded, behind = _told(read_recording(recording, places, "the result", load_columns(columns)))
+    recorded, behind = _most_direct(read_recording(recording, places, "the result", load_columns(columns)))
     computed = _interpolated(result, recorded.signals)
     duration = float(result.time[-1] - result.time[0])
     pairings = [
@@ -108,7 +108,7 @@ def _variables(result: StoredResult) -> dict[str, Variable]:
     return found
 
 
-def _told(recorded: Recording) -> tuple[Recording, list[str]]:
+def _most_direct(recorded: Recording) -> tuple[Recording, list[str]]:
     """Return the recording with the most direct column of each signal, and the names of the others."""
     best = {signal.column for signal in preferred(recorded.signals).values()}
     kept = tuple(signal for signal in recorded.signals if signal.column in best)

@@ -226,7 +226,9 @@ def demanded(
     springs = SpringPeaks(robot)
     parts: list[dict[str, FloatArray]] = []
     outcomes = []
-    for name, trajectory in zip(_told_apart([each.name for each in trajectories]), trajectories, strict=True):
+    for name, trajectory in zip(
+        _distinguished([each.name for each in trajectories]), trajectories, strict=True
+    ):
         run = Run(robot, trajectory)
         blocks, left_out = [], 0
         for block in run:
@@ -241,7 +243,7 @@ def demanded(
     return Demand(tuple(outcomes), tuple(_motors(robot, parts, names)), springs.report())
 
 
-def _told_apart(names: Sequence[str]) -> Iterator[str]:
+def _distinguished(names: Sequence[str]) -> Iterator[str]:
     """Names with a number behind those that were there already."""
     for index, name in enumerate(names):
         earlier = names[:index].count(name)

@@ -37,7 +37,7 @@ MOST_VALUES = 1_000_000
 """Most values of one path: more than any study has runs."""
 
 
-class Held(NamedTuple):
+class FileNumber(NamedTuple):
     """A number of one of the files: the path as users write it, also with indices, its unit and its value."""
 
     path: str
@@ -46,7 +46,7 @@ class Held(NamedTuple):
     value: float
 
 
-def held(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) -> list[Held]:
+def file_numbers(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) -> list[FileNumber]:
     """Numbers of a file as they are looked up by paths.
 
     Args:
@@ -54,7 +54,7 @@ def held(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) -> list[He
         joint_types: type of each joint by name, on which units depend.
     """
     return [
-        Held(
+        FileNumber(
             _dotted(each.path),
             _dotted(each.path, indexed=True),
             each.quantity.unit(_type(each, joint_types)),
@@ -115,7 +115,7 @@ class Dimension(NamedTuple):
 
 
 def dimensions_of(
-    varied: Varied, numbers: Sequence[Held], before: Sequence[Dimension]
+    varied: Varied, numbers: Sequence[FileNumber], before: Sequence[Dimension]
 ) -> Iterator[Dimension]:
     """Yield the dimensions of a path: one, or one for each parameter of a distribution.
 
@@ -153,13 +153,13 @@ def dimensions_of(
             )
 
 
-def _fits(number: Held, path: str) -> bool:
+def _fits(number: FileNumber, path: str) -> bool:
     """Return whether a path leads to a number, or to a record with it."""
     return any(fnmatchcase(each, pattern) for each in number[:2] for pattern in (path, f"{path}.*"))
 
 
 def _distributed(
-    path: str, node: tree.Node, fitting: Sequence[Held], numbers: Sequence[Held]
+    path: str, node: tree.Node, fitting: Sequence[FileNumber], numbers: Sequence[FileNumber]
 ) -> Iterator[Dimension]:
     if not fitting:
         raise InputError.one(
@@ -256,10 +256,10 @@ class Entries:
                     self._change(dimension.path, value)
         problems.check()
 
-    def _numbers(self) -> list[Held]:
+    def _numbers(self) -> list[FileNumber]:
         trajectories = (numbers(document, self._joints.types) for document, _ in self._documents)
         every = [*numbers(self._read.document), *(each for found in trajectories for each in found)]
-        return held(every, self._joints.types)
+        return file_numbers(every, self._joints.types)
 
     def _change(self, path: str, value: object) -> None:
         changes = divided({path: value})

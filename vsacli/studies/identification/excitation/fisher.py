@@ -70,14 +70,14 @@ class Information:
         self._sizes = np.sqrt(np.mean(torques**2, axis=0))
         splits = self._splits(examples)
         self._kept = [each.kept for each in splits]
-        self.structural = tuple(self._untold(splits))
+        self.structural = tuple(self._unidentifiable(splits))
 
     def _splits(self, examples: Sequence[Block]) -> list[Independence]:
         """Return for each system the unknowns that some motion distinguishes, and the others."""
         systems = zip(*map(self._slopes, examples), strict=True)
         return [independence(np.concatenate(slopes), TOLERANCE) for slopes in systems]
 
-    def _untold(self, splits: Sequence[Independence]) -> Iterator[str]:
+    def _unidentifiable(self, splits: Sequence[Independence]) -> Iterator[str]:
         """Yield the parameters that no motion identifies, in words."""
         for system, split in zip(self._systems, splits, strict=True):
             own = system.names
@@ -175,7 +175,7 @@ USUAL_NOISE = Noise()
 
 
 @dataclass(frozen=True)
-class Told(Published):
+class PredictedError(Published):
     """A number that an identification looks for.
 
     Attributes:
@@ -191,7 +191,9 @@ class Told(Published):
     standard_error: float
 
 
-def predicted_errors(robot: Robot, trajectory: Trajectory, noise: Noise, seed: int) -> tuple[Told, ...]:
+def predicted_errors(
+    robot: Robot, trajectory: Trajectory, noise: Noise, seed: int
+) -> tuple[PredictedError, ...]:
     """Return the predicted identification from one recording of a motion, if the robot is as in its file.
 
     Args:
@@ -206,13 +208,13 @@ def predicted_errors(robot: Robot, trajectory: Trajectory, noise: Noise, seed: i
     block, random = executed(robot, trajectory), np.random.default_rng(seed)
     drawn = [_identified(robot, noisy_record(robot, block, noise, random)) for _ in range(RECORDS)]
     errors = np.array([[each.standard_error for each in numbers] for numbers in drawn])
-    told = np.isfinite(errors)
-    variances = np.where(told, errors, 0.0) ** 2
+    identifiable = np.isfinite(errors)
+    variances = np.where(identifiable, errors, 0.0) ** 2
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.sqrt(variances.sum(axis=0) / told.sum(axis=0))
-    mean[2 * told.sum(axis=0) < RECORDS] = np.nan
+        mean = np.sqrt(variances.sum(axis=0) / identifiable.sum(axis=0))
+    mean[2 * identifiable.sum(axis=0) < RECORDS] = np.nan
     return tuple(
-        Told(each.path, each.unit, each.before, float(error))
+        PredictedError(each.path, each.unit, each.before, float(error))
         for each, error in zip(drawn[0], mean, strict=True)
     )
 

@@ -20,7 +20,7 @@ from vsacli.base.version import __version__
 from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import MARGIN, RATE
-from vsacli.studies.identification.excitation.fisher import Told
+from vsacli.studies.identification.excitation.fisher import PredictedError
 from vsacli.studies.search.fixed_text import formula
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.trajectory import Trajectory
@@ -60,7 +60,7 @@ class Usefulness(Published):
     """
 
     conditions: Mapping[str, float]
-    numbers: tuple[Told, ...] = ()
+    numbers: tuple[PredictedError, ...] = ()
     reason: str = ""
 
     shape: ClassVar = {**named("conditions", "numbers"), "reason?": "reason"}
@@ -146,11 +146,11 @@ class Excitation(Published):
         return rows
 
 
-def _error(number: Told | None) -> str:
+def _error(number: PredictedError | None) -> str:
     return "-" if number is None or math.isnan(number.standard_error) else f"{number.standard_error:.2g}"
 
 
-def _share(number: Told) -> str:
+def _share(number: PredictedError) -> str:
     """Return the error as a share of the value, unless that is zero."""
     if number.value == 0 or math.isnan(number.standard_error):
         return "-"
