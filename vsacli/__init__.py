@@ -1,7 +1,7 @@
 """Inverse dynamics of robots with variable stiffness actuators (VSA-NEA, Buondonno & De Luca 2016).
 
-What users import is what the rooms offer; the block below is read by type checkers and, when a name is first
-asked for, by `lazy_exports`, so that the command line starts without NumPy.
+Users import the names that the packages offer. The block below is read by type checkers and, at the first use
+of a name, by `lazy_exports`, so that the command line starts without NumPy.
 """
 
 from typing import TYPE_CHECKING

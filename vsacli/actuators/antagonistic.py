@@ -186,7 +186,7 @@ class Antagonistic(Actuator):
         return rates + np.stack((rate, -rate))
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
-        """Return each spring by itself, and one between the motors."""
+        """Return each spring on its own, and one between the motors."""
         phi = of_joint["phi"]
         sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
         springs = [(f"spring {side}", *spring) for side, spring in sides]

@@ -6,8 +6,8 @@ T the torque of the springs. The motors' velocities follow from w and from the r
     [[b_1, b_2], [g_1, g_2]] (theta_1', theta_2') = (w + (b_1 + b_2) q', sigma' - sigma_q q')
 
 with b_k = 1 where a spring lies behind motor k, else 0, and g_k the derivative of sigma over theta_k, and
-their accelerations likewise. The matrix is singular where its determinant, the pivot b_1 g_2 - b_2 g_1, is
-zero, and not where det A is. With one motor the first row is all there is.
+the same for their accelerations. The matrix is singular where its determinant, the pivot b_1 g_2 - b_2 g_1,
+is zero, and not where det A is. With one motor the first row is all there is.
 
 The spread, the sum of the deflections that w is the rate of, is a state of its own: spread' = (tau_l - T)/d.
 The slope of that over the spread, at a stiffness, is -(det A/pivot)/d.
@@ -46,7 +46,7 @@ class InternalMotion(NamedTuple):
         phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
             a guess from which the stiffness is found.
         velocity: w, the rate of the spread, (samples,); None: it follows from the damping.
-        acceleration: its derivative, (samples,), likewise.
+        acceleration: its derivative, (samples,), as above.
     """
 
     phi: FloatArray
@@ -60,7 +60,7 @@ class _Springs(NamedTuple):
     Attributes:
         state: arrays (samples, 1 joint[, motors]).
         torque: derivatives of T over each theta, (motors, samples).
-        stiffness: those of sigma, likewise.
+        stiffness: those of sigma, as above.
         pivot: determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
     """
 

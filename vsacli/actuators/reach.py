@@ -16,7 +16,7 @@ from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Fla
 from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
-"""Relative excess over a limit that is none, so that a motion may run along its limit."""
+"""Relative excess over a limit that does not count, so that a motion may run along its limit."""
 
 ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
 """Standard deviations, and share of a limit's range, by which an uncertain value may seem to exceed it."""

@@ -140,7 +140,7 @@ class Between:
             self._seen = math.inf if ended else self._known.stop - 1
 
     def knows(self, samples: int) -> bool:
-        """Return whether the surroundings of so many samples after those that passed are known.
+        """Return whether the surroundings of this many samples after those that passed are known.
 
         Two samples after them must be, since a minimum around the first of these may be nearest to the last.
         """

@@ -106,8 +106,8 @@ chance, of 11 that are drawn from a normal distribution the largest is below a t
 times."""
 
 NOISE_GAIN = 12.0
-"""Errors beyond so many times that noise fail. Of 10^6 that are drawn from a normal distribution the largest
-lies at 5 of its widths, and the largest of 11 sixth differences may be a third of the noise."""
+"""Errors beyond this multiple of that noise fail. Of 10^6 drawn from a normal distribution the largest lies
+at 5 of its widths, and the largest of 11 sixth differences may be a third of the noise."""
 
 SMALL_JOINT = 1e-3
 """Share of the largest joint's peak against which smaller joints are measured: what is below may be nothing
@@ -157,7 +157,7 @@ def _ladder(
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Errors (derivatives, times) by the best of some steps, what noise admits, and whether all was compared.
 
-    So many times are computed together as fill a block, since a run has the memory for one.
+    This many times are computed together as fill a block, since a run has the memory for one.
 
     Args:
         kernel: of the robot.
@@ -260,7 +260,7 @@ class _RungErrors:
 
         Args:
             values: of what is derived, (scales, offsets, times, joints, motors).
-            derivatives: that are to be checked, likewise.
+            derivatives: that are to be checked, as above.
             compared: (scales, times, joints).
             size: what errors are measured against, if it is the largest; (times, joints, motors).
             grain: least noise of the values, (scales, times, joints, motors).
@@ -342,7 +342,7 @@ class SelfCheck(Stored):
         ladder: largest relative error of a derivative against differences of what it derives.
         spring_bound: bound on the residual of (14).
         ladder_bound: bound on the error of a derivative, where it is nearest to its bound.
-        shaft_residual: largest scaled residual of the balances of motors and windings, NaN likewise; 0 in
+        shaft_residual: largest scaled residual of the balances of motors and windings, NaN there, too; 0 in
             results of before these were balanced.
     """
 

@@ -125,7 +125,7 @@ class Known(NamedTuple):
         return self.first + len(self.time)
 
     def last(self, count: int) -> Known:
-        """Return the last so many."""
+        """Return the last this many."""
         dropped = max(0, len(self.time) - count)
         return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 

@@ -48,7 +48,7 @@ def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
 WIDTH = 78
 JOINTS_PER_LINE = 3
 MOST_APART = 7
-"""Joints of a robot up to which each is spoken of by itself."""
+"""Joints of a robot up to which each is spoken of on its own."""
 
 
 HUGE = 1e8

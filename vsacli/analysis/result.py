@@ -201,7 +201,7 @@ def open_result(path: str | os.PathLike[str]) -> ResultFile:
     Raises:
         InputError: there is no such file, or it is not a complete file of the format this version reads.
         StorageError: the operating system refuses to read it, or another program is writing it.
-        TypeError: path is none.
+        TypeError: path is of another type.
     """
     check_path(path, "open_result(path)")
     return open_one_of(Path(path), ResultFile)

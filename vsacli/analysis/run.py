@@ -63,8 +63,8 @@ class Run:
         choice: the engine that was chosen, and why.
 
     Raises:
-        InputError: the margin is none, the trajectory does not fit the robot, there are no such deflections,
-            there is no such engine, or no C compiler for it.
+        InputError: the margin is impossible, the trajectory does not fit the robot, deflections or engine are
+            unknown, or there is no C compiler for it.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Run:
         integrated = self._deflections is not None
         self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
-        busy = int(self._ahead)  # with the books of the block before
+        busy = int(self._ahead)  # one thread updates the report while the others compute
         self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)

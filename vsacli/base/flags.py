@@ -104,7 +104,7 @@ def finite(arrays: Iterable[FloatArray]) -> BoolArray:
 
 
 def not_finite_flags(where: BoolArray) -> FlagArray:
-    """NOT_FINITE, and INFEASIBLE with it: who heeds the latter alone stops there as well."""
+    """NOT_FINITE, and INFEASIBLE with it: code that checks only INFEASIBLE stops there as well."""
     return marked(Flag.NOT_FINITE | Flag.INFEASIBLE, where)
 
 

@@ -27,7 +27,7 @@ class LazyRegistry(Mapping[str, Any]):
         """Return the name of a class that is one of the things; imports nothing.
 
         Raises:
-            KeyError: it is none of them.
+            KeyError: it is not among them.
         """
         home = f"{cls.__module__}:{cls.__qualname__}"
         for name, other in self.homes.items():

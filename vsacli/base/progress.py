@@ -33,7 +33,7 @@ class NoBar:
 
 
 def unseen(steps: int) -> AbstractContextManager[NoBar]:
-    """Return a bar for work of so many steps that nobody watches."""
+    """Return a bar for work of this many steps that nobody watches."""
     del steps
     return nullcontext(NoBar())
 

@@ -28,7 +28,7 @@ class Signal(NamedTuple):
         optional: whether a component may have no value, so that it is NaN all the time.
         components: how many numbers a value has; None: one a joint.
         device: key in the robot file of what a joint takes it by, if that is not its actuator; a device that
-            is not commanded stands where it stands by itself.
+            is not commanded stays where it is.
     """
 
     key: str

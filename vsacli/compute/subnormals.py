@@ -1,7 +1,7 @@
 """Numbers of less than full precision, below 2.2e-308: taken for zero while rows of samples are computed.
 
 Some processors, those of Intel among them, take a hundred times longer for an operation on them, and motions
-that decay are full of them. Compiled code does likewise (engine/lanes.c).
+that decay are full of them. Compiled code does the same (engine/lanes.c).
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class Gains:
             4, or 2 for a robot without springs.
         stiffness: K_sigma0, K_sigma1 of (33b), (joints, 2) or (1, 2).
         position_integral: KI of the position, (joints,) or (1,), 1/s^(r+1); 0 for no integral action.
-        stiffness_integral: KI of the stiffness, likewise, 1/s^3.
+        stiffness_integral: KI of the stiffness, as above, 1/s^3.
         sources: the files that they were read from.
 
     Raises:

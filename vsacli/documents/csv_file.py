@@ -284,7 +284,7 @@ def _cells_count(text: bytes, expected: int, separator: int) -> bool:
 
 
 class _IrregularError(Exception):
-    """A row that is none of the table."""
+    """A row that does not belong to the table."""
 
 
 def _cleaned(rows: Rows) -> Iterator[str]:

@@ -409,7 +409,7 @@ def conversion_factor(text: str, expected: str) -> float:
 
     Args:
         text: the unit found: symbols of `BASES` with `^`, `*`, `/` and parentheses, a blank for a product.
-        expected: the unit wanted, likewise.
+        expected: the unit wanted, as above.
 
     Raises:
         InputError: the unit is not understood, or is one of something else.

@@ -172,7 +172,7 @@ def check_fields(record: Any, *further: FieldProblem) -> None:
 
     Args:
         record: an instance of a record class.
-        further: problems the record found by itself, reported together with these.
+        further: problems the record found on its own, reported together with these.
 
     Raises:
         InvalidRecordError: naming each field whose value it cannot have.
@@ -320,7 +320,7 @@ class Choice(Kind):
 
 
 def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
-    """Return why a word is none of the options."""
+    """Return why a word is not among the options."""
     if word in not_yet:
         return f"{word!r} is not supported yet"
     return f"unknown word {quoted(word)}{did_you_mean(word, options)}"

@@ -154,7 +154,7 @@ def changed(
         source: the file that it was read from.
         changes: the changes.
         members: as of `read_document`.
-        exempt: likewise.
+        exempt: as above.
 
     Raises:
         ChangeError: the first that cannot be made.

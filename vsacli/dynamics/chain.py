@@ -55,7 +55,7 @@ class TipLoad(NamedTuple):
 
     Attributes:
         force: its components and their first and second derivatives.
-        moment: likewise, about that point.
+        moment: as above, about that point.
         point: from the origin of frame N, in frame N.
         in_base: whether the components are along the axes of frame 0, else of frame N.
     """

@@ -177,7 +177,7 @@ def link_torques(
     Raises:
         InputError: an array has another shape than the joints of the robot ask for, or than `q` and the
             wrench; a derivative of q is missing; there is no such engine, or no C compiler for it.
-        TypeError: robot or wrench is none.
+        TypeError: robot or wrench is of another type.
     """
     check_robot(robot)
     if wrench is not None:

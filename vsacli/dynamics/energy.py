@@ -37,7 +37,7 @@ class JointEnergy(Stored):
         recovered: that of the negative part, J; spent - recovered is the work of the motors.
         co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
             torques do not split.
-        load: that of tau_e/2, likewise.
+        load: that of tau_e/2, as above.
         dissipated: what friction and damping of joint and motors took, J; None if nothing has dry friction.
         copper_loss: heat in the windings of its motors, J; None if no resistance is given.
     """
@@ -71,7 +71,7 @@ class Flow(NamedTuple):
         work: of each motor, J.
         spent: the positive part of that, J.
         load: integral of (tau_1 + tau_2)^2/4, (joints, intervals).
-        co_contraction: integral of (tau_1 - tau_2)^2/4, likewise.
+        co_contraction: integral of (tau_1 - tau_2)^2/4, as above.
         dissipated: taken by friction and damping, (joints, intervals), J; None if there is no dry friction.
         copper: heat in the windings, of the motors, J; None if it is not known.
     """

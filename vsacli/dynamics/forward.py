@@ -55,7 +55,7 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
 
     Raises:
         InputError: q has another shape.
-        TypeError: robot is none.
+        TypeError: robot is of another type.
     """
     check_robot(robot)
     return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
@@ -82,7 +82,7 @@ def state_derivative(
 
     Raises:
         InputError: shapes that do not fit, or a mass matrix that is not positive definite.
-        TypeError: robot or state is none.
+        TypeError: robot or state is of another type.
     """
     check_robot(robot)
     if wrench is not None:
@@ -127,7 +127,7 @@ class Plant:
 
         Raises:
             InputError: a part has another shape than the robot's.
-            TypeError: state is none.
+            TypeError: state is of another type.
         """
         check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
         joints = len(self.drivetrain.present)

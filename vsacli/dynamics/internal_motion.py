@@ -150,7 +150,7 @@ class Marched(NamedTuple):
 
     Attributes:
         phi: deflections, (2, samples), up to where they go; None if they go nowhere.
-        rates: w and its derivative, (2, samples), likewise.
+        rates: w and its derivative, (2, samples), as above.
         end: up to which time, s.
         reason: why not further; None at the end of the trajectory.
     """

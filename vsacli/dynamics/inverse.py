@@ -291,7 +291,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
 
     Raises:
         InputError: it has another number of joints than the robot, or lacks a stiffness that one takes.
-        TypeError: one of both is none.
+        TypeError: one of both is of another type.
     """
     check_robot(robot)
     remedy = "load_trajectory({}, robot) reads one; it comes after the robot"

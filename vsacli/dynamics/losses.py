@@ -23,7 +23,7 @@ def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> F
     Args:
         intervals: lengths h, (samples - 1,), s.
         values: of the integrand, (..., samples).
-        rates: its derivative, likewise.
+        rates: its derivative, as above.
     """
     before, after = ((values[..., part], rates[..., part]) for part in (slice(None, -1), slice(1, None)))
     return integral(intervals, before, after)

@@ -28,7 +28,7 @@ from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000
 NUMBERED = (1,)
-"""Columns that need no header: a first line that begins with a number is none."""
+"""Columns that need no header: a first line that begins with a number is no header."""
 
 _POSITION_SUFFIX, _STIFFNESS_SUFFIX, _DAMPING_SUFFIX = ".q", ".stiffness", ".damping"
 

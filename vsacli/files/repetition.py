@@ -37,7 +37,7 @@ class Difference:
     Attributes:
         variable: its name.
         values: how many differ.
-        largest: largest difference over the variable's peak; NaN if one of two values is none.
+        largest: largest difference over the variable's peak; NaN if one of two values is missing.
     """
 
     variable: str

@@ -48,7 +48,7 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
 
     Raises:
         InputError: with every problem of the file, each with its line.
-        TypeError: path is none.
+        TypeError: path is of another type.
     """
     check_path(path, "load_robot(path)")
     return read_robot(path).robot(changes)

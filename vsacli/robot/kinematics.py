@@ -93,7 +93,7 @@ def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
 
     Raises:
         InputError: q has another shape.
-        TypeError: robot is none.
+        TypeError: robot is of another type.
     """
     check_robot(robot)
     positions = checked_shape("q", q, len(robot.joints))
@@ -121,7 +121,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatAr
 
     Raises:
         InputError: q has another shape, or there is no such frame.
-        TypeError: robot is none.
+        TypeError: robot is of another type.
     """
     check_robot(robot)
     check_frame(frame, "Jacobian")

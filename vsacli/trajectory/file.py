@@ -165,7 +165,7 @@ def load_trajectory(
 
     Raises:
         InputError: with every problem of the file, each with its line.
-        TypeError: path or robot is none.
+        TypeError: path or robot is of another type.
     """
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
@@ -194,12 +194,12 @@ def declared_trajectory(
 
     Args:
         path: as of `load_trajectory`.
-        robot: likewise.
-        changes: likewise.
-        progress: likewise.
+        robot: as above.
+        changes: as above.
+        progress: as above.
 
     Raises:
-        InputError: likewise.
+        InputError: as above.
     """
     joints = CommandedJoints.of(robot)
     if is_table(path):

@@ -162,7 +162,7 @@ class Trajectory:
                 column asks for, see `vsacli.trajectory.fits.fit_samples`.
             name: used in reports and for the name of the result file.
             **commanded: derivatives of the stiffness, `dstiffness` and `ddstiffness`; further signals of
-                `COMMANDED` and their derivatives, likewise.
+                `COMMANDED` and their derivatives, as above.
 
         Raises:
             TypeError: there is no such signal.

@@ -185,7 +185,7 @@ class SpringLaw(ABC):
 
     @property
     def polynomial(self) -> tuple[float, ...] | None:
-        """Coefficients of phi, phi^2, ... if the torque is a polynomial on the domain; None if it is none."""
+        """Coefficients of phi, phi^2, ... if the torque is a polynomial on the domain, else None."""
         return None
 
     def as_second(self) -> SpringLaw:

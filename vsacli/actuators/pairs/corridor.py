@@ -39,7 +39,7 @@ class Corridor(NamedTuple):
 
     Attributes:
         inner: its end at the smaller preload; the stiffness is NaN where tau_e cannot be carried.
-        outer: its end at the larger preload, likewise.
+        outer: its end at the larger preload, as above.
         rising: whether the stiffness increases with the preload.
         critical: whether the inner end is a critical point (else the end of a law's domain).
         slack: whether a side that only pulls carries no torque at the inner end.

@@ -182,7 +182,7 @@ class FoldMap(NamedTuple):
     Attributes:
         tau_e: elastic torques, ascending from minus infinity to infinity.
         phi_1: deflections of side 1, NaN beyond the ends and at the beginning of a gap.
-        phi_2: deflections of side 2, likewise.
+        phi_2: deflections of side 2, as above.
         slope_1: derivatives of phi_1 over tau_e, with the digits of single precision; at a cusp over the root
             of the share of the cell, divided by its width.
         slope_2: the same of phi_2.

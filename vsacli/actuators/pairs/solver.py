@@ -21,7 +21,7 @@ MAX_STEPS = 30
 """Three or four do, except next to a cusp or far beyond what the springs are made for."""
 
 ERROR_RTOL = OfRounding(1e-17)
-"""Relative error after a step that is none: the estimate may be some hundred times too small."""
+"""Relative error after a step that changes nothing: the estimate may be some hundred times too small."""
 
 MAX_DOUBLINGS = 1000
 """Doublings of a preload, from about the demand on: its torque leaves the range of doubles before."""

@@ -48,12 +48,12 @@ class Kernel(Hashable, Protocol):
     def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
         """Rows of results, (samples,), or constants in their place.
 
-        Every sample is computed by itself, without a branch on its values.
+        Every sample is computed on its own, without a branch on its values.
         """
 
 
 def samples_per_pass(inputs: int) -> int:
-    """Samples that NumPy takes at a time of a kernel with so many inputs."""
+    """Samples that NumPy takes at a time of a kernel with this many inputs."""
     return max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // inputs))
 
 

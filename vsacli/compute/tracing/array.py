@@ -324,7 +324,7 @@ def trace(
     """Return the program of a function of rows of samples: what it does to one sample.
 
     Args:
-        function: from rows of samples to rows of results; each sample is computed by itself.
+        function: from rows of samples to rows of results; each sample is computed on its own.
         kinds: of the rows that it takes.
         most: operations that are recorded.
         calling: whether calls are recorded as such, or expanded.

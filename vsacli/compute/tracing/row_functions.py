@@ -53,7 +53,7 @@ class RowFunction:
         self.rows = allocation.counts
 
     def workspace(self, samples: int) -> RowSpace:
-        """Rows for the intermediate values of at most so many samples."""
+        """Rows for the intermediate values of at most this many samples."""
         return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in DTYPES.items())
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:

@@ -56,7 +56,7 @@ def _holds_float(value: float) -> bool:
 
 
 def _holds_integer(largest: int) -> Callable[[float], bool]:
-    """Return whether a whole number of so many values has all digits; minus zero is none."""
+    """Return whether a whole number of this many values has all digits; minus zero is none."""
     return lambda value: abs(value) <= largest and value == int(value) and str(value) != "-0.0"
 
 

@@ -158,7 +158,7 @@ def simulate(
             with others, a mass matrix that is not positive definite, springs so stiff or poles so fast that
             double precision does not resolve them, a budget below 1, encoders of a joint that slides any far,
             an engine that there is not, or that cannot compute this.
-        TypeError: robot or trajectory is none.
+        TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
     check_measured(measured, gains)
@@ -199,8 +199,8 @@ def _report(
 
     Args:
         robot: as of `simulate`.
-        trajectory: likewise.
-        gains: likewise.
+        trajectory: as above.
+        gains: as above.
         past: the history.
         integrated: how it was integrated.
         goal_tolerance: as of `simulate`.

@@ -83,7 +83,7 @@ class Instant:
     """The time of a program: what tables have then are inputs of it.
 
     Args:
-        inputs: makes so many further inputs, as an array.
+        inputs: makes this many further inputs, as an array.
 
     Attributes:
         tables: those that were read, in the order of their inputs.

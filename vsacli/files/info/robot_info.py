@@ -27,7 +27,7 @@ MOST_EVALUATIONS = 1e7
 """Samples times joints that a search may evaluate; beyond, the random configurations have to do."""
 
 SAMPLES_AT_NO_COST = 300
-"""Fewer samples at once cost as much as so many."""
+"""Fewer samples at once cost as much as this many."""
 
 SEED = 0
 TURN = 2 * math.pi
@@ -62,7 +62,7 @@ def unlimited(joint: Joint) -> bool:
 
 
 def largest_sizes(objective: Objective, goals: int, robot: Robot) -> Extremes:
-    """Maximise the size of each of several goals by itself; NaN if its numbers overflow."""
+    """Maximise the size of each of several goals on its own; NaN if its numbers overflow."""
     with np.errstate(all="ignore"):
         q = _searched(objective, _random(goals, robot), robot)
         sizes = np.abs(_own_values(objective, q))

@@ -186,7 +186,7 @@ def _joined(pieces: Sequence[Curves]) -> Curves:
 
 
 def column_starts(time: FloatArray, columns: int = COLUMNS) -> IndexArray:
-    """Return the first sample of each of so many equal intervals of time that hold any; ascending from 0."""
+    """Return the first sample of each of these equal intervals of time that hold any; ascending from 0."""
     edges = np.linspace(time[0], time[-1], columns + 1)[:-1]
     return np.unique(np.searchsorted(time, edges))
 

@@ -90,7 +90,7 @@ class PageTexts(NamedTuple):
         report: printed by the command that made it.
         provenance: pairs of a word and its value.
         inputs: the files that were read.
-        remedy: what would mend it; None if it needs none, or none was looked for.
+        remedy: what would fix it; None if it needs none, or none was looked for.
         table: what the report has beside the table in it; header first, empty if there is nothing.
     """
 

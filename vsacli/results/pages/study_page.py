@@ -71,7 +71,7 @@ def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) 
 
 
 def _drawn(points: StudyPoints) -> IndexArray:
-    """Return the rows that are drawn: all, or so many, the worst and the front among them."""
+    """Return the rows that are drawn: all, or this many, the worst and the front among them."""
     chosen = [evenly(len(points.runs), MOST_RUNS), points.worst]
     if points.cost is not None:
         chosen.append(points.front)

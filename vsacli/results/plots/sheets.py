@@ -25,7 +25,7 @@ LATE = 1e5
 """First time, s, from which on ticks count from it: their digits would not fit side by side."""
 
 FINE, FEW_TICKS = 0.1, 4
-"""Length of a span, s, below which the digits of more than so many ticks would not fit side by side."""
+"""Length of a span, s, below which the digits of more than this many ticks would not fit side by side."""
 
 TITLE_LENGTH, LABEL_BESIDE = 70, 16
 """Characters of a title, and of a name beside a panel."""

@@ -123,7 +123,7 @@ class NewFile:
                 raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
     def do(self, task: Callable[[], None], size: int) -> None:
-        """Use the file in a task that holds so many bytes: now, or of a long file in a thread.
+        """Use the file in a task that holds this many bytes: now, or of a long file in a thread.
 
         Within `used`, as the task itself is; tasks are done in their order. Signals never reach the thread,
         and its exceptions are raised by a later call or by `wait`. While too many bytes wait, so does the

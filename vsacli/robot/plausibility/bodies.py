@@ -111,7 +111,7 @@ def _gyration(checked: CheckedRobot, index: int) -> float:
 
 
 def _crowding(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the heaviest link, in the name of all, unless none has a mass, which the robot says by itself."""
+    """Yield the heaviest link for all of them; a robot without any mass has a warning of its own."""
     crowding = _links(lambda checked, _: ratio(checked.sizes.mass, checked.sizes.extent**3))
     heaviest = max(crowding(checked), key=lambda measured: measured.value)
     if heaviest.value > 0:

@@ -83,11 +83,11 @@ class Signals(NamedTuple):
         q, dq, ddq: motion of the joints, (samples, joints).
         theta, dtheta, ddtheta: motion of the motors, (samples, joints, 2); NaN where there is no motor, or
             nothing was recorded.
-        tau_motor: torques as measured, unfiltered, (samples, joints, 2), NaN likewise.
+        tau_motor: torques as measured, unfiltered, (samples, joints, 2), NaN there, too.
         rate: samples a second.
         filter: which every column of an equation passes, the measured torque as well.
         noise: standard deviation of the noise of q and both theta before filtering, as far as it is white,
-            (joints, 3), NaN likewise; None if it is not known.
+            (joints, 3), NaN there, too; None if it is not known.
     """
 
     time: FloatArray
@@ -116,8 +116,8 @@ def conditioned(
     Args:
         time: (samples,), s, in equal steps.
         q: (samples, joints).
-        theta: (samples, joints, 2), NaN throughout where there is none.
-        tau_motor: likewise.
+        theta: (samples, joints, 2), NaN throughout where there are none.
+        tau_motor: as above.
         bandwidth: of the equations, Hz, less than a quarter of the rate.
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
@@ -201,7 +201,7 @@ def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
     Args:
         time: (samples,), s, in equal steps.
         q: positions of joints, (samples, joints); NaN in columns that were not recorded.
-        theta: of motors, (samples, joints, 2), likewise.
+        theta: of motors, (samples, joints, 2), as above.
     """
     lowest, highest = bounds(time)
     positions = np.concatenate((q[..., None], theta), axis=-1).reshape(len(time), -1)

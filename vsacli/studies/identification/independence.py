@@ -89,7 +89,7 @@ def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[
 
     Args:
         triangle: the columns, turned to be few rows.
-        noise: of them, turned likewise: combinations of columns have those of their noise.
+        noise: of them, turned in the same way: combinations of columns have those of their noise.
         tolerance: as of `independence`.
     """
     left, noise = triangle.copy(), noise.copy()

@@ -214,7 +214,7 @@ class Delay(NamedTuple):
     standard_error: float
 
     def matters(self, rate: float) -> bool:
-        """Return whether it is to be taken out of a record with so many samples a second."""
+        """Return whether it is to be taken out of a record with this many samples a second."""
         size = abs(self.seconds)
         return size > CERTAIN_DELAY * self.standard_error and size * rate > WORTH_IT
 
@@ -247,7 +247,7 @@ def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tup
 
 
 def without_delay(signals: Signals, late: float) -> Signals:
-    """Return the same with torques that are earlier by so many seconds."""
+    """Return the same with torques that are earlier by this many seconds."""
     from scipy.interpolate import make_interp_spline
 
     torques = signals.tau_motor.copy()

@@ -265,8 +265,8 @@ class Record(NamedTuple):
         path: of the file.
         source: the file as it was read.
         time: (samples,), s, from the first row of the file on.
-        q: positions of the joints, (samples, joints), NaN throughout where there is none.
-        theta: positions of the motors, (samples, joints, 2), likewise; of a motor that moves with its joint
+        q: positions of the joints, (samples, joints), NaN throughout where there are none.
+        theta: positions of the motors, (samples, joints, 2), as above; of a motor that moves with its joint
             the joint's if it was not recorded.
         tau_motor: torques of the motors, (samples, joints, 2).
         columns: names in the file, by variable.

@@ -40,7 +40,7 @@ def covariance_of_sum(scores: FloatArray) -> tuple[FloatArray, int]:
 
 
 def count_of_cosines(samples: int) -> int:
-    """Return how many cosines count in a record of so many samples."""
+    """Return how many cosines count in a record of this many samples."""
     return min(COSINES, -(-samples // SAMPLES_A_COSINE), max(samples - 1, 1))
 
 

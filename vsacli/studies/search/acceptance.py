@@ -45,10 +45,10 @@ _Found = TypeVar("_Found")
 
 
 class ImpossibleError(VsacliError):
-    """No change of a kind mends a motion.
+    """No change of a kind fixes a motion.
 
     Attributes:
-        reasons: why, in clauses; one for each joint that cannot be mended.
+        reasons: why, in clauses; one for each joint that cannot be fixed.
     """
 
     def __init__(self, *reasons: str) -> None:
@@ -369,7 +369,7 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     """Return the admissible stiffness at every instant of a load, whose low end always exists.
 
     Raises:
-        ImpossibleError: no stiffness mends the joint, or it has none to choose.
+        ImpossibleError: no stiffness fixes the joint, or it has none to choose.
     """
     variable_stiffness_actuator(joint)
     if reason := acceptance.path_reason(joint, load):

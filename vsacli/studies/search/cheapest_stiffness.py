@@ -109,7 +109,7 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
 
 
 HALVES = 2
-"""Parts into which a load divides each step by itself."""
+"""Parts into which a load divides each step on its own."""
 
 LOOKED_AT = 3000
 """Instants of a period at which bounds are looked at, at least: with 8 for each piece of the spline, a search

@@ -39,7 +39,7 @@ PRELOAD_GAIN = 0.9
 
 
 class CombinedSearch:
-    """A search for the combination of changes that mends a motion.
+    """A search for the combination of changes that fixes a motion.
 
     It looks at some samples, which others that refuse the result join. Changes that help at a factor are
     kept.
@@ -68,7 +68,7 @@ class CombinedSearch:
         return self._confirmed(self._smallest)
 
     def fastest(self) -> Combination | None:
-        """Return the combination with the least slow-down, likewise."""
+        """Return the combination with the least slow-down, as above."""
         return self._confirmed(self._fastest)
 
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
@@ -257,7 +257,7 @@ def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]
 
     Args:
         robot: the robot.
-        watched: some steps; the other preload is a choice if it makes a difference there. None if it is none.
+        watched: some steps; the other preload is a choice if it makes a difference there. None: no choice.
     """
     choices = [{"": joint} for joint in robot.joints]
     if watched is None:

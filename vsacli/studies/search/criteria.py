@@ -85,7 +85,7 @@ class Criterion:
         Args:
             joint: the joint.
             driven: motion and torques of its motors.
-            level: the further row, if there is one, scaled likewise.
+            level: the further row, if there is one, scaled in the same way.
             scale: of the cost.
         """
         raise NotImplementedError

@@ -43,8 +43,8 @@ FASTER_SHARE = 0.8
 def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
     """Return the smallest changes after which every step has the margin and keeps every limit.
 
-    Slow-down, constant change and other profile of the stiffness each by itself; and remedies to choose from,
-    which combine them, also with another preload. Each is recomputed over all steps and confirmed.
+    Slow-down, constant change and other profile of the stiffness each on its own, and combinations of them to
+    choose from, also with another preload. Each is recomputed over all steps and confirmed.
 
     Args:
         robot: the robot.
@@ -54,7 +54,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     Raises:
         InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is no
             possible margin.
-        TypeError: robot or trajectory is none.
+        TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
     check_near_singular(near_singular)
@@ -244,7 +244,7 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
 
 
 def is_fixable(task: Task, index: int) -> bool:
-    """Return whether a joint by itself can be fixed, by any kind of change."""
+    """Return whether a joint on its own can be fixed, by any kind of change."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
     if CombinedSearch(alone, preloads=True).smallest() is not None:

@@ -211,7 +211,7 @@ MARGIN_FACTORS = (1, 2, 4, 8)
 """Multiples of the margin tried where motor limits refuse the nearest profile: torques grow with 1/margin."""
 
 SMOOTHING_FACTORS = (1, 2, 4, 8)
-"""Multiples of the smoothing time tried likewise: torques grow with the second derivative."""
+"""Multiples of the smoothing time tried in the same way: torques grow with the second derivative."""
 
 CLEARANCE = 1e-6
 """Share of the largest change by which a profile keeps clear of its bounds, so that rounding crosses none."""
@@ -255,7 +255,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
         acceptance: the rule.
         joint: the joint, at least one of whose steps is refused.
         load: its steps and instants between them, all of which are to be accepted.
-        constant: the constant that mends the joint, if there is one.
+        constant: the constant that fixes the joint, if there is one.
 
     Raises:
         ImpossibleError: with the reason.

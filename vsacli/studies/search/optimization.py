@@ -73,7 +73,7 @@ def optimize(
         robot: the robot.
         trajectory: for this robot.
         minimize: "torque" (rms of the motor torques), "energy" (that the motors spend), "copper" (heat in
-            their windings) or "peak" (of the motor torques), of each joint by itself, or of all
+            their windings) or "peak" (of the motor torques), of each joint on its own, or of all
             together where the timing varies; or "time".
         vary: "stiffness", "timing" or "both"; for "time" one of the latter.
         margin: min(sigma - lower, upper - sigma)/sigma that every step shall have.

@@ -88,7 +88,7 @@ class PacedSearch:
         self._scale = self._span[1]
 
     def _spaces(self, pieces: int) -> PacedSpaces:
-        """Return the splines of so many pieces among which is searched."""
+        """Return the splines of this many pieces among which is searched."""
         raise NotImplementedError
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
@@ -170,7 +170,7 @@ class PacedSearch:
         return None
 
     def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
-        """Return the pace by itself, and each joint, at some instants."""
+        """Return the pace on its own, and each joint, at some instants."""
         s = self._s[instants]
         pace = spaces.rows(None, s, PACE_ORDERS)
         of_pace = Pace(self._motion.resting, self._scale)

@@ -221,7 +221,7 @@ GRID_ROUNDING = 1e-6
 
 
 def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
-    """Return the constant closest to zero that mends a joint, N m/rad (N/m).
+    """Return the constant closest to zero that fixes a joint, N m/rad (N/m).
 
     Where only the corridor and the limits of stiffness and deflection are at stake, its bounds are closed;
     for the limits of the motors it is a scan outward in steps of 1 % of the stiffness, then bisection.
@@ -250,7 +250,7 @@ def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     """Return the constant that makes a joint as soft as load and stiffness limit admit, N m/rad (N/m).
 
     Raises:
-        ImpossibleError: no stiffness mends the joint.
+        ImpossibleError: no stiffness fixes the joint.
     """
     asked = load.command.commanded["stiffness"]
     rise = checked_range(acceptance, joint, load).low - asked

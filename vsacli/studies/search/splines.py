@@ -40,7 +40,7 @@ class SplineSpace:
     def at_rest(
         cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
     ) -> SplineSpace:
-        """Splines of so many equal pieces whose first two derivatives vanish at both ends.
+        """Splines of this many equal pieces whose first two derivatives vanish at both ends.
 
         They vanish where the first three coefficients are equal.
 
@@ -57,7 +57,7 @@ class SplineSpace:
 
     @classmethod
     def free(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
-        """Splines of so many equal pieces, whatever they do at the ends."""
+        """Splines of this many equal pieces, whatever they do at the ends."""
         knots = cls.at_rest(span, pieces).knots
         return cls(knots, np.eye(pieces + DEGREE))
 
@@ -65,7 +65,7 @@ class SplineSpace:
     def periodic(
         cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
     ) -> SplineSpace:
-        """Splines of so many equal pieces that go on at the end as they begin; see `at_rest`."""
+        """Splines of this many equal pieces that go on at the end as they begin; see `at_rest`."""
         ends = _ends(span, pieces, allowed)
         pieces, period = len(ends) - 1, span[1] - span[0]
         turns, places = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
@@ -97,7 +97,7 @@ class SplineSpace:
         return replace(self, shapes=self.shapes @ null_space(integrals[None]), offset=mean)
 
     def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
-        """Return a spline that goes on at the end as it begins, passed so many times."""
+        """Return a spline that goes on at the end as it begins, passed this many times."""
         first, last = self.knots[DEGREE], self.knots[-DEGREE - 1]
         pieces = len(self.shapes) - DEGREE
         whole = self.periodic((first, first + count * (last - first)), count * pieces)
@@ -166,11 +166,11 @@ class Pacing:
     bounding: dict[str, dict[str, float]]
 
     def pace(self, count: int = 1) -> BSpline[np.float64]:
-        """Over the path, a spline whose argument is s; passed so many times if it repeats itself."""
+        """Over the path, a spline whose argument is s; passed this many times if it repeats itself."""
         return self._spline(None, count)
 
     def stiffness(self, count: int = 1) -> dict[int, BSpline[np.float64]]:
-        """Likewise of the joints where it varies, by index."""
+        """Return the same of the joints where it varies, by index."""
         return {key: self._spline(key, count) for key in self.splines if key is not None}
 
     def stiffness_at(self, s: FloatArray) -> dict[int, FloatArray]:
@@ -206,7 +206,7 @@ class Rows(NamedTuple):
 def of_rows(
     functions: Functions, instants: IndexArray, rows: Rows, weights: FloatArray, bounds: int
 ) -> Group:
-    """Functions of rows at instants, with so many bounds at each of them."""
+    """Functions of rows at instants, with this many bounds at each of them."""
     there = np.ones((bounds, len(instants)), dtype=np.bool_)
     return Group(functions, instants, rows.basis, rows.places, weights, there, rows.scales, rows.offsets)
 

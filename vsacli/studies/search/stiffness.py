@@ -214,7 +214,7 @@ class Profile:
 
 
 Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
-"""The splines over a span of so many pieces, which begin and end at some of these times."""
+"""The splines over a span of this many pieces, which begin and end at some of these times."""
 
 
 class _Attempt(NamedTuple):

@@ -98,7 +98,7 @@ def least_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Combination:
-    """Changes that together mend a motion.
+    """Changes that together fix a motion.
 
     Attributes:
         factor: of the slow-down, at least 1.
@@ -266,7 +266,7 @@ class Task:
         return with_kept_rate(declared, factor, rate_of(self.trajectory))
 
     def constants(self) -> Combination:
-        """Return the smallest constant changes of stiffness that mend the task by themselves.
+        """Return the smallest constant changes of stiffness that fix the task by themselves.
 
         Raises:
             ImpossibleError: there is none for some joint.

@@ -43,7 +43,7 @@ class Effects:
     Attributes:
         peak: largest |tau_motor| of each joint, (joints,).
         largest: largest |change of tau_motor| of each joint by each parameter's step, (parameters, joints).
-        time, motor: when, s, and of which motor, 1 or 2; likewise.
+        time, motor: when, s, and of which motor, 1 or 2; as above.
         smallest: the smallest margins.
         spent: change of the energy that the motors spend by each parameter's step, (parameters, joints), J.
         failed: how many steps of joints are infeasible or singular.
@@ -144,7 +144,7 @@ def sensitivity(
         seed: of these draws.
 
     Raises:
-        InputError: the trajectory does not fit the robot, a pattern fits no number, or a tolerance is none.
+        InputError: the trajectory does not fit the robot, a pattern fits no number, a tolerance is invalid.
     """
     return analysed(SensitivityRun(robot, trajectory, parameters), tolerances, runs=runs, seed=seed)
 
@@ -169,7 +169,7 @@ def analysed(
         keep: gets the derivatives, block by block.
 
     Raises:
-        InputError: a tolerance is none.
+        InputError: a tolerance is invalid.
     """
     robot, given = run.robot, None if tolerances is None else tolerances_of(tolerances, run.parameters)
     steps = np.array([step_of(each) for each in run.parameters])

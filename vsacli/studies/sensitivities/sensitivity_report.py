@@ -81,7 +81,7 @@ class Sensitivity(Published):
     Attributes:
         robot, trajectory: names of both.
         verdict: on the run with the numbers as they are: ok, over_limit, singular or infeasible.
-        failed: how many of its steps are infeasible or singular, each joint by itself, and do not count.
+        failed: how many of its steps are infeasible or singular, each joint on its own, and do not count.
         parameters: the numbers, the most important first.
         band: effect of tolerances on each joint, by name; empty if none were given.
         curves: motor torques and their deviations; None without tolerances, and not in JSON.

@@ -154,7 +154,7 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
         unit: of it.
 
     Raises:
-        InputError: it is none.
+        InputError: it is invalid.
     """
     if not isinstance(node, tree.Mapping) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")

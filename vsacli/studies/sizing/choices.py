@@ -227,7 +227,7 @@ def coupled_choices(
     Args:
         joint: with a coupled inertia.
         first: choices for motor 1, the best first.
-        second: choices for motor 2, likewise.
+        second: choices for motor 2, as above.
         motors: of the catalogue by name.
         criterion: by which they are sorted.
 

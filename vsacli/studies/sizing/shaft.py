@@ -35,7 +35,7 @@ class Shaft(NamedTuple):
         backward, forward: dry friction while the joint side moves that way.
         offset: torque that is added.
         max_torque: of peaks, as far as torque and current go.
-        continuous_torque: of the root mean square, likewise.
+        continuous_torque: of the root mean square, as above.
         max_velocity: of the shaft.
         max_voltage: of the windings.
         torque_constant: torque over current; NaN if it is not known.

@@ -138,7 +138,7 @@ class Recorder:
 
     Args:
         kept: the variables.
-        every: of so many steps one is kept, from the first on.
+        every: of this many steps one is kept, from the first on.
     """
 
     def __init__(self, kept: Sequence[Column], every: int) -> None:

@@ -103,7 +103,7 @@ class Dimension(NamedTuple):
         return self.values[int(share * len(self.values))]
 
     def number(self, value: Any) -> float | None:
-        """Return a value as a number in SI units; None if it is none."""
+        """Return a value as a number in SI units; None if it is not one."""
         try:
             return (
                 float(evaluate(str(value), self.unit or str(ANY_SI_UNIT)))

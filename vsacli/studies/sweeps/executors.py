@@ -41,7 +41,7 @@ TASKS_A_THREAD = 2
 """Given to the cluster at a time: one is computed, the next one waits at the worker."""
 
 CONNECT_SECONDS = 10.0
-"""After which a scheduler that does not answer is none."""
+"""After which a scheduler that does not answer counts as absent."""
 
 CRITICAL = 50
 """The level of messages of Python's `logging` from which on Dask prints its own."""

@@ -59,7 +59,7 @@ def run_study(
     Raises:
         InputError: a file is wrong, or nobody can compute.
         StorageError: the table exists and must not be replaced, or the disk is full or fails.
-        TypeError: path is none.
+        TypeError: path is of another type.
     """
     check_path(path, "run_study(path)")
     study = load_study(path, engine)

@@ -65,7 +65,7 @@ class Spaced(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A distribution, of each number that the path fits by itself; the node is as of `distribution`."""
+    """A distribution, of each number that the path fits on its own; the node is as of `distribution`."""
 
     node: Node
 

@@ -114,7 +114,7 @@ class PolynomialPart(_Timed):
 
 
 class _Standalone(Formula, Part):
-    """A formula that is a part as well: it knows by itself where it begins."""
+    """A formula that is a part as well: it knows on its own where it begins."""
 
     @property
     @abstractmethod

@@ -59,7 +59,7 @@ def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
     """Return whether there is noise that a filter hides from neighbouring samples, (components,).
 
     Differences of every second, fourth, ... sample grow by 2^order each time as long as motion is smooth over
-    so many samples, those of filtered noise by less and less.
+    this many samples, those of filtered noise by less and less.
 
     Args:
         time: (samples,), s.

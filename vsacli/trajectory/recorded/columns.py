@@ -96,7 +96,7 @@ def column_layout(
             of signals that it does not take: such columns are admitted, but not in the layout.
         wanted: signals whose values must be there; their derivatives are optional.
         file: named in errors.
-        line: of the header, likewise.
+        line: of the header, as above.
 
     Raises:
         InputError: all that is wrong with the header.

@@ -251,7 +251,7 @@ def _noticeable(quantization: Quantization, samples: IndexArray) -> FloatArray:
 
 
 def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:
-    """First and last sample of each run of equal values with at least so many steps."""
+    """First and last sample of each run of equal values with at least this many steps."""
     same = np.concatenate(([False], values[1:] == values[:-1], [False]))
     edges = np.flatnonzero(same[1:] != same[:-1])
     first, last = edges[::2], edges[1::2]

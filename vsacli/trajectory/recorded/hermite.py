@@ -105,7 +105,7 @@ def belong_together(time: FloatArray, rows: FloatArray) -> bool:
 
     Args:
         time: as of `interpolated`.
-        rows: likewise; components that are NaN throughout do not count.
+        rows: as above; components that are NaN throughout do not count.
     """
     given = rows[:, ~np.isnan(rows[0]).all(axis=1)]
     peaks = np.abs(given).max(axis=2)

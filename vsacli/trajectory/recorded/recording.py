@@ -262,7 +262,7 @@ def recorded_trajectory(
     Args:
         path: the file.
         joints: as of `read_recording`.
-        progress: likewise.
+        progress: as above.
         rate: samples per second: of the file if it has no times, else of the trajectory.
 
     Raises:

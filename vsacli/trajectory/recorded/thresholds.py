@@ -29,7 +29,7 @@ NOISE_DEVIATIONS = 8.0
 white noise 1e-8 are; the estimate by medians of 64 may be a third too small."""
 
 QUANTA = 4.0
-"""Steps of an encoder likewise: rounding moves a sample by half a step, its prediction by one at most."""
+"""The same for steps of an encoder: rounding moves a sample by half a step, its prediction by one at most."""
 
 FIT_DEVIATIONS = 8.0
 """Deviations of its neighbours from a polynomial through them by which an outlier is off. A kink, a jump or
@@ -78,7 +78,7 @@ HELD_ROWS = 20
 """Rows at most over which a logger that is faster than its sensor repeats each value."""
 
 HELD_SHARE = 0.9
-"""Share of the changes that must come after just so many rows.
+"""Share of the changes that must come after just this many rows.
 
 Those of an encoder at a steady speed do, but they are single steps of it.
 """

@@ -22,7 +22,7 @@ MAX_STEP = 0.1
 """Longest step, as a part of the ranges."""
 
 LEAST_STEP = OfRounding(1e-13, power=0.9)
-"""Length at which a step is none."""
+"""Length at which a step changes nothing."""
 
 LEAST_COSINE = 0.95
 """Smallest cosine of the angle by which the level curve may turn in a step."""
@@ -205,7 +205,7 @@ class LevelCurves:
 
 CLOSE, NEWTON_STEPS = 1e-4, 4
 """Length of Newton's step to a torque and a stiffness, as a part of the ranges and for a sine of one, from
-which on so many steps leave rounding: it is squared by each."""
+which on this many steps leave rounding: it is squared by each."""
 
 LEAST_SINE = OfRounding(1e-8, power=0.5)
 """Sine that is zero; the stiffness then differs from that of the critical point by the square of this."""

@@ -40,7 +40,7 @@ def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
 
 
 def _truncation(of_q: int, of_motors: int, degree: int) -> Truncation:
-    """Derivatives over (q, theta_1, theta_2), at most so many over q, over both motors, and in all."""
+    """Derivatives over (q, theta_1, theta_2), at most this many over q, over both motors, and in all."""
     return Truncation(
         (a, b, c)
         for a in range(of_q + 1)

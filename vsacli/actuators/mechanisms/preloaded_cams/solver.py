@@ -49,7 +49,7 @@ class Piece(NamedTuple):
 
     Attributes:
         outer: at the largest pretension; the stiffness is NaN where the torque cannot be carried.
-        inner: the other end, likewise.
+        inner: the other end, as above.
         at_fold: whether that is a fold.
         sign: 1 where the stiffness falls from the outer to the inner end, else -1.
         curvature: second derivative of the lift at the inner end.

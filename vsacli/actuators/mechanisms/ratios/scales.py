@@ -108,7 +108,7 @@ class ScaleLaw(ABC):
         return increasing_root(missing, low, high, start, (scale,))
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
-        """Why it is none for a range of settings."""
+        """Return why it is invalid for a range of settings."""
         s = np.linspace(*settings, SETTINGS)
         with np.errstate(all="ignore"):
             scale = self.at(s)
