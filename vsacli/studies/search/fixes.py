@@ -84,7 +84,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
 
 
 class _Tried(NamedTuple):
-    """The results of searches by name, the fixes worth choosing, and those that fall short between them."""
+    """Results of searches by name, fixes worth choosing, and those that fall short between samples."""
 
     found: Mapping[str, list[Remedy] | NotPossible]
     chosen: list[Remedy]
