@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -99,6 +99,11 @@ class _Tried(NamedTuple):
             return NotPossible(("what keeps every limit at the steps exceeds one between them",))
         return getattr(found[0], name)
 
+    @staticmethod
+    def slower(fixes: Sequence[Remedy]) -> bool:
+        """Return whether one of some fixes slows the motion down."""
+        return any(each.longer > 0 for each in fixes)
+
 
 def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
     """Search for fixes of the joints that have one; instants at which they fall short join in."""
@@ -108,10 +113,12 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
         return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
     asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
     tried = _searched(asked)
-    if tried.chosen or not isinstance(task.trajectory.times, RecordedTimes):
-        return tried
     # steps between the samples may exceed a limit of the position that these keep, at whatever speed
-    return _searched(replace(asked, keeps_rate=False))
+    lost = not tried.chosen or (tried.slower(tried.failed) and not tried.slower(tried.chosen))
+    if lost and isinstance(task.trajectory.times, RecordedTimes):
+        at_samples = _searched(replace(asked, keeps_rate=False))
+        return at_samples if at_samples.chosen else tried
+    return tried
 
 
 def _searched(asked: Task) -> _Tried:
@@ -124,6 +131,7 @@ def _searched(asked: Task) -> _Tried:
         del searches["transition"]
     found: dict[str, list[Remedy] | NotPossible] = {}
     confirmed: list[Remedy] = []
+    every_failed: list[Remedy] = []
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
         task = replace(asked, acceptance=rule)
@@ -134,7 +142,8 @@ def _searched(asked: Task) -> _Tried:
                 found[name] = NotPossible(error.reasons)
         by_search = {name: each for name in searches if isinstance(each := found[name], list)}
         chosen, failed, short = _worth_choosing(chain(*by_search.values()), asked, confirmed)
-        tried = _Tried(dict(found), chosen, failed)
+        every_failed.extend(failed)
+        tried = _Tried(dict(found), chosen, every_failed)
         for name, remedies in by_search.items():
             if any(each is other for each in remedies for other in failed):
                 del found[name]
