@@ -26,15 +26,22 @@ def motion(arm):
     return load_trajectory(REST_TO_REST, arm)
 
 
-def test_rates_along_a_path_are_those_of_the_composition():
-    """Of sin(s) with s = t + t^2: the pace dt/ds and its derivatives by s, and what SymPy differentiates."""
+@pytest.mark.parametrize(
+    ("of_time", "time"), [("t + t**2", "(sqrt(1 + 4*s) - 1)/2"), ("exp(t) - 1", "log(1 + s)")]
+)
+def test_rates_along_a_path_are_those_of_the_composition(of_time, time):
+    """Of sin(s): the pace dt/ds and its derivatives by s, and what SymPy differentiates.
+
+    Along t + t^2 the speed's square is linear in s, so that a term of its third derivative vanishes.
+    """
     t, s = sympy.symbols("t s", positive=True)
     at = 0.7
-    time_of_s = (sympy.sqrt(1 + 4 * s) - 1) / 2
-    pace = [float(sympy.diff(time_of_s, s, order + 1).subs(s, at + at**2)) for order in range(PACE_ORDERS)]
-    by_s = [float(sympy.diff(sympy.sin(s), s, order).subs(s, at + at**2)) for order in range(5)]
+    along, passed = sympy.sympify(of_time, {"t": t}), sympy.sympify(time, {"s": s})
+    place = along.subs(t, at)
+    pace = [float(sympy.diff(passed, s, order + 1).subs(s, place)) for order in range(PACE_ORDERS)]
+    by_s = [float(sympy.diff(sympy.sin(s), s, order).subs(s, place)) for order in range(5)]
     rates = Speeds.of(pace).rates(by_s)
-    expected = [float(sympy.diff(sympy.sin(t + t**2), t, order).subs(t, at)) for order in range(5)]
+    expected = [float(sympy.diff(sympy.sin(along), t, order).subs(t, at)) for order in range(5)]
     np.testing.assert_allclose(rates, expected, rtol=1e-12)
 
 
