@@ -1,7 +1,8 @@
 """Write the generated parts of README.md and of the pages in docs/ from the code.
 
-python docs/generate.py            rewrites the parts and draws the images
-python docs/generate.py --check    changes nothing; exit code 1 if a part is stale
+python docs/generate.py                     rewrites the parts and draws the images
+python docs/generate.py --check             changes nothing; exit code 1 if a part is stale
+python docs/generate.py --examples [PAGE]   runs the examples of pages, and shows what they print now
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import click
 from click.testing import CliRunner
 from field_tables import record_sections, table, variant_sections
 from noise_study import table_rows
+from page_examples import renewed
 from page_images import draw_images
 from python_names import public_names
 
@@ -315,6 +317,11 @@ def main() -> int:
         for page in (outdated := stale()):
             print(f"{page}: generated parts are stale; run python docs/generate.py", file=sys.stderr)
         return 1 if outdated else 0
+    if "--examples" in sys.argv[1:]:
+        chosen = [Path(name) for name in sys.argv[2:]] or PAGES
+        for page in chosen:
+            page.write_text(renewed(page), encoding="utf-8")
+        return 0
     for page in PAGES:
         page.write_text(regenerated(page.read_text(encoding="utf-8")), encoding="utf-8")
     draw_images(PAGES)

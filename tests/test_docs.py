@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-import os
 import re
-import shutil
 import subprocess
 import sys
-import sysconfig
 import tomllib
 from collections.abc import Iterator
-from itertools import takewhile
 from pathlib import Path
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
+import generate
 import h5py
+import page_examples
 import pytest
+from page_examples import PRINTED, blocks, commands, comparable, copy_examples, run_shell
 from samples.command_line import installed
 from samples.marks import slow
 
@@ -43,95 +41,25 @@ LONG = (
 )
 """Pages whose examples take more than half a second."""
 
-SAVED_AS = re.compile(r"Save as `(\S+)`:$")
 EXIT_CODE = re.compile(r"# exit code (\d+)$")
-SETTING_UP = re.compile(r"-m venv|pip install")
-HELP_EXAMPLE = re.compile(r"^ +(vsacli .*)$", re.MULTILINE)
-PRINTED = re.compile(r"^ *print\(.*?\)(?:  # ([^:\n]*)[^\n]*)?$", re.MULTILINE)
-"""Statements that print, and what they print if a comment says so."""
-
-ROUNDING = re.compile(r"self-check passed \(\S+,")
-"""What of a report differs between machines."""
-
-
-class Block(NamedTuple):
-    """A fenced block of a page, and the line of text before it."""
-
-    before: str
-    language: str
-    text: str
-
-
-def blocks(page: Path) -> list[Block]:
-    text = page.read_text(encoding="utf-8")
-    found = re.finditer(r"(?:^([^\n]*)\n\n?)?^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    return [Block(match[1] or "", match[2], match[3]) for match in found]
-
-
-def commands(block: Block) -> Iterator[str]:
-    """The shell lines of a block that run vsacli, without the making of an environment."""
-    if block.language == "text":
-        yield from HELP_EXAMPLE.findall(block.text.partition("Example:")[2])
-    elif block.language == "sh" and re.search(r"\bvsacli ", block.text):
-        for line in block.text.splitlines():
-            parts = [part for part in line.split(" && ") if not SETTING_UP.search(part)]
-            yield from [" && ".join(parts).replace(".venv/bin/", "")] if parts else []
 
 
 def named(page: Path) -> str:
     return page.name
 
 
-@pytest.fixture(scope="module")
-def generate() -> ModuleType:
-    """The script that writes the generated parts."""
-    sys.path.insert(0, str(REPOSITORY / "docs"))
-    try:
-        return importlib.import_module("generate")
-    finally:
-        sys.path.remove(str(REPOSITORY / "docs"))
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with what a clone shows."""
-    for name in ("robots", "trajectories"):
-        shutil.copytree(REPOSITORY / name, tmp_path / name)
+    copy_examples(tmp_path)
     return tmp_path
 
 
-def run_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
-    return subprocess.run(
-        ["sh", "-c", line],
-        cwd=folder,
-        env={**os.environ, "PATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def made_on_other_pages(folder: Path) -> None:
-    """What help texts take for granted: studies, motors, and the record that is identified."""
-    for name in ("identification.md", "sizing.md", "studies.md"):
-        for block in blocks(REPOSITORY / "docs" / name):
-            if saved := SAVED_AS.search(block.before):
-                (folder / saved[1]).write_text(block.text)
-    making = [line for block in blocks(REPOSITORY / "docs" / "identification.md") for line in commands(block)]
-    for line in takewhile(lambda line: not line.startswith("vsacli identify"), making):
-        assert run_shell(line, folder).returncode == 0
-
-
-def comparable(report: str) -> str:
-    return ROUNDING.sub("self-check passed (,", report).strip()
-
-
-def test_generated_parts_are_up_to_date(generate: ModuleType) -> None:
+def test_generated_parts_are_up_to_date() -> None:
     assert generate.stale() == [], "run python docs/generate.py"
 
 
-def test_a_stale_part_is_noticed(generate: ModuleType, tmp_path: Path) -> None:
+def test_a_stale_part_is_noticed(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- generated: exit-codes -->\nold\n<!-- end of generated part -->\nafter\n")
     assert generate.stale([page]) == [page]
@@ -141,7 +69,15 @@ def test_a_stale_part_is_noticed(generate: ModuleType, tmp_path: Path) -> None:
     assert "old" not in page.read_text()
 
 
-def test_every_part_has_its_place(generate: ModuleType) -> None:
+def test_a_stale_example_is_renewed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```sh\nvsacli --version\n```\n\n```text\nvsacli none\n```\n\nend\n")
+    assert page_examples.renewed(page) == page.read_text().replace("none", vsacli.__version__)
+    page.write_text("```python\nprint(3)  # 3\nprint(4)\n```\n\n```text\n5\n```\n")
+    assert page_examples.renewed(page) == page.read_text().replace("\n5", "\n4")
+
+
+def test_every_part_has_its_place() -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert {match["name"] for match in generate.PART.finditer(text)} == generate.PARTS.keys()
 
@@ -150,10 +86,10 @@ def test_every_part_has_its_place(generate: ModuleType) -> None:
 def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
     printed: tuple[str, ...] = ()
     if page.name == "cli.md":
-        made_on_other_pages(folder)
+        page_examples.make_files_of_other_pages(folder)
     for block in blocks(page):
-        if saved := SAVED_AS.search(block.before):
-            (folder / saved[1]).write_text(block.text)
+        if block.saved_as:
+            (folder / block.saved_as).write_text(block.text)
         if block.language == "text" and printed:
             assert block.text.strip()
             assert comparable(block.text) in printed
