@@ -27,6 +27,7 @@ from python_names import public_names
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import LAWS
 from vsacli.base.flags import Flag
+from vsacli.base.renamed import RENAMINGS
 from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
@@ -270,6 +271,14 @@ def _cost(name: str) -> tuple[str, ...]:
     )
 
 
+def renamings() -> str:
+    """Names that changed before version 0.1."""
+    return table(
+        ("kind", "now", "before", "place"),
+        ((each.kind, f"`{each.new}`", f"`{each.old}`", each.place) for each in RENAMINGS),
+    )
+
+
 def noise_study() -> str:
     """Error of the fourth derivative over rate and noise of a record."""
     header = ("samples", "noise", "knots", "doubtful at each end", "error of d4q, `lsq`", "`interpolate`")
@@ -297,6 +306,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "public-names": public_names,
     "variables": variables,
     "flags": flags,
+    "renamings": renamings,
 }
 
 

@@ -111,7 +111,8 @@ def renewed(page: Path) -> str:
 
 def _outputs(page: Path, folder: Path) -> dict[tuple[int, int], str]:
     """Return what stale blocks of a page should show, by place."""
-    found, printed = {}, []
+    found: dict[tuple[int, int], str] = {}
+    printed: list[str] = []
     for block in blocks(page):
         if block.saved_as:
             (folder / block.saved_as).write_text(block.text)

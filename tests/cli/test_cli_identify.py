@@ -41,7 +41,7 @@ def test_the_file_written_is_that_of_the_robot_found(vsacli: Command, record: Pa
     )
     assert found.code == 0
     report = json.loads(found.out)
-    assert report["format"] == "vsacli-identification/1"
+    assert report["format"] == "vsacli-identification/2"
     assert report["verdict"] == "ok"
     numbers = {number["path"]: number for system in report["systems"] for number in system["numbers"]}
     fitted = load_robot("fitted.yaml")

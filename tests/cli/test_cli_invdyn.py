@@ -102,7 +102,7 @@ def test_json_is_all_there_is_on_stdout(vsacli, tmp_path, too_soft):
     done = vsacli("invdyn", ROBOT, too_soft, "--json")
     report = json.loads(done.out)
     assert done.code == 3
-    assert report["format"] == "vsacli-report/1"
+    assert report["format"] == "vsacli-report/2"
     assert [joint["name"] for joint in report["joints"]] == ["base", "shoulder", "elbow"]
     with h5py.File(tmp_path / "vsa_3r-soft.h5") as file:
         assert json.loads(file["report/json"].asstr()[()]) == report

@@ -37,7 +37,7 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
     assert done.out.splitlines()[0].startswith("vsa-3r, rest-to-rest: feedforward, 1 s")
     assert done.err == "wrote vsa_3r-quick-simulation.h5\n"
     with StoredSimulation.open(tmp_path / "vsa_3r-quick-simulation.h5") as stored:
-        assert stored.attributes["format"] == "vsacli-simulation/1"
+        assert stored.attributes["format"] == "vsacli-simulation/2"
         assert (stored.verdict, stored.complete, stored.samples) == ("ok", True, 26)
         declared = [name for name, each in SIMULATION_VARIABLES.items() if each.requires in OF_ANY_ROBOT]
         assert list(stored.variables) == [name for name in declared[1:] if not name.endswith("_measured")]
@@ -209,6 +209,6 @@ def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
 def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with pytest.raises(
-        InputError, match=r"is a simulation \(vsacli-simulation/1\), expected a result \(vsacli-result/1\)"
+        InputError, match=r"is a simulation \(vsacli-simulation/2\), expected a result \(vsacli-result/2\)"
     ):
         StoredResult.open(tmp_path / "s.h5")

@@ -35,7 +35,7 @@ def test_a_list_of_gears_and_several_motions_as_json(vsacli, motors, motion):
     )
     assert done.code == 0, done.err
     report = json.loads(done.out)
-    assert report["format"] == "vsacli-sizing/1"
+    assert report["format"] == "vsacli-sizing/2"
     assert [each["trajectory"] for each in report["trajectories"]] == ["rest-to-rest", "rest-to-rest-soft"]
     assert {each["choices"][0]["ratio"] for each in report["motors"][:2]} == {120}
     assert {each["choices"][0]["ratio"] for each in report["motors"][2:]} <= {50, 80}

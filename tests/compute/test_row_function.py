@@ -59,7 +59,7 @@ def test_rows_are_used_again():
 
 
 @pytest.mark.parametrize("samples", [1, 7, 64, 12288, 20000])
-@pytest.mark.parametrize("dtype", [np.float64, np.uint16, np.bool_])
+@pytest.mark.parametrize("dtype", [np.float64, np.uint32, np.bool_])
 def test_rows_of_the_workspace_begin_at_whole_vectors_in_different_sets_of_a_cache(samples, dtype):
     rows = aligned_rows(5, samples, dtype)
     assert rows.shape == (5, samples)

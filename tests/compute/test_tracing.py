@@ -142,7 +142,7 @@ def test_a_value_does_not_become_a_number(row: TracedArray) -> None:
         (lambda x: np.spacing(x), "the operation spacing cannot be recorded"),
         (lambda x: np.searchsorted(NODES, x), "side='right' only"),
         (lambda x: x.astype(np.int64), "no conversion"),
-        (lambda x: np.where(x > 0, np.uint16(1), np.uint16(2)), "set or not"),
+        (lambda x: np.where(x > 0, np.uint32(1), np.uint32(2)), "set or not"),
         (lambda x: (x > 0) + x, "different kinds"),
         (lambda x: (x > 0) * 2.0, "truth"),
         (lambda x: np.searchsorted(NODES, x, side="right") * 0.5, "whole"),

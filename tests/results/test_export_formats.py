@@ -102,7 +102,7 @@ def test_parquet_has_the_columns_of_the_csv_bit_for_bit(stored):
     np.testing.assert_array_equal(table["j1.q"], block.q[:, 1])
     np.testing.assert_array_equal(table["j0.tau_motor_2"], block.tau_motor[:, 0, 1])
     assert table["j1.flags"].to_pylist() == block.flags[:, 1].tolist()
-    assert str(table.schema.field("j1.flags").type) == "uint16"
+    assert str(table.schema.field("j1.flags").type) == "uint32"
 
 
 def test_parquet_says_units_and_where_it_comes_from(stored):

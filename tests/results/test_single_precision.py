@@ -25,7 +25,7 @@ def test_values_are_rounded_but_times_and_flags_are_not(tmp_path: Path) -> None:
     with h5py.File(path) as file:
         assert file.attrs["precision"] == "single"
         for name in STORED:
-            kind = {"time": np.float64, "flags": np.uint16}.get(name, np.float32)
+            kind = {"time": np.float64, "flags": np.uint32}.get(name, np.float32)
             np.testing.assert_array_equal(file[name][...], getattr(block, name).astype(kind), strict=True)
     with StoredResult.open(path) as result:
         theta = result.read("theta")

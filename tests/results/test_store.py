@@ -80,7 +80,7 @@ def test_root_attributes(path):
     with h5py.File(path) as file:
         attributes = dict(file.attrs)
     assert next(iter(attributes)) == "format"
-    assert attributes["format"] == "vsacli-result/1"
+    assert attributes["format"] == "vsacli-result/2"
     assert attributes["generated_by"].startswith("vsacli ")
     assert attributes["command_line"] == "vsacli invdyn é"
     assert set(json.loads(attributes["versions"])) == {"vsacli", "python", "numpy", "scipy", "h5py"}
@@ -125,7 +125,7 @@ def test_units_follow_the_joint_types(tmp_path, block, kinds, expected):
 def test_flags_explain_themselves_as_cf_asks(path):
     with h5py.File(path) as file:
         attributes = file["flags"].attrs
-        assert attributes["flag_masks"].dtype == file["flags"].dtype == np.uint16
+        assert attributes["flag_masks"].dtype == file["flags"].dtype == np.uint32
         assert attributes["flag_masks"].tolist() == [2**bit for bit in range(15)]
         assert attributes["flag_meanings"].split() == [flag.label for flag in Flag]
 

@@ -24,7 +24,7 @@ def foreign(path):
 
 def newer(path):
     with h5py.File(path, "r+") as file:
-        file.attrs["format"] = "vsacli-result/2"
+        file.attrs["format"] = "vsacli-result/3"
 
 
 def without_report(path):
@@ -52,8 +52,11 @@ def folder(path):
         (folder, "is a folder; expected a result file"),
         (lambda path: path.write_bytes(b""), "is empty; expected a result file"),
         (lambda path: path.write_bytes(b"format: x"), "is not an HDF5 file; expected a result file"),
-        (foreign, "no result file: it has no attribute format = 'vsacli-result/1'"),
-        (newer, "has the format vsacli-result/2, but this version reads vsacli-result/1; run invdyn again"),
+        (foreign, "no result file: it has no attribute format = 'vsacli-result/2'"),
+        (
+            newer,
+            "has the format vsacli-result/3, but this version reads vsacli-result/2; run invdyn again",
+        ),
         (truncated, r"is damaged or truncated \(.*truncated file.*\); compute it again"),
         (without_report, r"is damaged or truncated \(.*not found.*\); compute it again"),
     ],

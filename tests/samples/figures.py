@@ -79,7 +79,7 @@ def rest_to_rest(
         "tau_motor": tau_motor,
         "stiffness_lower": lower,
         "stiffness_upper": np.full_like(lower, np.inf),
-        "flags": infeasible.astype(np.uint16),
+        "flags": infeasible.astype(np.uint32),
     }
     return Result(time, types, **{**values, **options})
 

@@ -13,7 +13,7 @@ from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray, cells_of
 Values = list[Any]
 
 MEANING: dict[str, Callable[..., Any]] = {
-    "bits": lambda truth, mask: np.where(truth, np.uint16(mask), np.uint16(0)),
+    "bits": lambda truth, mask: np.where(truth, np.uint32(mask), np.uint32(0)),
     "searchsorted": lambda table, values: np.searchsorted(table.values, values, side="right"),
     "take": lambda table, index: np.asarray(table.values)[index],
 }

@@ -26,7 +26,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.profile import WrenchProfile
 
-REPORT = {"format": "vsacli-report/1", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
+REPORT = {"format": "vsacli-report/2", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
 SOURCE = Source("robots/two.yaml", "0" * 64, "name: two\n# °\n")
 
 PUSH = WrenchProfile(Constant(signal=WRENCH, span=(0.0, 1.0), value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "base")
@@ -79,7 +79,7 @@ def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:
     def values(name: str) -> np.ndarray:
         dims = VARIABLES[name].dims
         if name == "flags":
-            return generator.integers(0, 1024, (joints, samples)).astype(np.uint16).T
+            return generator.integers(0, 1024, (joints, samples)).astype(np.uint32).T
         length = {"joint": joints, "motor": 2, "wrench_axis": 6}
         shape = (*(length[dim] for dim in dims), samples)
         return np.moveaxis(generator.standard_normal(shape), -1, 0)

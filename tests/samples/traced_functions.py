@@ -48,7 +48,7 @@ ELEMENTWISE: dict[str, Callable[[Any, Any], Any]] = {
     "clip": lambda x, _y: np.clip(x, -0.5, 2.0),
     "clip between values": lambda x, y: np.clip(x, y, 2 * y),
     "search": lambda x, _y: np.searchsorted(NODES, x, side="right"),
-    "bits": lambda x, y: (x < y).astype(np.uint16) * np.uint16(4) | (y < 0).astype(np.uint16) * np.uint16(16),
+    "bits": lambda x, y: (x < y).astype(np.uint32) * np.uint32(4) | (y < 0).astype(np.uint32) * np.uint32(16),
     "any": lambda x, y: np.logical_or.reduce(np.stack([x < y, y < 0])),
     "hypot of NaN": lambda x, _y: np.hypot(x, np.nan),
     "sign of NaN": lambda x, _y: np.copysign(x, np.nan),

@@ -272,7 +272,7 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     assert began in page.text
     assert hashlib.sha256((tmp_path / "m.csv").read_bytes()).hexdigest() in page.text
     report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--begins-at", str(BEGIN)).out)
-    assert report["format"] == "vsacli-comparison/1"
+    assert report["format"] == "vsacli-comparison/2"
     assert (report["begins_at"], report["found"], len(report["signals"])) == (BEGIN, False, 15)
 
 

@@ -171,7 +171,7 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
     )
     assert done.code == 0
     found = json.loads(done.out)
-    assert (found["format"], found["possible"]) == ("vsacli-optimum/1", True)
+    assert (found["format"], found["possible"]) == ("vsacli-optimum/2", True)
     assert [drawn.name for drawn in Path("figures").iterdir()] == ["vsa_3r-rest_to_rest-optimum.png"]
     result = inverse_dynamics(arm, load_trajectory("best.yaml", arm))
     assert result.report.verdict == "ok"

@@ -57,7 +57,7 @@ def fine_joints(robot, motion):
     block = compute_block(robot, motion)
     room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
     narrow = room / block.stiffness < MARGIN - ROUNDING
-    bad = narrow | ((block.flags & ~np.uint16(Flag.NEAR_SINGULAR)) != 0)
+    bad = narrow | ((block.flags & ~np.uint32(Flag.NEAR_SINGULAR)) != 0)
     return ~np.any(bad, axis=0)
 
 

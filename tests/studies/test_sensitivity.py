@@ -123,7 +123,7 @@ def test_json_has_every_number(vsacli, tmp_path):
     report = json.loads(
         vsacli("sensitivity", ROBOT, "coarse.yaml", "--json", "--parameters", "joints.*.actuator.*").out
     )
-    assert report["format"] == "vsacli-sensitivity/1"
+    assert report["format"] == "vsacli-sensitivity/2"
     assert {each["path"].split(".")[2] for each in report["parameters"]} == {"actuator"}
     assert len(report["parameters"]) == 12
     assert set(report["parameters"][0]["joints"]["shoulder"]) == {
@@ -167,7 +167,7 @@ def test_the_file_has_the_derivatives_over_time(vsacli, tmp_path, arm):
     assert done.code == 0
     (part,) = SensitivityRun(arm, motion, ["joints.elbow.*"])
     with h5py.File(tmp_path / "s.h5") as file:
-        assert file.attrs["format"] == "vsacli-sensitivity/1"
+        assert file.attrs["format"] == "vsacli-sensitivity/2"
         assert file.attrs["verdict"] == json.loads(done.out)["verdict"] == "ok"
         paths = file["parameter"].asstr()[...].tolist()
         values = dict(zip(paths, file["parameter_value"][...].tolist(), strict=True))

@@ -130,7 +130,7 @@ class Elastic(Actuator):
             ddtheta=command.ddq + command.ddtau_e / stiffness,
             tau_spring=command.tau_e,
             elastic_energy=phi * command.tau_e / 2,
-            flags=np.zeros(command.q.shape, dtype=np.uint16),
+            flags=np.zeros(command.q.shape, dtype=np.uint32),
         )
 
     def _nonlinear(self, command: Command) -> OfJoint:

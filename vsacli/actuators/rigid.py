@@ -55,7 +55,7 @@ class Rigid(Actuator):
             ddtheta=command.ddq,
             tau_spring=command.tau_e,
             elastic_energy=still * command.tau_e / 2,
-            flags=np.zeros(still.shape, dtype=np.uint16),
+            flags=np.zeros(still.shape, dtype=np.uint32),
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:

@@ -113,7 +113,7 @@ class Between:
         self._trajectory, self._compute, self._judged = trajectory, compute, judged
         self._joints = len(robot.joints)
         self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
-        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=np.uint16)
+        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=np.uint32)
         self._flagged = np.array([0.0 if quantity.limit else near_singular for quantity in self.quantities])
         self._lowest = [np.empty(0)] * len(self.quantities)
         self._least_at_steps = np.full(len(self.quantities), np.inf)

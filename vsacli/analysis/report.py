@@ -48,7 +48,7 @@ class Report(Stored):
     drifts: tuple[JointDrift, ...] = ()
     fits: tuple[dict[str, Any], ...] = ()
 
-    format: ClassVar = "vsacli-report/1"
+    format: ClassVar = "vsacli-report/2"
     shape: ClassVar = {
         **named("format", "verdict", "robot", "trajectory", "samples", "duration", "complete"),
         **named("warnings", "notes", "fits", "self_check"),

@@ -114,7 +114,7 @@ class RunUncertainty:
     def _judge_limits(self, block: Block, index: int) -> None:
         """Take the bits of limits away where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
-        seen, exceeded = np.zeros((2, len(block.time)), dtype=np.uint16)
+        seen, exceeded = np.zeros((2, len(block.time)), dtype=np.uint32)
         for check in limit_checks(joint):
             seeming, known = check.flags(values), check.flags(values, check.allowance(values))
             seen |= seeming

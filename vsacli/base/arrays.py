@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _AnyShape = tuple[Any, ...]
 FloatArray = np.ndarray[_AnyShape, np.dtype[np.float64]]
 BoolArray = np.ndarray[_AnyShape, np.dtype[np.bool_]]
-FlagArray = np.ndarray[_AnyShape, np.dtype[np.uint16]]
+FlagArray = np.ndarray[_AnyShape, np.dtype[np.uint32]]
 IndexArray = np.ndarray[_AnyShape, np.dtype[np.intp]]
 AnyArray = np.ndarray[_AnyShape, np.dtype[Any]]
 

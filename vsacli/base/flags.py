@@ -88,13 +88,13 @@ LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 
 def has(flags: FlagArray, bits: Flag) -> BoolArray:
     """Return where any of the bits is set."""
-    hit: BoolArray = (flags & np.uint16(bits)) != 0
+    hit: BoolArray = (flags & np.uint32(bits)) != 0
     return hit
 
 
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
     """Return the bit where it shall be set, else 0."""
-    return where.astype(np.uint16) * np.uint16(flag)
+    return where.astype(np.uint32) * np.uint32(flag)
 
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:

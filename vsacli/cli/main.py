@@ -15,6 +15,7 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
+from vsacli.base.renamed import successor
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
@@ -129,6 +130,7 @@ def run(arguments: Sequence[str]) -> int:
         with reporting_stdout_errors():
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
     except click.ClickException as error:
+        _name_successor(error)
         shown = io.StringIO()
         error.show(shown)
         return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
@@ -150,6 +152,14 @@ def run(arguments: Sequence[str]) -> int:
         lines = traceback.format_exc()
         return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
     return int(code or Exit.OK)
+
+
+def _name_successor(error: click.ClickException) -> None:
+    """Let the error of an unknown option name the option that it is called now."""
+    if isinstance(error, click.NoSuchOption) and error.ctx:
+        options = [name for each in error.ctx.command.params for name in each.opts]
+        if new := successor(error.option_name, options):
+            error.message, error.possibilities = f"{error.option_name} is now {new}.", None
 
 
 def _interrupted(ended: Interrupted) -> int:

@@ -246,7 +246,7 @@ def block_of(
         rows[name] = np.ascontiguousarray(of_joints)
     found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
     computed = {name: over_time(array) for name, array in found.items()}
-    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint16)}
+    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint32)}
     return kernel.block(**arrays)
 
 

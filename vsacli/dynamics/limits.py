@@ -43,7 +43,7 @@ def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
 
     Something is beyond a limit there, but nothing by more than is allowed at most.
     """
-    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=np.uint16)
+    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=np.uint32)
     for check in limit_checks(joint):
         if check.variable in of_joint:
             beyond |= check.flags(of_joint)

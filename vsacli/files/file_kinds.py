@@ -109,19 +109,20 @@ def _beginning(path: str | os.PathLike[str]) -> bytes:
 
 def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
     from vsacli.results.store import schema, study_table
-    from vsacli.results.store.reader import stored_format
+    from vsacli.results.store.reader import other_version, stored_format
 
     kinds = {
-        schema.FORMAT: FileKind.RESULT,
-        schema.SIMULATION: FileKind.SIMULATION,
-        study_table.FORMAT: FileKind.STUDY_TABLE,
+        schema.FORMAT: (FileKind.RESULT, "invdyn"),
+        schema.SIMULATION: (FileKind.SIMULATION, "simulate"),
+        study_table.FORMAT: (FileKind.STUDY_TABLE, "study"),
     }
-    found = stored_format(Path(path))
-    if found not in kinds:
-        raise InputError.one(
-            f"is an HDF5 file, but its format is none of {', '.join(kinds)}", os.fspath(path)
-        )
-    return kinds[found]
+    found = stored_format(Path(path)) or ""
+    if found in kinds:
+        return kinds[found][0]
+    for known, (_, command) in kinds.items():
+        if found.startswith(known.partition("/")[0] + "/"):
+            raise InputError.one(other_version(found, known, command), os.fspath(path))
+    raise InputError.one(f"is an HDF5 file, but its format is none of {', '.join(kinds)}", os.fspath(path))
 
 
 def _document_kind(path: str | os.PathLike[str]) -> FileKind:

@@ -18,10 +18,8 @@ from vsacli.base.progress import Tell, unheard
 from vsacli.base.storage import reading_copies, reporting_temporary_errors, temporary_folder
 from vsacli.base.variables import Block
 from vsacli.results.exports.selection import check_rate, stride_of
-from vsacli.results.store import study_table
 from vsacli.results.store.inputs import StoredInput
-from vsacli.results.store.reader import StoredResult, stored_format
-from vsacli.results.store.study_table import StoredStudy
+from vsacli.results.store.reader import StoredResult, stored_inputs
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
@@ -159,14 +157,12 @@ class Extracted(NamedTuple):
 
 
 def extract(path: str | Path) -> Extracted:
-    """Return the inputs of a result, or of the table of a study.
+    """Return the inputs of a result, a simulation or a study table, of any version of its format.
 
     Raises:
-        InputError: it is neither, or does not hold one of them.
+        InputError: it is none of them, or does not hold one of its inputs.
     """
-    stored = StoredStudy(path) if stored_format(path) == study_table.FORMAT else StoredResult.open(path)
-    with stored as result:
-        inputs = result.inputs()
+    inputs = stored_inputs(path)
     missing = [each.path for each in inputs if each.content is None]
     if missing or not inputs:
         what = ", ".join(missing) if missing else "any input"

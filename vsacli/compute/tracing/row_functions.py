@@ -23,7 +23,7 @@ from vsacli.compute.tracing.python_functions import compiled, defined
 RowSpace = tuple[npt.NDArray[Any], ...]
 """Rows for intermediate values: of real numbers, of truth values, of bits."""
 
-DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
+DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint32}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
 _NONE_ON_ROWS = {"loop", "branch", "item", "take"}
 _SELECTIONS = {"where": "{1}, {2}", "bits": "{1}, 0"}

@@ -33,7 +33,7 @@ Results = dict[int, Any]
 _DTYPES: dict[Kind, type[np.generic]] = {
     Kind.REAL: np.float32,
     Kind.TRUTH: np.bool_,
-    Kind.BITS: np.uint16,
+    Kind.BITS: np.uint32,
     Kind.INDEX: np.intp,
 }
 
@@ -119,7 +119,7 @@ def _entries(table: Table) -> FloatArray:
 
 
 _MEANING: dict[str, Callable[..., Any]] = {
-    "bits": lambda truth, mask: np.where(truth, mask, np.uint16(0)),
+    "bits": lambda truth, mask: np.where(truth, mask, np.uint32(0)),
     "branch": _branch,
     "call": _call,
     "item": lambda results, number: results[number],

@@ -189,9 +189,9 @@ def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
 
 def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
     """Limits exceeded by what was, or was asked of the motors; at the last step, what ended the run."""
-    flags = np.zeros(values["q"].shape, dtype=np.uint16)
+    flags = np.zeros(values["q"].shape, dtype=np.uint32)
     for index, joint in enumerate(robot.joints):
         flags[:, index] = limit_flags(joint, of_joint(values, index), flags[:, index])
     if ending is not None and ending.joint is not None and ending.flag is not None:
-        flags[-1, ending.joint] |= np.uint16(ending.flag)
+        flags[-1, ending.joint] |= np.uint32(ending.flag)
     return flags

@@ -105,7 +105,7 @@ class Failures:
         if "flags" not in result.variables:
             none = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
             return cls(time, none, none, none)
-        flags = np.ascontiguousarray(result.read("flags").T, dtype=np.uint16)
+        flags = np.ascontiguousarray(result.read("flags").T, dtype=np.uint32)
         return cls(time, *(has(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR)))
 
     def among(self, joints: Sequence[int]) -> tuple[BoolArray, BoolArray]:

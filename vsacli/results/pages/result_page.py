@@ -181,7 +181,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     """Return the stretches of each kind of trouble, for each joint, s; only kinds that there are."""
     if "flags" not in result.variables:
         return {}
-    flags = np.asarray(result.read("flags"), dtype=np.uint16)
+    flags = np.asarray(result.read("flags"), dtype=np.uint32)
     marked = {kind: has(flags, bits) for kind, bits in TROUBLES.items()}
     return {
         kind: [marked_spans(result.time, of_joint).tolist() for of_joint in where.T]

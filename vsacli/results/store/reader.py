@@ -58,6 +58,9 @@ COMPUTED_BY = ("engine", "compiler", "threads")
 """Root attributes of files that a run has written: all of them, or none."""
 
 
+OURS = "vsacli-"
+"""Beginning of the name of each format."""
+
 RANGES = {
     "q": "limits_position",
     "dq": "limits_velocity",
@@ -433,6 +436,19 @@ def stored_format(path: str | Path) -> str | None:
         return _format(path, file)
 
 
+def stored_inputs(path: str | Path) -> list[StoredInput]:
+    """Return the inputs that a result, a simulation or a study table holds, of any version of its format.
+
+    Raises:
+        InputError, StorageError: as `StoredResult.open`.
+    """
+    with CheckedFile(path) as file:
+        found = _format(path, file)
+        if found is None or not found.startswith(OURS):
+            raise InputError.one(_foreign(found, (StoredResult, StoredSimulation)), path)
+        return StoredFile(path, file).inputs()
+
+
 def _format(path: str | Path, file: h5py.File) -> str | None:
     with reporting_damage(path):
         found = file.attrs.get("format")
@@ -440,15 +456,21 @@ def _format(path: str | Path, file: h5py.File) -> str | None:
 
 
 def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
-    if found is None or not found.startswith("vsacli-"):
+    if found is None or not found.startswith(OURS):
         expected = " or ".join(repr(kind.format) for kind in kinds)
         return f"is an HDF5 file, but no result file: it has no attribute format = {expected}"
-    word = found.partition("/")[0].removeprefix("vsacli-")
+    word = found.partition("/")[0].removeprefix(OURS)
     for kind in kinds:
         if word == kind.kind:
-            return f"has the format {found}, but this version reads {kind.format}; run {kind.command} again"
+            return other_version(found, kind.format, kind.command)
     expected = " or ".join(f"a {kind.kind} ({kind.format})" for kind in kinds)
     return f"is a {word} ({found}), expected {expected}"
+
+
+def other_version(found: str, read: str, command: str) -> str:
+    """Return that a file has another version of a format, and how to compute it again."""
+    again = f"run {command} again, with its inputs (vsacli info FILE --extract FOLDER)"
+    return f"has the format {found}, but this version reads {read}; {again}"
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -12,7 +12,7 @@ from vsacli.base.units import Quantity, WrenchQuantity
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.base.wrench import WRENCH_AXES
 
-FORMAT, SIMULATION, SENSITIVITY = "vsacli-result/1", "vsacli-simulation/1", "vsacli-sensitivity/1"
+FORMAT, SIMULATION, SENSITIVITY = "vsacli-result/2", "vsacli-simulation/2", "vsacli-sensitivity/2"
 """Formats of files in the layout of results."""
 
 EXISTING = "existing"
@@ -53,7 +53,7 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
     if variable.name == "flags":
-        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=np.uint16)
+        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=np.uint32)
         attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
     return attributes
 
@@ -61,7 +61,7 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     """Little-endian type of a variable in a file of some precision; times are always double."""
     if variable.name == "flags":
-        return np.dtype("<u2")
+        return np.dtype("<u4")
     return FLOATS[precision if variable.dims else DOUBLE]
 
 

@@ -202,7 +202,7 @@ class Identification(Published):
     torques: tuple[Torques, ...] = field(repr=False, default=())
     sources: tuple[Source, ...] = field(repr=False, default=())
 
-    format: ClassVar[str] = "vsacli-identification/1"
+    format: ClassVar[str] = "vsacli-identification/2"
     shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "notes")}
 
     @property

@@ -114,7 +114,7 @@ class Comparison(Published):
     notes: tuple[str, ...] = ()
     sources: tuple[Source, ...] = field(repr=False, default=())
 
-    format: ClassVar[str] = "vsacli-comparison/1"
+    format: ClassVar[str] = "vsacli-comparison/2"
     shape: ClassVar = {
         "format": "format",
         **{name: name for name in ("result", "recording", "begins_at", "begins_at_error")},

@@ -207,7 +207,7 @@ class Acceptance:
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
     ) -> Trouble | None:
         """Return the first kind of limit that is exceeded, of those on variables that were computed."""
-        flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint16))
+        flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint32))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
         for check in limit_checks(joint):
@@ -291,7 +291,7 @@ class RecordedLimits:
         if steps.size:
             rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
             uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
-            flags[steps] &= ~np.uint16(LIMITS)
+            flags[steps] &= ~np.uint32(LIMITS)
             flags[steps] = limit_flags(joint, {**rows, **uncertain}, flags[steps])
         return flags
 

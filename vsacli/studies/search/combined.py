@@ -181,7 +181,7 @@ class CombinedSearch:
             if index in acceptance.ignored:
                 continue
             path = {"q": load.command.q, "dq": load.command.dq}
-            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=np.uint16)) != 0
+            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=np.uint32)) != 0
             if STIFFNESS.key not in joint.actuator.commanded:
                 impossible |= acceptance.refused_steps(joint, load)
             elif len(choices) == 1:

@@ -132,7 +132,7 @@ class Optimum(Published):
     trajectory: Trajectory | None = field(default=None, repr=False)
     pace: BSpline[np.float64] | None = field(default=None, repr=False)
 
-    format: ClassVar[str] = "vsacli-optimum/1"
+    format: ClassVar[str] = "vsacli-optimum/2"
     shape: ClassVar = {
         "format": "format",
         "robot": "robot_name",

@@ -66,7 +66,7 @@ class Effects:
         self.motor = np.ones(shape, dtype=int)
         self.smallest = Smallest(np.full(joints, np.inf), np.zeros(joints), np.zeros(shape))
         self.failed = 0
-        self._flags = np.zeros(1, dtype=np.uint16)
+        self._flags = np.zeros(1, dtype=np.uint32)
 
     def add(self, part: Derivatives) -> None:
         """Merge the next block."""

@@ -99,7 +99,7 @@ class Sensitivity(Published):
     curves: TorqueCurves | None = field(default=None, repr=False)
     units: dict[str, str] = field(default_factory=dict)
 
-    format: ClassVar[str] = "vsacli-sensitivity/1"
+    format: ClassVar[str] = "vsacli-sensitivity/2"
     shape: ClassVar = {
         "format": "format",
         **named("robot", "trajectory", "verdict", "failed", "parameters"),

@@ -43,7 +43,7 @@ class Sizing(Published):
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    format: ClassVar[str] = "vsacli-sizing/1"
+    format: ClassVar[str] = "vsacli-sizing/2"
     shape: ClassVar = {
         **named("format", "verdict", "robot"),
         "trajectories": "outcomes",

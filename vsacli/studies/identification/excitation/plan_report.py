@@ -94,7 +94,7 @@ class Excitation(Published):
     active: tuple[ActiveLimit, ...]
     assumptions: tuple[str, ...]
 
-    format: ClassVar[str] = "vsacli-excitation/1"
+    format: ClassVar[str] = "vsacli-excitation/2"
     shape: ClassVar = {
         "format": "format",
         **named("seed", "noise", "planned"),

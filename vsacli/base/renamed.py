@@ -1,0 +1,35 @@
+"""Public names that changed before version 0.1, each with its successor.
+
+A name that is not known is looked up here (`did_you_mean`), so that its error says what it is called now.
+`docs/renamed.md` lists them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+
+class Renaming(NamedTuple):
+    """A public name that changed: a table of the documentation has a row for each.
+
+    Attributes:
+        kind: kind of name, such as "option" or "variable".
+        old: the name before.
+        new: the name now.
+        place: command, file or function that has it.
+    """
+
+    kind: str
+    old: str
+    new: str
+    place: str
+
+
+RENAMINGS: tuple[Renaming, ...] = ()
+
+
+def successor(word: str, valid: Iterable[str]) -> str | None:
+    """Return the present name of a renamed word if it is among the valid ones, else None."""
+    options = set(valid)
+    return next((each.new for each in RENAMINGS if each.old == word and each.new in options), None)
