@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "check-feasibility",
-    short_help="Say whether a robot can execute a trajectory.",
+    short_help="Report whether a robot can execute a trajectory.",
     epilog=example("vsacli check-feasibility robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --suggest"),
 )
 @robot_argument

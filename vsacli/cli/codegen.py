@@ -11,7 +11,7 @@ from vsacli.cli.file_names import FOLDER
 
 @click.command(
     "codegen",
-    short_help="Write C code of a robot for its controller.",
+    short_help="Generate C code of a robot for its controller.",
     epilog=example("vsacli codegen robots/vsa_3r.yaml -o controller"),
 )
 @robot_argument

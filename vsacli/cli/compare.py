@@ -33,7 +33,7 @@ LARGEST_DRAWN = 1e30
 
 @click.command(
     "compare",
-    short_help="Compare a result with what was measured.",
+    short_help="Compare a result with a recording.",
     epilog=example("vsacli compare result.h5 torques.csv --plot figures"),
 )
 @click.argument("result", type=FILE)

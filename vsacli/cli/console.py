@@ -39,17 +39,13 @@ class Exit(enum.IntEnum):
 
     meaning: str
 
-    OK = 0, "done; every step feasible, regular and within limits"
-    BUG = 1, "a bug, or a result whose self-check failed (written, and its verdict says so)"
+    OK = 0, "done; every sample feasible, regular and within limits"
+    BUG = 1, "a bug, or a result whose self-check failed (written, with that verdict)"
     USAGE = 2, "usage or input error: one line for each problem; nothing written"
-    VERDICT = (
-        3,
-        "done, but steps are infeasible, singular or over a limit, records doubtful, numbers left open, "
-        "simulations astray, motors too weak, or runs of a study failed",
-    )
+    VERDICT = 3, "completed with findings: see the report"
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
-    INTERRUPTED = 130, "interrupted; the target is untouched"
+    INTERRUPTED = 130, "interrupted (Ctrl-C); the target is untouched"
     CUT_OFF = 141, "data on standard output was cut off: its reader has gone, as `head` does"
     TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "examples",
-    short_help="List the shipped robots and trajectories, or copy them.",
+    short_help="List the bundled robots and trajectories, or copy them.",
     epilog=example("vsacli examples puma_560 scara_4 --copy my-robots"),
 )
 @click.argument("names", metavar="[ROBOT]...", nargs=-1)

@@ -44,7 +44,7 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 
 @click.command(
     "export",
-    short_help="Write results, or the robot, for other programs.",
+    short_help="Export results, or the robot, for other programs.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
 @click.argument("file", type=FILE)

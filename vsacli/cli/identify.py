@@ -24,7 +24,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
 @click.command(
     "identify",
-    short_help="Find the numbers of a robot from records.",
+    short_help="Identify robot parameters from recordings.",
     epilog=example("vsacli identify robots/vsa_3r.yaml record.csv -o fitted.yaml --plot figures"),
 )
 @robot_argument

@@ -38,7 +38,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 
 @click.command(
     "import-urdf",
-    short_help="Make a robot file from a serial chain of a URDF.",
+    short_help="Convert a serial chain of a URDF to a robot file.",
     epilog=example("vsacli import-urdf robots/desk_arm.urdf --tip flange -o desk_arm.yaml"),
 )
 @click.argument("urdf", type=FILE)

@@ -17,7 +17,7 @@ from vsacli.cli.file_names import FILE, FOLDER
 
 @click.command(
     "info",
-    short_help="Show what a robot, trajectory, recording or result holds.",
+    short_help="Describe a robot, trajectory, recording or result.",
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
 @click.argument("file", type=FILE, required=False)

@@ -20,8 +20,14 @@ from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
 
-_EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
-_EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)
+_EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml")
+_EPILOG += """
+
+\b
+Exit codes (all: docs/cli.md):
+  0  done                       1  bug or failed self-check
+  2  usage or input error       3  completed with findings (see the report)
+  4  cannot read or write       128 + n  ended by signal n"""
 
 
 _SECTIONS = {
@@ -86,8 +92,8 @@ class SectionedGroup(click.Group):
 def vsacli() -> None:
     """Inverse dynamics of robots with variable stiffness actuators.
 
-    From a robot and a trajectory, compute the motor torques that execute a motion and a stiffness profile;
-    say which steps cannot be done, and why.
+    From a robot and a trajectory, compute the motor torques that execute a motion and a stiffness profile,
+    and report what is infeasible, where, by how much, and how to fix it.
     """
 
 

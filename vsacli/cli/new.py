@@ -21,7 +21,7 @@ _output_option = click.option(
 
 @click.group(
     "new",
-    short_help="Write a robot or trajectory file to begin with.",
+    short_help="Create a robot or trajectory file to begin with.",
     epilog=example("vsacli new robot --joints RR"),
 )
 def new() -> None:

@@ -47,7 +47,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 
 @click.command(
     "optimize",
-    short_help="Find the cheapest stiffness or pace, or the fastest pace.",
+    short_help="Optimize the stiffness or the timing of a motion.",
     epilog=example(
         "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
     ),

@@ -31,7 +31,7 @@ RECORDING = "recording"
 
 @click.command(
     "plot",
-    short_help="Draw results, simulations and recordings, or compare.",
+    short_help="Plot results, simulations and recordings.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)

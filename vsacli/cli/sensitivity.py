@@ -36,7 +36,7 @@ SHOWN_FROM = 20_000
 
 @click.command(
     "sensitivity",
-    short_help="Say which numbers of a robot matter most.",
+    short_help="Rank robot parameters by their effect on a motion.",
     epilog=example("vsacli sensitivity robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --tolerances 2%"),
 )
 @robot_argument

@@ -65,7 +65,7 @@ class Options(NamedTuple):
 
 @click.command(
     "simulate",
-    short_help="Integrate the robot's full dynamics under a controller.",
+    short_help="Simulate the robot's full dynamics under a controller.",
     epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --tolerance 2%"),
 )
 @robot_argument

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "size",
-    short_help="Size motors, gears and springs for motions.",
+    short_help="Select motors, gears and springs for given motions.",
     epilog=example("vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalogue motors.csv"),
 )
 @robot_argument

@@ -30,7 +30,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 
 @click.command(
     "study",
-    short_help="Compute many runs: other numbers, other motions.",
+    short_help="Compute many runs with varied parameters or motions.",
     epilog=example("vsacli study yield.yaml -o yield.h5"),
 )
 @click.argument("files", type=FILE, metavar="STUDY", nargs=-1, required=True)

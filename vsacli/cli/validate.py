@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "validate",
-    short_help="Report everything that is wrong with files of any kind.",
+    short_help="Report every problem of files of any kind.",
     epilog=example("vsacli validate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
