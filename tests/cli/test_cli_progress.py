@@ -50,6 +50,20 @@ def test_there_is_none_without_a_terminal(capsys: pytest.CaptureFixture[str]) ->
     assert capsys.readouterr().err == ""
 
 
+def test_without_a_terminal_verbose_work_has_a_line_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter([100.0, 110.0, 131.0, 132.0, 165.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(now))
+    with Talk(quiet=False, verbose=True).progress(4 * LONG, label="searching") as bar:
+        for _ in range(4):
+            bar.update(LONG)
+    assert capsys.readouterr().err.splitlines() == [
+        "searching: 200000 of 400000 (50 %) after 31 s",
+        "searching: 400000 of 400000 (100 %) after 65 s",
+    ]
+
+
 def test_a_short_run_shows_none(vsacli: Callable[..., Any], motion: Path) -> None:
     with redirect_stderr(Terminal()) as shown:
         assert vsacli("invdyn", ROBOT, motion).code == 0

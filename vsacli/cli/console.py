@@ -9,8 +9,9 @@ import json
 import os
 import re
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Protocol, Self, TextIO, cast
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TextIO, cast
 import click
 
 from vsacli.base.errors import StorageError
-from vsacli.base.progress import unseen
+from vsacli.base.progress import NoBar, unseen
 from vsacli.base.texts import for_terminal
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ PROGRESS_FROM = 100_000
 
 LOOKING_FROM = 20_000_000
 """Bytes of a recording from which on looking at them takes longer than a second."""
+
+SECONDS_PER_LINE = 30.0
+"""Time between two lines on progress where there is no terminal, s."""
 
 WRITING_FROM = 2_000_000
 """Samples from which on writing them takes longer than a second, as CSV."""
@@ -168,6 +172,28 @@ def _colored() -> bool:
     return wanted and sys.stdout.isatty()
 
 
+class ProgressLines(NoBar):
+    """A bar for a log file: a line on stderr every `SECONDS_PER_LINE`.
+
+    Args:
+        length: number of steps.
+        label: what is going on.
+    """
+
+    def __init__(self, length: int, label: str) -> None:
+        self._length, self._label = length, label
+        self._start = self._told = time.monotonic()
+
+    def update(self, steps: int, /) -> None:
+        """Count steps that are done."""
+        super().update(steps)
+        now = time.monotonic()
+        if now - self._told >= SECONDS_PER_LINE:
+            self._told = now
+            done = f"{self.pos} of {self._length} ({100 * self.pos / self._length:.0f} %)"
+            tell(f"{self._label}: {done} after {now - self._start:.0f} s")
+
+
 @dataclass(frozen=True)
 class Talk:
     """Notes on stderr, as loud as the user wants them."""
@@ -193,10 +219,12 @@ class Talk:
     def progress(
         self, steps: int, *, shown_from: int = PROGRESS_FROM, label: str = "computing"
     ) -> AbstractContextManager[Any]:
-        """Return a progress bar over steps, shown only for long work on a terminal."""
-        if self.quiet or steps < shown_from or not sys.stderr.isatty():
+        """Return a progress bar for long work on a terminal; elsewhere, lines now and then if verbose."""
+        if self.quiet or steps < shown_from:
             return unseen(steps)
-        return click.progressbar(length=steps, label=label, file=sys.stderr)
+        if sys.stderr.isatty():
+            return click.progressbar(length=steps, label=label, file=sys.stderr)
+        return nullcontext(ProgressLines(steps, label)) if self.verbose else unseen(steps)
 
     def fitting(self, samples: int) -> AbstractContextManager[Any]:
         """Return the same over the samples of all components that splines are fitted to."""
