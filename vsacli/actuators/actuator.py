@@ -271,7 +271,7 @@ class Actuator(ABC):
     """Whether phi can be integrated along a trajectory; if so, the kind has the two methods below."""
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """Return the rates of phi, (2, samples), for the commanded rates of tau_e and stiffness, (19)-(20)."""
+        """Return the rates of phi, (2, samples), for commanded rates of tau_e and stiffness, (19)-(20)."""
         raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")
 
     def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:

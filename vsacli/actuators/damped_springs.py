@@ -43,10 +43,10 @@ class InternalMotion(NamedTuple):
     """The motion inside a transmission with a damper.
 
     Attributes:
-        phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
+        phi: Deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
             a guess from which the stiffness is found.
         velocity: w, the rate of the spread, (samples,); None: it follows from the damping.
-        acceleration: its derivative, (samples,), as above.
+        acceleration: Derivative of w, (samples,); None with `velocity`.
     """
 
     phi: FloatArray
@@ -58,10 +58,10 @@ class _Springs(NamedTuple):
     """The springs at deflections.
 
     Attributes:
-        state: arrays (samples, 1 joint[, motors]).
-        torque: derivatives of T over each theta, (motors, samples).
-        stiffness: those of sigma, as above.
-        pivot: determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
+        state: Arrays (samples, 1 joint[, motors]).
+        torque: Derivatives of T over each theta, (motors, samples).
+        stiffness: Derivatives of sigma over each theta, (motors, samples).
+        pivot: Determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
     """
 
     state: ElasticState
@@ -98,21 +98,21 @@ class DampedSprings:
         self._behind = [float(there) for there in actuator.has(VARIABLES["phi"])[: self._motors]]
 
     def spread(self, phi: FloatArray) -> FloatArray:
-        """Sum of the deflections beside the damper."""
+        """Return the spread: the sum of the deflections parallel to the damper."""
         parts = [factor * row for factor, row in zip(self._behind, phi, strict=False)]
         return reduce(operator.add, parts)
 
     def torque(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """T."""
+        """Return T."""
         return self._state(phi, q).tau_e[..., 0]
 
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """dT/d(spread) at a stiffness: positive where the motion inside is stable."""
+        """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
         slope: FloatArray = self._springs(phi, q).slope
         return slope
 
     def pivot(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Zero where the rates do not follow from that of the stiffness."""
+        """Return the pivot; zero where the motor velocities do not follow from the rate of the stiffness."""
         return self._springs(phi, q).pivot
 
     def within(self, phi: FloatArray) -> BoolArray:
@@ -122,7 +122,7 @@ class DampedSprings:
         return np.asarray(np.all(inside, axis=0))
 
     def settled(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
-        """Deflections of a spread with the commanded stiffness, from a guess; NaN where none are near."""
+        """Return the deflections with a spread and the commanded stiffness near a guess; NaN if none."""
         missing = (spread - self.spread(phi)) / sum(self._behind)
         shares = zip_longest(phi, self._behind, fillvalue=0.0)
         phi = np.stack([row + missing * share for row, share in shares])
@@ -137,7 +137,7 @@ class DampedSprings:
         return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
 
     def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
-        """Deflections at which the springs carry the torque alone; those of a spread, if one is given."""
+        """Return the deflections at which the springs carry the torque alone; or with a spread, if given."""
         if self._settable:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
@@ -159,7 +159,7 @@ class DampedSprings:
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
     def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> OfJoint:
-        """Stiffness, motor motion and spring torques of a motion inside; as `Actuator.transmit`.
+        """Compute stiffness, motor motion and spring torques of an internal motion; see `Actuator.transmit`.
 
         The corridor is that of the springs' torque. A step is singular where the pivot is zero, not where
         det A is; INTERNAL_INSTABILITY says that the slope is not positive.
@@ -226,7 +226,7 @@ class DampedSprings:
         return margin
 
     def _along(self, like: FloatArray) -> FloatArray:
-        """Velocities of the motors that leave the spread as it is, (motors, samples)."""
+        """Return motor velocities that leave the spread unchanged, (motors, samples)."""
         return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
 
     def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
@@ -289,5 +289,5 @@ class DampedSprings:
 
 
 def _columns(of_motors: FloatArray) -> FloatArray:
-    """(samples, 1 joint, motors) from (motors, samples)."""
+    """Return (samples, 1 joint, motors) from (motors, samples)."""
     return of_motors.T[:, None]

@@ -20,8 +20,8 @@ def largest_coupling(first: float, second: float) -> float:
     """Return what the size of a coupled inertia must be below, or B is not positive definite.
 
     Args:
-        first: inertia of one rotor, on the same side of its gear as the coupled one.
-        second: that of the other.
+        first: Inertia of one rotor, on the same side of its gear as the coupled one.
+        second: Inertia of the other rotor.
     """
     return math.sqrt(first * second)
 
@@ -43,14 +43,14 @@ class Rotors:
         self._other = self._coupled + to_other[self._coupled].astype(np.intp)
 
     def torques(self, ddtheta: FloatArray) -> FloatArray:
-        """B theta''."""
+        """Return B theta''."""
         torques: FloatArray = self._inertia * ddtheta
         if self._coupled.size:
             torques[..., self._coupled] += self._coupling[self._coupled] * ddtheta[..., self._other]
         return torques
 
     def accelerations(self, torques: FloatArray) -> FloatArray:
-        """Theta'' = B^-1 of what is left of the motors' torques."""
+        """Return theta'' = B^-1 of the torques that accelerate the rotors."""
         accelerations: FloatArray = torques / self._inertia
         if self._coupled.size:
             here, other = self._coupled, self._other
@@ -60,7 +60,7 @@ class Rotors:
         return accelerations
 
     def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """Theta'' where some motors are held, and the torques that hold these, 0 of others; (..., motors)."""
+        """Return theta'' with some motors held, and the holding torques, 0 for others; (..., motors)."""
         apart = held.copy()
         apart[..., self._coupled] |= held[..., self._other]
         moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
@@ -88,12 +88,12 @@ class Drivetrain:
         sprung: (motors,), whether the motor acts through a spring; of motors without one, one a joint.
         joint: (motors,), index of the joint of each motor.
         inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
-        rotors: of the motors with springs.
-        friction: dry friction of the motors, joint side; None if none has any.
-        windings: constants of the motors that give current and voltage; None if none is given.
+        rotors: Rotors of the motors with springs.
+        friction: Dry friction of the motors, joint side; None if none has any.
+        windings: Constants of the motors that give current and voltage; None if none is given.
         rigid: (joints,), whether the joint has no spring.
         deflected: (joints, 2), where there is a motor whose phi is a deflection.
-        chosen: indices of the joints whose stiffness is commanded.
+        chosen: Indices of the joints whose stiffness is commanded.
         spring_joint: (springs,), index of the joint of each spring.
         domain: (2, springs), lowest and highest `ranged` for which each law holds.
     """
@@ -131,17 +131,17 @@ class Drivetrain:
         return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
-        """(..., motors) from (..., joints, 2), whose entries without a motor do not matter."""
+        """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
         return values[..., self.present]
 
     def of_joints(self, values: FloatArray) -> FloatArray:
-        """(..., joints, 2) from (..., motors), NaN where there is no motor."""
+        """Return (..., joints, 2) from (..., motors), NaN where there is no motor."""
         result = np.full((*values.shape[:-1], *self.present.shape), np.nan)
         result[..., self.present] = values
         return result
 
     def merged(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
-        """(..., joints, 2) from values of the springs (..., springs), and of the joints (..., joints).
+        """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
 
         The latter are taken at motors without a spring.
         """
@@ -155,13 +155,13 @@ class Drivetrain:
         return result
 
     def of_all(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
-        """(..., motors) from values of motors with springs, and of joints, taken at other motors."""
+        """Return (..., motors) from values of motors with springs, and of joints for the other motors."""
         values = rigid[..., self.joint]
         values[..., self.sprung] = sprung
         return values
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""
+        """Return phi, (..., springs), from joint (..., joints) and motor positions (..., springs); or rates."""
         parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
@@ -179,7 +179,7 @@ class Drivetrain:
         )
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Elastic energy of each joint, (..., joints)."""
+        """Return the elastic energy of each joint, (..., joints)."""
         return self.by_joint([elasticity.energy(at) for elasticity, at in self.at(q, theta)], q)
 
     def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ class Drivetrain:
         return self.by_joint([each.state(at).stiffness for each, at in self.at(q, theta)], q)
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Det A (67), (..., joints), NaN where no stiffness is commanded."""
+        """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
         found = self.by_joint([each.state(at).determinant() for each, at in self.at(q, theta)], q)
         return np.where(self.rigid, np.nan, found)
 
@@ -202,7 +202,7 @@ class Drivetrain:
         return [values if self._alone else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., joints) from the part of each group; 0 where there are no springs."""
+        """Return (..., joints) from the parts of the groups; 0 for joints without springs."""
         if self._alone:
             return parts[0]
         result = np.zeros_like(like)
@@ -211,7 +211,7 @@ class Drivetrain:
         return result
 
     def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., springs) from the part of each group, (..., joints, motors)."""
+        """Return (..., springs) from the parts of the groups, (..., joints, motors)."""
         if self._alone:
             return parts[0].reshape(*like.shape)
         result = np.empty_like(like)
@@ -278,12 +278,12 @@ class DrivetrainState:
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+        """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         Args:
-            ddq: acceleration of the joints.
-            ddtau_e: second derivative of the elastic torque.
-            ddstiffness: that of the stiffness, which counts where it is commanded.
+            ddq: Acceleration of the joints.
+            ddtau_e: Second derivative of the elastic torque.
+            ddstiffness: Second derivative of the stiffness; ignored where it is not commanded.
         """
         wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
         parts = [

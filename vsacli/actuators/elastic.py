@@ -70,7 +70,7 @@ class Elastic(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """One motor, which drives the joint alone."""
+        """Return one motor, which drives the joint alone, behind a linear spring."""
         return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
     @property
@@ -119,7 +119,7 @@ class Elastic(Actuator):
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> OfJoint:
-        """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
+        """Compute a linear spring: phi = tau_e/K, with constant stiffness."""
         phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
         return single_motor(
             stiffness=constant + stiffness,
@@ -174,12 +174,12 @@ class Elastic(Actuator):
         return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Sigma phi'."""
+        """Return sigma phi'."""
         rates: FloatArray = self.law.stiffness(of_joint["phi"][:1]) * of_joint["dphi"][:1]
         return rates
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """Torque and stiffness by the law."""
+        """Return torque and stiffness by the law."""
         phi = of_joint["phi"][0]
         tau_e, stiffness = self.law.torque(phi), self.law.stiffness(phi)
         return Carried(tau_e, np.abs(tau_e), stiffness, stiffness, tau_e[None])

@@ -29,7 +29,7 @@ class Elasticity(ABC):
     """
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""
+        """Return phi from positions, or its rates from velocities; theta - q unless the kind overrides it."""
         return theta - q[..., None]
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def energy(self, coordinates: FloatArray) -> FloatArray:
-        """Elastic energy of each joint, J."""
+        """Return the elastic energy of each joint, J."""
 
     @abstractmethod
     def state(self, coordinates: FloatArray) -> ElasticState:
@@ -73,11 +73,11 @@ class ElasticState(ABC):
 
     @abstractmethod
     def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """Rate of the elastic torque (17), (..., joints)."""
+        """Return the rate of the elastic torque (17), (..., joints)."""
 
     @abstractmethod
     def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """Rate of the stiffness (18), (..., joints)."""
+        """Return the rate of the stiffness (18), (..., joints)."""
 
     @abstractmethod
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
@@ -87,11 +87,11 @@ class ElasticState(ABC):
     def motor_accelerations(
         self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+        """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         NaN where there are none, because the decoupling matrix is singular.
         """
 
     def determinant(self) -> FloatArray:
-        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if no stiffness is commanded."""
+        """Return det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
         return np.full_like(self.tau_e, np.nan)

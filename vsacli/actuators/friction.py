@@ -43,7 +43,7 @@ class Friction:
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
         return {"coulomb": 0.5 if joint_type == "revolute" else 5, "width": 0.01}
 
     @property
@@ -75,9 +75,9 @@ class FrictionLaws(NamedTuple):
     """Friction of several motors or joints; arrays that spread with those of their velocities.
 
     Attributes:
-        backward, forward: sizes of Coulomb friction while the velocity is negative, and positive.
-        offset: torque that is added.
-        width: of the change of sign, 0 for the sign function.
+        backward, forward: Sizes of Coulomb friction while the velocity is negative, and positive.
+        offset: Torque that is added.
+        width: Width of the change of sign, 0 for the sign function.
     """
 
     backward: FloatArray
@@ -87,7 +87,7 @@ class FrictionLaws(NamedTuple):
 
     @classmethod
     def of(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
-        """One entry each, on the last axis; None if none has friction."""
+        """Return the laws, one per entry on the last axis; None if no entry has friction."""
         if not any(frictions):
             return None
         laws = [friction or NO_FRICTION for friction in frictions]
@@ -105,11 +105,11 @@ class FrictionLaws(NamedTuple):
         return sharp
 
     def torque(self, velocity: FloatArray, direction: FloatArray | None = None) -> FloatArray:
-        """Friction at velocities; at rest the offset alone, where the shape is the sign.
+        """Return the friction at velocities; sharp friction at rest is the offset alone.
 
         Args:
-            velocity: rad/s (m/s), any shape that spreads with the laws.
-            direction: of the motion, -1, 0 or 1, where the shape is the sign; that of the velocity if None,
+            velocity: Rad/s (m/s), any shape that spreads with the laws.
+            direction: Of the motion, -1, 0 or 1, where the shape is the sign; that of the velocity if None,
                 and where it is NaN.
         """
         sign = direction_of(velocity)
@@ -138,5 +138,5 @@ class FrictionLaws(NamedTuple):
 
 
 def direction_of(velocity: FloatArray) -> FloatArray:
-    """-1, 0 or 1; 0 at rest, and where the velocity does not exist."""
+    """Return -1, 0 or 1; 0 at rest, and where the velocity is NaN."""
     return np.where(np.abs(velocity) > REST, np.where(velocity < 0, -1.0, 1.0), 0.0)

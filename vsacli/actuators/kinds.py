@@ -24,14 +24,14 @@ ACTUATORS = LazyRegistry(
 
 
 def example(name: str, joint_type: str) -> dict[str, Any]:
-    """Plausible values of a joint's key `actuator`.
+    """Return plausible values of a joint's key `actuator`.
 
     Args:
         name: a kind, or a mechanism of serial ones.
-        joint_type: of the joint.
+        joint_type: Type of the joint.
 
     Raises:
-        InputError: the mechanism does not drive such joints.
+        InputError: The mechanism does not drive such joints.
     """
     if name in ACTUATORS:
         return {"type": name, **ACTUATORS[name].example(joint_type)}

@@ -137,7 +137,7 @@ class Motor:
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
         revolute = joint_type == "revolute"
         return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
 
@@ -168,9 +168,9 @@ class Windings(NamedTuple):
     """Constants of several motors; arrays that spread with those of their torques.
 
     Attributes:
-        torque_constant: torque on the joint's side of the gear over current, and so voltage over velocity
+        torque_constant: Torque on the joint's side of the gear over current, and so voltage over velocity
             there; negative if the gear turns the motor against the joint. NaN where it is not known.
-        resistance: of the windings, NaN where it is not known.
+        resistance: Resistance of the windings, NaN where unknown.
     """
 
     torque_constant: FloatArray
@@ -178,7 +178,7 @@ class Windings(NamedTuple):
 
     @classmethod
     def of(cls, motors: Sequence[JointMotor | None]) -> Windings | None:
-        """One entry each, on the last axis; None if there is no torque constant."""
+        """Return the constants, one entry per motor on the last axis; None if no torque constant is given."""
         rows = [[getattr(motor, name, None) for name in cls._fields] for motor in motors]
         if all(constant is None for constant, _ in rows):
             return None
@@ -193,8 +193,8 @@ class Windings(NamedTuple):
         """Return the variables `ELECTRICAL` by name, A, V, W.
 
         Args:
-            torque: of the motors, N m (N), joint side of the gear.
-            velocity: of the motors, rad/s (m/s), joint side of the gear.
+            torque: Torques of the motors, N m (N), joint side of the gear.
+            velocity: Velocities of the motors, rad/s (m/s), joint side of the gear.
         """
         current = torque / self.torque_constant
         return {

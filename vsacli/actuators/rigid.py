@@ -35,7 +35,7 @@ class Rigid(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """One motor, which drives the joint alone."""
+        """Return one motor, which drives the joint alone."""
         return cls(motor=constants.only_motor)
 
     @property

@@ -67,7 +67,7 @@ class Serial(Actuator):
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
-        """Motor 2 has no deflection."""
+        """See `Actuator.has`; motor 2 has no deflection."""
         return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
 
     @classmethod
@@ -138,7 +138,7 @@ class Serial(Actuator):
         return self.mechanism
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Theta_1 = phi + q; theta_2 is the setting."""
+        """Return theta_1 = phi + q, and theta_2, which is the setting."""
         return np.stack((phi[0] + q, phi[1]))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
@@ -171,7 +171,7 @@ class Serial(Actuator):
         }
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Rates of the derivatives of the potential over theta_1 and theta_2."""
+        """Return the rates of the derivatives of the potential over theta_1 and theta_2."""
         rates = of_joint["dphi"][0], of_joint["dtheta"][1], of_joint["dq"]
         return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
 
@@ -194,7 +194,7 @@ class Serial(Actuator):
         return _Springs(actuators[0].mechanism)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Phi and theta_2, on the mechanism's branch."""
+        """Return phi and theta_2 on the mechanism's branch."""
         return self.mechanism.solve(tau_e, stiffness, q)
 
     @property
@@ -207,12 +207,12 @@ class Serial(Actuator):
         return self.mechanism.other_preload(tau_e, stiffness, q)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """A^-1 (tau_e', sigma')."""
+        """Return A^-1 (tau_e', sigma')."""
         state = self._state(phi, command.q)
         return state.rates(command.dtau_e, command.commanded["dstiffness"], command.dq)[..., :2].T
 
     def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Det A over (theta_1, theta_2)."""
+        """Return det A over (theta_1, theta_2)."""
         return self._state(phi, q).determinant()
 
     def _state(self, phi: FloatArray, q: FloatArray) -> MechanismState:
@@ -230,7 +230,7 @@ class _Springs(Elasticity):
         self._mechanism = mechanism
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi and theta_2."""
+        """Return phi and theta_2."""
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -238,11 +238,11 @@ class _Springs(Elasticity):
         return np.stack(self._mechanism.ranged(theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi, theta_2 and q."""
+        """Return phi, theta_2 and q."""
         return np.stack((theta[..., 0] - q, theta[..., 1], q), axis=-1)
 
     def torques(self, coordinates: FloatArray) -> Torques:
-        """Derivatives of the potential."""
+        """Return the derivatives of the potential."""
         state = self._mechanism.state(coordinates)
         return Torques(state.tau_e, state.tau_spring)
 

@@ -18,7 +18,7 @@ class LinearRows:
         self._stiffness = np.array(stiffness)[:, None]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """K phi."""
+        """Return K phi."""
         torque: FloatArray = phi * self._stiffness
         return torque
 
@@ -28,7 +28,7 @@ class LinearRows:
         return energy
 
     def state(self, phi: FloatArray) -> SpringState:
-        """K phi, whose derivatives are constants."""
+        """Return the state of a spring of torque K phi."""
         torque, none = self.torque(phi), np.zeros_like(phi)
         return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), none, none)
 
@@ -76,21 +76,21 @@ class _State(ElasticState):
         return self._springs.tau
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """Sigma phi'."""
+        """Return sigma phi'."""
         return self._one.sigma * dphi[..., 0]
 
     def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """Zeta phi'; of a linear spring zero, not -0."""
+        """Return zeta phi'; for a linear spring zero, not -0."""
         return self._one.zeta * dphi[..., 0] + 0.0
 
     def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
-        """Eta phi'^2."""
+        """Return eta phi'^2."""
         return self._one.eta * dphi[..., 0] * dphi[..., 0]
 
     def motor_accelerations(
         self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
     ) -> FloatArray:
-        """(tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
+        """Return (tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
         squared = dphi[..., 0] * dphi[..., 0]
         divisor = np.where(self.stiffness == 0, np.nan, self.stiffness)
         return ((ddtau_e - self._one.zeta * squared) / divisor + ddq)[..., None]

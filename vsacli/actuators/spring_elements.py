@@ -11,9 +11,9 @@ class SpringElement(NamedTuple):
     """A spring whose deflection is a weighted sum of positions, on which it pulls by the same weights.
 
     Attributes:
-        law: its law.
-        joint: weight of the position of the joint.
-        motors: weight of the position of each motor.
+        law: Law of the spring.
+        joint: Weight of the position of the joint.
+        motors: Weight of the position of each motor.
     """
 
     law: SpringLaw
@@ -27,10 +27,10 @@ class LeverSpring(NamedTuple):
     It is stretched by the distance of both ends beyond the least one, and by the pretension.
 
     Attributes:
-        lever: length of the lever, m.
-        arm: distance from the axis to the point of the link, m.
+        lever: Length of the lever, m.
+        arm: Distance from the axis to the point of the link, m.
         stiffness: N/m.
-        lead: pretension per position of motor 2, m/rad.
+        lead: Pretension per position of motor 2, m/rad.
     """
 
     lever: float

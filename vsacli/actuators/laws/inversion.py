@@ -18,7 +18,7 @@ def hermite(
 
 
 def in_single(values: FloatArray) -> FloatArray:
-    """Values with the digits of single precision, which do for a guess; beyond its range as they are."""
+    """Return values rounded to single precision, enough for a guess; unchanged beyond its range."""
     with np.errstate(all="ignore"):
         rounded = values.astype(np.float32).astype(float)
     return np.where(np.isfinite(rounded) & ((rounded == 0) == (values == 0)), rounded, values)
@@ -41,16 +41,16 @@ the torque, which no cubic comes close to."""
 def inverse(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, SpringState]:
-    """Deflection at which a law has a torque, and the state of the spring there; arrays (samples,).
+    """Return the deflection at which a law has a torque, and the state of the spring there; (samples,).
 
     The last step is so short that the state before it gives the state after it.
 
     Args:
-        law: the spring.
-        torque: torque of the spring, N m (N).
-        low: deflection that is not above the one sought, rad (m).
-        high: deflection that is not below the one sought.
-        start: first guess; next to the solution one step does, without a loop.
+        law: Spring.
+        torque: Torque of the spring, N m (N).
+        low: Deflection that is not above the one sought, rad (m).
+        high: Deflection that is not below the one sought.
+        start: First guess; next to the solution one step does, without a loop.
     """
     with np.errstate(all="ignore"):  # without stiffness at rest, a step leads nowhere
         phi, error, state = _halley_step(law, torque, start)
@@ -87,7 +87,7 @@ def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
 def _safeguarded(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> Values:
-    """`inverse` from a start that is far away: Halley's steps within the bracket, else bisection."""
+    """Compute `inverse` from a distant start: Halley steps within the bracket, else bisection."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi, low, high, *_), (torque,) = state, constants
@@ -105,7 +105,7 @@ def _safeguarded(
 
 
 def with_sign_of(torque: FloatArray, phi: FloatArray, state: SpringState) -> tuple[FloatArray, SpringState]:
-    """Deflection and state of an odd law under a torque, from those under the size of the torque."""
+    """Return deflection and state of an odd law at a torque, from those at its absolute value."""
     tau, zeta = np.copysign(state.tau, torque), np.copysign(state.zeta, torque)
     return np.copysign(phi, torque), state._replace(tau=tau, zeta=zeta)
 

@@ -26,10 +26,10 @@ class SpringState(NamedTuple):
     """Torque, stiffness, slope and curvature of springs, (62)-(64), (66); arrays of one shape.
 
     Attributes:
-        tau: torque, N m (N).
-        sigma: stiffness, the first derivative of the torque over the deflection.
-        zeta: slope of the stiffness, the second derivative.
-        eta: curvature of the stiffness, the third derivative.
+        tau: Torque, N m (N).
+        sigma: Stiffness, the first derivative of the torque over the deflection.
+        zeta: Slope of the stiffness, the second derivative.
+        eta: Curvature of the stiffness, the third derivative.
     """
 
     tau: FloatArray

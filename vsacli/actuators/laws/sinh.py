@@ -24,7 +24,7 @@ class Sinh(SpringLaw):
         return SinhPair(self, other) if isinstance(other, Sinh) and same_number(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Torque and stiffness from one exponential function, and a^2 times either."""
+        """Return torque and stiffness from one exponential function, and a^2 times each."""
         grown = np.expm1(np.abs(self.a * phi))
         shrunk = 1 / (1 + grown)
         half = self.k / 2 * grown
@@ -33,27 +33,27 @@ class Sinh(SpringLaw):
         return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque k sinh(a phi)."""
+        """Return the torque k sinh(a phi)."""
         return self.derivatives(phi, 0)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness k a cosh(a phi)."""
+        """Return the stiffness k a cosh(a phi)."""
         return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope a^2 tau."""
+        """Return the slope a^2 tau."""
         return self.a**2 * self.torque(phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature a^2 sigma."""
+        """Return the curvature a^2 sigma."""
         return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy k (cosh(a phi) - 1)/a, without cancellation near zero."""
+        """Return the energy k (cosh(a phi) - 1)/a, without cancellation near zero."""
         return 2 * self.k / self.a * np.sinh(self.a * phi / 2) ** 2
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse asinh(tau/k)/a."""
+        """Return the inverse asinh(tau/k)/a."""
         return np.arcsinh(torque / self.k) / self.a
 
 

@@ -122,49 +122,49 @@ class MeasuredSpring(SpringLaw):
         return self.domain[0] == 0
 
     def as_second(self) -> SpringLaw:
-        """Turned around if it only pulls."""
+        """Return the mirrored law if it only pulls."""
         return Mirrored(law=self) if self.pulls_only else self
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
+        """Return the relative hardening, infinite where a spring without stiffness at rest goes slack."""
         state = self.state(phi)
         slack = state.sigma == 0
         return np.where(slack, np.inf, state.zeta / np.where(slack, 1.0, state.sigma))
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Derivatives of the fitted curve, whose piece is looked up once."""
+        """Return the derivatives of the fitted curve, whose piece is looked up once."""
         return self._curve(phi, 1, order + 1)
 
     def state(self, phi: FloatArray) -> SpringState:
-        """State of the fitted curve, which code that must be short has once."""
+        """Return the state of the fitted curve, as a subroutine of compiled code."""
         return SpringState(*subroutine(lambda phi: self.derivatives(phi, 3), (phi,)))
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque of the fitted curve."""
+        """Return the torque of the fitted curve."""
         return self._curve(phi, 1, 1)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness of the fitted curve."""
+        """Return the stiffness of the fitted curve."""
         return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope of the fitted curve."""
+        """Return the slope of the fitted curve."""
         return self.derivatives(phi, 2)[2]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature of the fitted curve."""
+        """Return the curvature of the fitted curve."""
         return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy of the fitted curve."""
+        """Return the energy of the fitted curve."""
         return self._curve(phi, 0, 0)[0]
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse by safeguarded iteration within the measured range."""
+        """Return the inverse, by safeguarded iteration within the measured range."""
         return self.deflection_and_state(torque)[0]
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and state by one iteration."""
+        """Return deflection and state by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
         least, largest = self.torque_range
         carried = np.minimum(np.maximum(torque, least), largest)
@@ -199,7 +199,7 @@ def worst_misfit(table: Table, misfit: FloatArray) -> tuple[int, float]:
 
 
 def wrong_rows(table: Table) -> Iterator[Problem]:
-    """Why the rows are none of a curve over the deflection: too few, out of bounds or out of order."""
+    """Yield why the rows are no curve over the deflection: too few, out of bounds or out of order."""
     deflection, path = table.values[:, 0], table.source.path
     if len(deflection) < MIN_ROWS:
         yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
@@ -211,7 +211,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
 
 
 def _problems(table: Table) -> Iterator[Problem]:
-    """Why the rows are no hardening spring, with the lines."""
+    """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path
 
@@ -233,7 +233,7 @@ def _problems(table: Table) -> Iterator[Problem]:
 
 
 def _wrong_sizes(table: Table) -> Iterator[Problem]:
-    """Rows with numbers too large, or with an end of the curve too near to zero, as in declared fields."""
+    """Yield rows with values too large, or an end of the curve too near to zero, as in declared fields."""
     for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
             yield Problem(
@@ -246,7 +246,7 @@ def _wrong_sizes(table: Table) -> Iterator[Problem]:
 
 
 def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
-    """Rows where the torque is not convex for positive, or not concave for negative deflections."""
+    """Yield rows where the torque is not convex for positive, or not concave for negative deflections."""
     left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
     share = (middle - left) / (right - left)
     chord = (1 - share) * torque[:-2] + share * torque[2:]

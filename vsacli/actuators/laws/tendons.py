@@ -81,7 +81,7 @@ class Mirrored(SpringLaw):
         return tuple(value if each % 2 else -value for each, value in enumerate(values))
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Both are those of the law under the opposite torque, mirrored."""
+        """Return deflection and state of the law at the opposite torque, mirrored."""
         phi, state = self.law.deflection_and_state(-torque)
         return -phi, _mirrored_state(state)
 
@@ -141,32 +141,32 @@ class Quadratic(Tendon):
         return QuadraticTwins(self) if other == self.as_second() else None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Hardening 1/phi, infinite where the tendon goes slack."""
+        """Return the hardening 1/phi, infinite where the tendon goes slack."""
         with np.errstate(divide="ignore"):
             return 1 / np.abs(phi)
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque k phi^2."""
+        """Return the torque k phi^2."""
         return self.k * phi * phi
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness 2 k phi."""
+        """Return the stiffness 2 k phi."""
         return 2 * self.k * phi
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope 2 k."""
+        """Return the slope 2 k."""
         return np.where(np.isnan(phi), np.nan, 2 * self.k)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature zero."""
+        """Return the curvature, zero."""
         return np.zeros_like(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy k phi^3/3."""
+        """Return the energy k phi^3/3."""
         return self.k * phi * phi * phi / 3
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse sqrt(tau/k)."""
+        """Return the inverse sqrt(tau/k)."""
         return np.sqrt(np.maximum(torque, 0) / self.k)
 
 
@@ -199,33 +199,33 @@ class Exponential(Tendon):
         return None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Torque and stiffness, and the others each a times the one before."""
+        """Return torque and stiffness, and the slope and curvature, each a times the one before."""
         torque = self.torque(phi)
         stiffness = self.a * (torque + self.c)
         return (torque, stiffness, self.a * stiffness, self.a**2 * stiffness)[: order + 1]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque c (exp(a phi) - 1)."""
+        """Return the torque c (exp(a phi) - 1)."""
         return self.c * np.expm1(self.a * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness a (tau + c)."""
+        """Return the stiffness a (tau + c)."""
         return self.a * (self.torque(phi) + self.c)
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope a sigma."""
+        """Return the slope a sigma."""
         return self.a * self.stiffness(phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature a^2 sigma."""
+        """Return the curvature a^2 sigma."""
         return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy tau/a - c phi."""
+        """Return the energy tau/a - c phi."""
         return self.torque(phi) / self.a - self.c * phi
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse ln(1 + tau/c)/a."""
+        """Return the inverse ln(1 + tau/c)/a."""
         return np.log1p(np.maximum(torque, 0) / self.c) / self.a
 
 

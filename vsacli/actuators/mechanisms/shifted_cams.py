@@ -53,7 +53,7 @@ class ShiftedCams(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Cams alike, whose torque grows with the cube of the turn."""
+        """Return equal cams, whose torque grows with the cube of the rotation."""
         revolute = joint_type == "revolute"
         constants = {"k": 200, "k_c": 8000} if revolute else {"k": 2000, "k_c": 500000}
         return {"spring": {"type": "cubic", **constants}}
@@ -97,7 +97,7 @@ class ShiftedCams(Mechanism):
         return (SpringElement(first, -1.0, (1.0, 1.0)), SpringElement(second, -1.0, (1.0, -1.0)))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """Deflection and setting from the solution of the pair."""
+        """Return deflection and setting from the solution of the pair."""
         with np.errstate(all="ignore"):  # a torque may be infinite
             found = self._cams.solve(tau_e, stiffness)
         return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
@@ -113,7 +113,7 @@ class ShiftedCams(Mechanism):
         return self._cams.opposite_reaches(tau_e, stiffness)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """Sums and differences of those of both cams; det A is -2 times that of the pair."""
+        """Return sums and differences of both cams' derivatives; det A is -2 times that of the pair."""
         first, second = self._cams.laws
         (energy_1, one), (energy_2, two) = first.energy_and_state(phi + s), second.energy_and_state(phi - s)
         return Partials(

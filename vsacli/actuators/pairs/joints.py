@@ -30,7 +30,7 @@ def solve(
     Args:
         one: State of spring 1.
         two: State of spring 2.
-        divisor: det A, or NaN where the result is to be NaN.
+        divisor: Det A, or NaN where the result is to be NaN.
         torque_row: Right-hand side of the first row of A, (17) or (21).
         stiffness_row: Right-hand side of the second row, (18) or (22).
     """

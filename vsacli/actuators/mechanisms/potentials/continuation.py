@@ -49,14 +49,14 @@ class Spot(NamedTuple):
     """A point (phi, theta_2); arrays (samples,).
 
     Attributes:
-        phi: deflection.
+        phi: Deflection.
         s: theta_2.
-        tau_e: elastic torque.
-        stiffness: of the joint.
-        torque_1: change of the torque with phi, over the range of phi.
-        torque_2: the same with theta_2.
-        stiffness_1: change of the stiffness with phi, over the range of phi.
-        stiffness_2: the same with theta_2.
+        tau_e: Elastic torque.
+        stiffness: Stiffness of the joint.
+        torque_1: Change of the torque with phi, over the range of phi.
+        torque_2: Same with theta_2.
+        stiffness_1: Change of the stiffness with phi, over the range of phi.
+        stiffness_2: Same with theta_2.
     """
 
     phi: FloatArray
@@ -90,7 +90,7 @@ class Spot(NamedTuple):
         return -self.torque_2 / self.steepness, self.torque_1 / self.steepness
 
     def to(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Newton's step to a torque and a stiffness, as a part of the ranges."""
+        """Return the Newton step to a torque and a stiffness, as a share of the ranges."""
         missing = tau_e - self.tau_e, stiffness - self.stiffness
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
         return (
@@ -99,7 +99,7 @@ class Spot(NamedTuple):
         )
 
     def chosen(self, mask: BoolArray, other: Spot) -> Spot:
-        """This one where the mask holds, else the other."""
+        """Return this point where the mask holds, else the other."""
         return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
 
 
@@ -112,9 +112,9 @@ class LevelCurves:
     """The level curves of a potential within ranges.
 
     Args:
-        potential: the potential.
-        phi: range of the deflection.
-        theta_2: range of motor 2.
+        potential: Potential.
+        phi: Range of the deflection.
+        theta_2: Range of motor 2.
     """
 
     def __init__(
@@ -174,11 +174,11 @@ class LevelCurves:
         """Return a step of length h along a level curve, back onto tau_e, and whether it stays on the piece.
 
         Args:
-            spot: where to begin.
-            h: length, as a part of the ranges; the stiffness grows with it if the sine is positive.
-            tau_e: torque wanted.
-            q: position of the joint.
-            dq: how far that is from the position at which the spot was found.
+            spot: Point at which to begin.
+            h: Length, as a part of the ranges; the stiffness grows with it if the sine is positive.
+            tau_e: Torque wanted.
+            q: Position of the joint.
+            dq: Distance of q from the joint position at `spot`.
         """
         first, second = spot.along
         by_q = spot.torque_1 / self._width[0] - spot.stiffness  # of the torque, at constant phi and theta_2
@@ -232,8 +232,8 @@ class Branch:
     """Solutions that are continued from a start, where q = 0.
 
     Attributes:
-        start: the start, arrays (1,).
-        orientation: sign of the sine on the branch.
+        start: Start, arrays (1,).
+        orientation: Sign of the sine on the branch.
     """
 
     def __init__(self, curves: LevelCurves, phi: float, theta_2: float) -> None:

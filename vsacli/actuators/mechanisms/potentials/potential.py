@@ -229,7 +229,7 @@ def _place(phi: float, theta_2: float) -> str:
 
 
 def _why_no_word(name: str) -> str:
-    """Why no constant may have a name; empty if one may."""
+    """Return why no constant may have a name; empty if one may."""
     if not _WORD.fullmatch(name):
         return "is no word: letters, digits and _, of which the first is no digit"
     return "has a meaning of its own in the energy; choose another name" if name in RESERVED else ""

@@ -49,9 +49,9 @@ class Profile(NamedTuple):
     """A fitted profile.
 
     Attributes:
-        rest: deflection of the minimum, rad (m).
-        curve: lift over the deflection from there, but for a constant.
-        misfit: of the points, (rows,).
+        rest: Deflection of the minimum, rad (m).
+        curve: Lift over the deflection from there, but for a constant.
+        misfit: Distance of the curve from the points, (rows,).
     """
 
     rest: float
@@ -114,7 +114,7 @@ def _least(phi: FloatArray, lift: FloatArray) -> float:
 
 
 def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[FloatArray, float]:
-    """Weights of columns, none below the least, that with a constant come closest to a lift; and how far."""
+    """Fit weights of columns, at least `least`, and a constant to a lift; return also the misfit."""
     from scipy.optimize import nnls
 
     level = np.ones((len(lift), 1))
@@ -125,7 +125,7 @@ def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[Float
 
 
 def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
-    """Deflection between the neighbours of the lowest point from which the fit is best."""
+    """Return the deflection of rest with the best fit, between the neighbors of the lowest point."""
     from scipy.interpolate import PPoly
     from scipy.optimize import minimize_scalar
 
@@ -219,7 +219,7 @@ class Cam(PreloadedCam):
 
 
 def _problems(table: Table) -> Iterator[Problem]:
-    """Why the rows are no profile with one minimum, with the lines."""
+    """Yield why the rows are no profile with one minimum, with the lines."""
     deflection, lift = table.values.T
     if problems := list(wrong_rows(table)):
         yield from problems

@@ -120,7 +120,7 @@ class Maccepa(PreloadedCam):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Levers of a hand's size, with the stiffness of an arm's joint."""
+        """Return levers of a hand's size, with the stiffness of an arm's joint."""
         return {"b": 0.04, "c": 0.12, "k": 20000, "r": 0.01, "pretension": [0.002, 0.05]}
 
     @property
@@ -134,7 +134,7 @@ class Maccepa(PreloadedCam):
         return LeverSpring(self.b, self.c, self.k, self.r)
 
     def lift(self, from_rest: FloatArray) -> Lift:
-        """Growth of the distance a; with half angles, so that nothing cancels at rest."""
+        """Return the growth of the distance a; by half angles, so that nothing cancels at rest."""
         shortest, area = abs(self.c - self.b), self.b * self.c
         half_sine = np.sin(from_rest / 2)
         doubled = 2 * area * half_sine * half_sine

@@ -61,11 +61,11 @@ class Sine:
         return np.arctan(self.ratio * quotient) / self.ratio
 
     def state(self, phi: FloatArray) -> SpringState:
-        """Torque and three derivatives."""
+        """Return torque and three derivatives."""
         return self.energy_and_state(phi)[1]
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy 2 k/ratio^2 sin^2(ratio phi/2), torque and three derivatives."""
+        """Return the energy 2 k/ratio^2 sin^2(ratio phi/2), the torque and three derivatives."""
         turn, squared = self.ratio * phi, self.ratio * self.ratio
         half = np.sin(turn / 2)
         tau, sigma = self.k / self.ratio * np.sin(turn), self.k * np.cos(turn)
@@ -78,12 +78,12 @@ TURN = Sine(k=2.0, ratio=2.0)
 
 
 def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Partials:
-    """Partial derivatives of the potential K(s) w(phi).
+    """Return the partial derivatives of the potential K(s) w(phi).
 
     Args:
         scale: K and two derivatives.
         energy: w.
-        form: g and three derivatives.
+        form: G and three derivatives.
     """
     value, slope, curvature = scale
     return Partials(
@@ -114,7 +114,7 @@ class SineRatio(Mechanism):
 
     @abstractmethod
     def scale(self, s: FloatArray) -> Scale:
-        """K(s) with its derivatives, positive and monotone over the range of the setting."""
+        """Return K(s) with its derivatives, positive and monotone over the range of the setting."""
 
     @abstractmethod
     def setting(self, scale: FloatArray) -> FloatArray:
@@ -130,7 +130,7 @@ class SineRatio(Mechanism):
         return ratio_partials(self.scale(s), *TURN.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """(2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
+        """Solve by (2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
         load = 2 * np.abs(np.where(np.isfinite(tau_e), tau_e, np.nan))
         least, most = ((2 * scale - load) * (2 * scale + load) for scale in self.scale_range)
         carried = most >= 0
@@ -167,7 +167,7 @@ class Awas(SineRatio):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Arms from 5 to 12 cm."""
+        """Return arms from 5 to 12 cm."""
         return {"k": 50000, "arm": [0.05, 0.12], "lead": 0.01}
 
     @property
@@ -183,7 +183,7 @@ class Awas(SineRatio):
         return self.k * shortest * shortest, self.k * longest * longest
 
     def scale(self, s: FloatArray) -> Scale:
-        """K = k r^2."""
+        """Return K = k r^2."""
         curvature = self.k * self.lead * self.lead
         return Scale(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
 
@@ -235,7 +235,7 @@ class Lever(SineRatio):
         return low, high
 
     def scale(self, s: FloatArray) -> Scale:
-        """K = k/2 (L x)^2 with x = p/(L - p)."""
+        """Return K = k/2 (L x)^2 with x = p/(L - p)."""
         rest = self.length - self.lead * s
         ratio, slope = self.lead * s / rest, self.length * self.lead / (rest * rest)
         factor = self.k * self.length * self.length

@@ -40,11 +40,11 @@ def increasing_root(
     """Return the zero of a function between `low` and `high`, to rounding; an end if it has none.
 
     Args:
-        function: what increases between both.
-        low: the smaller ends, (samples,).
-        high: the larger ends.
-        start: first guesses; the middle is taken where they do not lie between both.
-        constants: what else the function takes, arrays (samples,).
+        function: Function that increases between both ends.
+        low: Smaller ends, (samples,).
+        high: Larger ends.
+        start: First guesses; the middle is taken where they do not lie between both.
+        constants: Further arguments of the function, arrays (samples,).
     """
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
@@ -92,7 +92,7 @@ class ScaleLaw(ABC):
 
     @abstractmethod
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives at settings."""
+        """Return K with its derivatives at settings."""
 
     def setting(self, scale: FloatArray, settings: tuple[float, float]) -> FloatArray:
         """Return the setting in a range at which K has a value."""
@@ -132,7 +132,7 @@ class Power(ScaleLaw):
     offset: float = number(units.DIMENSIONLESS, "length where theta_2 is zero", default=0.0)
 
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives."""
+        """Return K with its derivatives."""
         length = self.offset + self.lead * s
         scale = length**self.exponent
         slope = self.exponent * self.lead * scale / length
@@ -154,7 +154,7 @@ class PolynomialScale(ScaleLaw):
     c4: float = number(units.DIMENSIONLESS, "coefficient of theta_2^4", default=0.0)
 
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives, by Horner's scheme."""
+        """Return K with its derivatives, by Horner's scheme."""
         row = (self.c0, self.c1, self.c2, self.c3, self.c4)
         rate = tuple(power * each for power, each in enumerate(row))[1:]
         bent = tuple(power * each for power, each in enumerate(rate))[1:]

@@ -36,10 +36,10 @@ class _Limit(NamedTuple):
     """The end of the deflection to one side of rest on the branch.
 
     Attributes:
-        phi: the last deflection, infinite if there is none.
-        torque: g there.
-        critical: whether the stiffness turns around there, and A is singular; else the law ends.
-        stiffness: g' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
+        phi: Last deflection, infinite if there is none.
+        torque: G there.
+        critical: Whether the stiffness turns around there, and A is singular; else the law ends.
+        stiffness: G' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
     """
 
     phi: float
@@ -114,7 +114,7 @@ class VariableRatio(Mechanism):
         return ratio_partials(self.scale.at(s), *self.torque.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """tau_e/sigma = g/g' solved for phi between the ends of the scale, then K = sigma/g'."""
+        """Solve tau_e/sigma = g/g' for phi between the ends of the scale, then K = sigma/g'."""
         least, most = sorted(self.scale.at(np.array(self.setting, dtype=float)).value.tolist())
         with np.errstate(all="ignore"):  # a torque of a tendon that pushes, for instance
             soft, stiff = self._end(tau_e, least), self._end(tau_e, most)
@@ -138,13 +138,13 @@ class VariableRatio(Mechanism):
         )
 
     def _deflection(self, ratio: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Phi at which g/g' has a value, between two ends."""
+        """Return phi at which g/g' has a value, between two ends."""
         if isinstance(self.torque, Sine):
             return np.minimum(np.maximum(self.torque.deflection_at(ratio), low), high)
         return increasing_root(self._torque_over_stiffness, low, high, ratio, (ratio,))
 
     def _torque_over_stiffness(self, phi: FloatArray, ratio: FloatArray) -> Values:
-        """g/g' less a ratio, which grows with phi along the branch, and two derivatives."""
+        """Return g/g' minus a ratio, which increases with phi along the branch, and two derivatives."""
         state = self.torque.state(phi)
         found, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
         bent = 2 * found * slope * slope - slope - found * curvature
