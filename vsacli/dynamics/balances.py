@@ -42,10 +42,10 @@ def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
-        joint: the joint.
-        of_joint: its variables by name, `SHAFT_VARIABLES` among them.
-        tau_spring: torque of the springs against each motor by their laws, (motors, samples).
-        regular: where there must be numbers; the error is zero elsewhere.
+        joint: Joint.
+        of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
+        tau_spring: Torque of the springs against each motor by their laws, (motors, samples).
+        regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
         np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
@@ -94,7 +94,7 @@ def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_spring: Fl
 
 
 def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
-    """Row `index` of B theta'', term by term: the rate of what the kinetic energy has as momentum."""
+    """Return row `index` of B theta'', term by term."""
     own = joint.actuator.motors[index].inertia * ddtheta[index]
     coupling = joint.actuator.coupled_rotors
     return [own, coupling * ddtheta[1 - index]] if coupling else [own]
@@ -121,7 +121,7 @@ def _winding_residuals(
 
 
 def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[FloatArray]:
-    """Dry friction as the mean of both directions, half their difference, and the offset."""
+    """Return dry friction as the mean of both directions, half their difference, and the offset."""
     if friction is None:
         return []
     backward, forward = friction.coulomb
@@ -134,7 +134,7 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
 
 
 def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, FloatArray]:
-    """Velocity of each damper of a joint, by the motor that feels it; None is one between the links."""
+    """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
     if joint.damper_at("link"):
@@ -144,7 +144,7 @@ def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, Floa
 
 
 def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
-    """Power that is lost between the two links of a joint, term by term."""
+    """Return the power lost between the two links of a joint, term by term."""
     dq = of_joint["dq"]
     lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
     if joint.damper_at("link"):
@@ -153,7 +153,7 @@ def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
 
 
 def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
-    """Power that is lost between the motors and the link of a joint, term by term."""
+    """Return the power lost between the motors and the link of a joint, term by term."""
     lost = []
     for motor, dtheta in zip(joint.actuator.motors, of_joint["dtheta"], strict=False):
         lost.append(motor.damping * dtheta * dtheta)
@@ -165,7 +165,7 @@ def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
 
 
 def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
-    """Kinetic energy of the rotors of a joint, and the energy in its springs, (samples,), J."""
+    """Return the kinetic energy of the rotors of a joint plus the energy in its springs, (samples,), J."""
     energy: FloatArray = of_joint["elastic_energy"]
     motors, dtheta = joint.actuator.motors, of_joint["dtheta"]
     for motor, velocity in zip(motors, dtheta, strict=False):
@@ -260,7 +260,7 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
 
 
 def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
-    """Errors of stiffness and torque of the springs, both scaled, and of the shafts.
+    """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
     Beside a damper that of the torque is in N m, with its size, which is None elsewhere.
     """
@@ -311,11 +311,11 @@ class _Moving(NamedTuple):
     """A link frame, all in its own components.
 
     Attributes:
-        origin: from that of frame 0.
-        velocity: of the origin.
-        omega: angular velocity.
-        gravity: acceleration.
-        rotations: from frame 0 on.
+        origin: Vector from the origin of frame 0.
+        velocity: Velocity of the origin.
+        omega: Angular velocity.
+        gravity: Acceleration.
+        rotations: Rotations from frame 0 on.
     """
 
     origin: Vector
@@ -326,7 +326,7 @@ class _Moving(NamedTuple):
 
 
 def link_energy(robot: Robot, block: Block) -> FloatArray:
-    """Kinetic and potential energy of all links, (samples,), J."""
+    """Return the kinetic and potential energy of all links, (samples,), J."""
     energy = np.zeros(len(block.time))
     for joint, moving in zip(robot.joints, _link_motions(robot, block), strict=True):
         link = link_constants(joint)
@@ -341,9 +341,9 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
     """Return the powers that change `link_energy`: joints, losses between links, and the wrench; W.
 
     Args:
-        robot: the robot.
-        block: its variables.
-        frame: along whose axes the wrench is given; None if there is none.
+        robot: Robot.
+        block: Variables of the robot.
+        frame: Frame of the components of the wrench; None without a wrench.
     """
     powers = []
     for index, joint in enumerate(robot.joints):
@@ -376,7 +376,7 @@ def _link_motions(robot: Robot, block: Block) -> Iterator[_Moving]:
 
 
 def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:
-    """Power of the wrench on the end effector."""
+    """Return the power of the wrench on the end effector."""
     *_, last = _link_motions(robot, block)
     force, moment = Vector(*block.wrench.T[:3]), Vector(*block.wrench.T[3:])
     velocity = last.velocity + cross(last.omega, Vector(*robot.tool.xyz))

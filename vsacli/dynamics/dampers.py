@@ -23,11 +23,11 @@ from vsacli.robot.model import Robot
 
 
 def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
-    """D v and its first two derivatives.
+    """Return D v and its first two derivatives.
 
     Args:
         damping: d, d', d''.
-        rates: the velocity v of the damper, v', v''; scalars of any kind.
+        rates: Velocity v of the damper, v', v''; scalars of any kind.
     """
     (d, d_d, dd_d), (v, dv, ddv) = damping, rates
     return TorqueDerivatives(
@@ -38,7 +38,7 @@ def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueD
 
 
 def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[Scalar]:
-    """Velocity of each damper of a joint, from its own and those of the deflections; or accelerations."""
+    """Return the velocity of each damper of a joint from dq and dphi; or accelerations."""
     if joint.damper_at("link"):
         return [dq]
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
@@ -100,7 +100,7 @@ class Dampers:
     def variables(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
     ) -> dict[str, FloatArray]:
-        """Result variables of the dampers by name, (..., joints); none if there are no dampers."""
+        """Return the result variables of the dampers by name, (..., joints); none if there are no dampers."""
         if self._absent.all():
             return {}
         damping = commanded[DAMPING.key]

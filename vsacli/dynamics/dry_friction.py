@@ -14,11 +14,11 @@ from vsacli.dynamics.chain import TorqueDerivatives
 
 
 def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> TorqueDerivatives:
-    """F tanh(q'/w) + F_o and its derivatives, of which tanh' = 1 - tanh^2.
+    """Return F tanh(q'/w) + F_o and its derivatives, with tanh' = 1 - tanh^2.
 
     Args:
-        friction: of the joint; None if there is none.
-        rates: q', q'', q''', q''''; scalars of any kind that has a tanh, integers where they are exact.
+        friction: Friction of the joint; None without friction.
+        rates: Q', q'', q''', q''''; scalars of any kind that has a tanh, integers where they are exact.
     """
     if friction is None:
         return TorqueDerivatives(0, 0, 0)
@@ -39,9 +39,9 @@ class Response(NamedTuple):
     """Accelerations that follow from motor torques.
 
     Attributes:
-        ddq: acceleration of the joints, (..., joints).
-        ddtheta: of the motors with springs, (..., springs).
-        friction: dry friction of all motors, (..., motors); None if none has any.
+        ddq: Acceleration of the joints, (..., joints).
+        ddtheta: Acceleration of the motors with springs, (..., springs).
+        friction: Dry friction of all motors, (..., motors); None if none has any.
     """
 
     ddq: FloatArray
@@ -62,15 +62,15 @@ def response_with_friction(
     slip: FloatArray | None,
     balance: Balance,
 ) -> Response:
-    """Accelerations under motor torques and dry friction.
+    """Return the accelerations under motor torques and dry friction.
 
     Args:
-        laws: dry friction of all motors.
-        torque: of all motors, (..., motors).
-        velocity: of all motors, (..., motors).
-        slip: where friction is sharp the direction in which a motor slides, 0 while it is held, (motors,). If
+        laws: Dry friction of all motors.
+        torque: Torques of all motors, (..., motors).
+        velocity: Velocities of all motors, (..., motors).
+        slip: Where friction is sharp the direction in which a motor slides, 0 while it is held, (motors,). If
             None, a motor that rests is held as long as its friction can.
-        balance: accelerations without friction.
+        balance: Accelerations without friction.
     """
 
     def under(direction: FloatArray) -> tuple[Response, FloatArray]:

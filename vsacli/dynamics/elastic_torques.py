@@ -41,7 +41,7 @@ TORQUES = ("tau_e", "dtau_e", "ddtau_e")
 
 
 def link_constants(joint: Joint) -> LinkConstants:
-    """Constants of a joint for the recursion, with exact zeros and ones where the geometry has them."""
+    """Return the constants of a joint for the recursion; zeros and ones of the geometry are exact."""
     inertia = joint.link.inertia
     return LinkConstants(
         revolute=joint.is_revolute,
@@ -61,9 +61,9 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
     """Return the load of the end effector while the environment exerts a wrench on it.
 
     Args:
-        robot: whose base and tool count.
-        frame: along whose axes the components are, one of `vsacli.base.wrench.WRENCH_FRAMES`.
-        wrench: the six components, their first and their second derivatives; scalars of any kind.
+        robot: Robot with its base and tool.
+        frame: Frame of the components, one of `vsacli.base.wrench.WRENCH_FRAMES`.
+        wrench: Six components, their first and their second derivatives; scalars of any kind.
     """
     in_base = frame == "base"
     rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(robot.tool)
@@ -85,8 +85,8 @@ class LinkTorques(RowKernel):
     outputs are tau_e, dtau_e, ddtau_e of the joints.
 
     Attributes:
-        robot: the chain.
-        frame: of the wrench; None if there is none.
+        robot: Chain.
+        frame: Frame of the wrench; None without a wrench.
     """
 
     robot: Robot
@@ -129,9 +129,9 @@ class ElasticTorques(NamedTuple):
     """Torques that the motion of the links requires of the joints, each ([samples,] joints), N m (N) per s^k.
 
     Attributes:
-        tau_e: total elastic torque (58).
-        dtau_e: its first derivative (59); None if d3q was not given.
-        ddtau_e: its second derivative (60); None if d4q was not given.
+        tau_e: Total elastic torque (58).
+        dtau_e: First derivative of tau_e (59); None if d3q was not given.
+        ddtau_e: Second derivative of tau_e (60); None if d4q was not given.
     """
 
     tau_e: FloatArray
@@ -153,31 +153,31 @@ def link_torques(
     dddamping: ArrayLike | None = None,
     engine: str | Engine = "numpy",
 ) -> ElasticTorques:
-    """Torques that the links demand of the joints, and their first two derivatives, (36)-(60).
+    """Compute the torques that the links require of the joints, with two derivatives, (36)-(60).
 
     With q alone the robot holds still. A derivative of the torques is computed from what is given, never from
     zeros in place of what is not: tau_e takes dq and ddq, dtau_e also d3q, ddtau_e also d4q.
 
     Args:
-        robot: the chain.
-        q: joint positions, ([samples,] joints), rad (m).
-        dq: their first derivative.
-        ddq: their second derivative.
-        d3q: their third derivative.
-        d4q: their fourth derivative.
-        wrench: what the environment exerts on the end effector, arrays ([samples,] 6); nothing if None.
-        damping: of the dampers between the links, of the shape of q; the least of their ranges if None.
-        ddamping: its first derivative; zero if None.
-        dddamping: its second derivative; zero if None.
-        engine: what computes, one of `vsacli.compute.engine.NAMES`, or one that was chosen before.
+        robot: Chain.
+        q: Joint positions, ([samples,] joints), rad (m).
+        dq: Their first derivative.
+        ddq: Their second derivative.
+        d3q: Their third derivative.
+        d4q: Their fourth derivative.
+        wrench: Wrench of the environment on the end effector, arrays ([samples,] 6); zero if None.
+        damping: Damping of the dampers between the links, of the shape of q; their minimum if None.
+        ddamping: First derivative of the damping; zero if None.
+        dddamping: Second derivative of the damping; zero if None.
+        engine: Backend: one of `vsacli.compute.engine.NAMES`, or an engine chosen before.
 
     Returns:
         tau_e, dtau_e, ddtau_e, each of the shape of q; None for those derivatives that lack their input.
 
     Raises:
-        InputError: an array has another shape than the joints of the robot ask for, or than `q` and the
+        InputError: An array has another shape than the joints of the robot ask for, or than `q` and the
             wrench; a derivative of q is missing; there is no such engine, or no C compiler for it.
-        TypeError: robot or wrench is of another type.
+        TypeError: Robot or wrench is of another type.
     """
     check_robot(robot)
     if wrench is not None:
@@ -250,13 +250,13 @@ def joint_state(
     rates: tuple[Scalar, Scalar, Scalar, Scalar],
     damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
 ) -> JointState:
-    """Pose and motion of a joint for the recursion.
+    """Return the pose and motion of a joint for the recursion.
 
     Args:
-        joint: the joint.
-        q: its position.
-        rates: the four derivatives of that.
-        damping: of its damper, with two derivatives; counts if that lies between the links.
+        joint: Joint.
+        q: Position of the joint.
+        rates: Four derivatives of that.
+        damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
     """
     dh = joint.dh
     resistance = link_resistance(joint, rates, damping)

@@ -32,14 +32,14 @@ class JointEnergy(Stored):
     With other springs between the motors and the link, or between the motors, they do not split like this.
 
     Attributes:
-        elastic_peak: largest energy in the springs, J, over the steps where it exists.
-        spent: integral of the positive part of each motor's power, summed over the motors, J.
-        recovered: that of the negative part, J; spent - recovered is the work of the motors.
-        co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
+        elastic_peak: Largest energy in the springs, J, over the steps where it exists.
+        spent: Integral of the positive part of each motor's power, summed over the motors, J.
+        recovered: Integral of the negative part, J; spent - recovered is the work of the motors.
+        co_contraction: Root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
             torques do not split.
-        load: that of tau_e/2, as above.
-        dissipated: what friction and damping of joint and motors took, J; None if nothing has dry friction.
-        copper_loss: heat in the windings of its motors, J; None if no resistance is given.
+        load: Root mean square of tau_e/2, as above.
+        dissipated: Energy lost to friction and damping of joint and motors, J; None without dry friction.
+        copper_loss: Heat in the windings of its motors, J; None if no resistance is given.
     """
 
     elastic_peak: float
@@ -67,13 +67,13 @@ class Flow(NamedTuple):
     """Energy that flows in consecutive intervals; of the motors (joints, 2, intervals), NaN where none is.
 
     Attributes:
-        intervals: their lengths, (intervals,), s.
-        work: of each motor, J.
-        spent: the positive part of that, J.
-        load: integral of (tau_1 + tau_2)^2/4, (joints, intervals).
-        co_contraction: integral of (tau_1 - tau_2)^2/4, as above.
-        dissipated: taken by friction and damping, (joints, intervals), J; None if there is no dry friction.
-        copper: heat in the windings, of the motors, J; None if it is not known.
+        intervals: Their lengths, (intervals,), s.
+        work: Work of each motor, J.
+        spent: Positive part of that, J.
+        load: Integral of (tau_1 + tau_2)^2/4, (joints, intervals).
+        co_contraction: Integral of (tau_1 - tau_2)^2/4, as above.
+        dissipated: Taken by friction and damping, (joints, intervals), J; None if there is no dry friction.
+        copper: Heat in the windings, of the motors, J; None if it is not known.
     """
 
     intervals: FloatArray
@@ -96,9 +96,9 @@ def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[
     """Return the common and the opposing effort of two springs over intervals, by trapezoids.
 
     Args:
-        interval: length, s.
-        before: torques of both springs.
-        after: the same at the end of the interval.
+        interval: Length, s.
+        before: Torques of both springs.
+        after: Same at the end of the interval.
     """
     (tau_1, tau_2), (next_1, next_2) = before, after
     return Efforts(
@@ -171,7 +171,7 @@ def _copper(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | 
 
 
 def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
-    """Root of the mean over time; NaN if no time has passed."""
+    """Return the root of the mean over time; NaN if no time has passed."""
     return np.sqrt(integral / duration) if duration else np.full_like(integral, np.nan)
 
 
@@ -187,9 +187,9 @@ class IntervalEnergy(RowKernel):
     friction takes, and the work of another motor's acceleration on it.
 
     Attributes:
-        inertia: of the motors of each joint.
-        coupling: the inertia B_12 of each joint.
-        rubbing: whether the work of dry friction is given.
+        inertia: Inertias of the motors of each joint.
+        coupling: Inertia B_12 of each joint.
+        rubbing: Whether the work of dry friction is given.
     """
 
     inertia: tuple[tuple[float, ...], ...]
@@ -216,7 +216,7 @@ class IntervalEnergy(RowKernel):
         return RowLayout({**motors, **dict.fromkeys(("load", "co_contraction"), joints)})
 
     def __call__(self, rows: Sequence[Any]) -> list[Any]:
-        """Energy joint by joint."""
+        """Compute the energy joint by joint."""
         given = self.arguments.unpack(rows)
         (interval,) = given["interval"]
         friction = _by_joint(given["friction"]) if self.rubbing else [None] * len(self.inertia)
@@ -237,7 +237,7 @@ def _joint_flow(
     ends: Sequence[Mapping[str, Sequence[FloatArray]]],
     friction: Sequence[FloatArray] | None,
 ) -> tuple[list[FloatArray], list[FloatArray], Efforts]:
-    """Work of both motors of a joint, NaN of one that is not there, its positive part, and efforts."""
+    """Return work, positive work and efforts of both motors of a joint; NaN for a missing motor."""
     works = [np.full_like(interval, np.nan)] * SIDES
     for side, of_motor in enumerate(inertia):
         at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
@@ -267,8 +267,8 @@ class RunEnergy:
     """The energy of a run of the inverse dynamics; `add` its blocks in order, then ask for the `report`.
 
     Args:
-        robot: the robot.
-        engine: the backend.
+        robot: Robot.
+        engine: Backend.
     """
 
     def __init__(self, robot: Robot, engine: Engine) -> None:

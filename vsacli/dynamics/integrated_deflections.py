@@ -47,8 +47,8 @@ class Task:
     """A robot and what it is asked to do; deflections are (joints, 2, samples).
 
     Attributes:
-        trajectory: the commanded motion.
-        joints: those whose deflections can be integrated.
+        trajectory: Commanded motion.
+        joints: Joints whose deflections can be integrated, by index.
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
@@ -60,13 +60,13 @@ class Task:
         self.joints = tuple(self._actuators)
 
     def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
-        """Roots of (14) of some joints."""
+        """Return the roots of (14) of some joints."""
         return np.stack(
             [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
         )
 
     def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
-        """Rates of the deflections of some joints, (19)."""
+        """Return the rates of the deflections of some joints, (19)."""
         return np.stack(
             [
                 actuator.deflection_rates(of_joint, command)
@@ -75,7 +75,7 @@ class Task:
         )
 
     def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
-        """Why the deflections of some joints cannot be integrated there: indices into `REASONS`."""
+        """Return why deflections of some joints cannot be integrated at times: indices into `REASONS`."""
         return np.stack(
             [
                 _hindrances(actuator, command, of_joint)
@@ -96,7 +96,7 @@ def _root(actuator: Actuator, command: Command) -> PairSolution:
 
 
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
-    """Singular is, too, where det A has another sign than on the joint's branch: it was zero before."""
+    """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
     solution = _root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
@@ -120,8 +120,8 @@ class Pieces(NamedTuple):
     """The pieces of a trajectory that are integrated one after the other.
 
     Attributes:
-        ends: ascending, s.
-        tolerance: relative error admitted in an integration step.
+        ends: Ascending, s.
+        tolerance: Relative error admitted in an integration step.
     """
 
     ends: FloatArray
@@ -129,7 +129,7 @@ class Pieces(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, tolerance: float) -> Pieces:
-        """Between all breakpoints if they are not too many, else between some of them."""
+        """Return the pieces between all breakpoints, or between some of them if they are too many."""
         ends = trajectory.breakpoints[1:]
         if len(ends) <= MOST_PIECES:
             return cls(ends, tolerance)
@@ -141,16 +141,16 @@ class Integration:
     """The deflections of some joints from a start on.
 
     Args:
-        task: what they are asked to do.
-        joints: their indices.
-        pieces: of the whole trajectory.
-        start: time of the deflections, s.
-        phi: deflections, (joints, 2).
+        task: Robot and motion.
+        joints: Their indices.
+        pieces: Pieces of the whole trajectory.
+        start: Time of the deflections, s.
+        phi: Deflections, (joints, 2).
 
     Attributes:
-        joints: as given.
-        times: ends of the steps.
-        stopped: why each joint that ended the integration cannot be integrated beyond the last of `times`.
+        joints: Indices of the joints.
+        times: Ends of the steps.
+        stopped: Why each joint that ended the integration cannot be integrated beyond the last of `times`.
     """
 
     def __init__(
@@ -242,7 +242,7 @@ class _Course:
     solution: OdeSolution
 
     def deflections(self, time: FloatArray) -> FloatArray:
-        """(joints, 2, samples)."""
+        """Return the deflections, (joints, 2, samples)."""
         return by_joint(self.solution(time))
 
 
@@ -251,7 +251,7 @@ class IntegratedDeflections:
     """Deflections along a trajectory, as `integrate_deflections` found them.
 
     Attributes:
-        stops: for each joint, where its way ends before the trajectory does.
+        stops: For each joint, the time at which its integration ends before the trajectory, or None.
     """
 
     stops: tuple[Stop | None, ...]
@@ -259,7 +259,7 @@ class IntegratedDeflections:
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Deflections of all joints at any times of the span, (joints, 2, samples).
+        """Return the deflections of all joints at any times of the span, (joints, 2, samples).
 
         NaN from a stop on, and at joints whose stiffness is not commanded.
         """
@@ -286,9 +286,9 @@ def integrate_deflections(
     kinds of actuator that are `integrable` have deflections to integrate.
 
     Args:
-        robot: the robot.
-        trajectory: the commanded motion.
-        tolerance: relative error admitted in an integration step, at least 1e-13.
+        robot: Robot.
+        trajectory: Commanded motion.
+        tolerance: Relative error admitted in an integration step, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     task = Task(robot, trajectory)

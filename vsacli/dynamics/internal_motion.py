@@ -34,9 +34,9 @@ class _Rule(NamedTuple):
 
     Attributes:
         nodes: (stages,), the last at 1.
-        to_coefficients: of Chebyshev's polynomials, from values at -1 and at the nodes.
-        through_nodes: the same from values at the nodes alone.
-        slopes: derivatives at the nodes from values at -1 and at the nodes.
+        to_coefficients: Matrix from values at -1 and the nodes to coefficients of Chebyshev polynomials.
+        through_nodes: Matrix from values at the nodes alone to coefficients.
+        slopes: Derivatives at the nodes from values at -1 and at the nodes.
     """
 
     nodes: FloatArray
@@ -67,7 +67,7 @@ class Collocation:
         return start + (end - start) / 2 * (1 + self._rule.nodes)
 
     def slopes(self, start: float, end: float) -> FloatArray:
-        """Rates at the nodes from values at the start and at the nodes, (stages, stages + 1), 1/s."""
+        """Return the matrix from values at start and nodes to rates at nodes, (stages, stages + 1), 1/s."""
         return self._rule.slopes * (2 / (end - start))
 
     def coefficients(self, values: FloatArray) -> FloatArray:
@@ -83,7 +83,7 @@ class Piecewise:
     """A function in cells, each with the coefficients of Chebyshev's polynomials.
 
     Args:
-        ends: of the cells, ascending, (cells + 1,), s.
+        ends: Ends of the cells, ascending, (cells + 1,), s.
         coefficients: (cells, rows, degree + 1).
     """
 
@@ -149,10 +149,10 @@ class Marched(NamedTuple):
     """The motion inside as functions of time.
 
     Attributes:
-        phi: deflections, (2, samples), up to where they go; None if they go nowhere.
+        phi: Deflections, (2, samples), up to where they go; None if they go nowhere.
         rates: w and its derivative, (2, samples), as above.
-        end: up to which time, s.
-        reason: why not further; None at the end of the trajectory.
+        end: Up to which time, s.
+        reason: Why not further; None at the end of the trajectory.
     """
 
     phi: Piecewise | None
@@ -165,11 +165,11 @@ class _Solution(NamedTuple):
     """The solution of a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
-        phi: deflections, (2, 1 + stages).
+        phi: Deflections, (2, 1 + stages).
         rates: w and its derivative by the equation, (2, stages).
-        torque: the largest that is asked of the joint.
-        damping: the largest.
-        constants: the time constants that the cell lasts.
+        torque: Largest that is asked of the joint.
+        damping: Largest.
+        constants: Time constants that the cell lasts.
     """
 
     phi: FloatArray
@@ -183,10 +183,10 @@ class _Cell(NamedTuple):
     """A cell that is still to be solved.
 
     Attributes:
-        left, right: its ends, s.
-        new: whether the demand sets in anew where it begins.
-        shares: of the last coefficients in the cells that it is a half and a quarter of, the latter first.
-        halved: how often it was halved.
+        left, right: Ends of the cell, s.
+        new: Whether the demand sets in anew where it begins.
+        shares: Shares of the last coefficients two halvings and one halving before.
+        halved: Number of halvings.
     """
 
     left: float
@@ -196,7 +196,7 @@ class _Cell(NamedTuple):
     halved: int = 0
 
     def halves(self, share: float) -> tuple[_Cell, _Cell]:
-        """Left and right."""
+        """Return the left and the right half."""
         middle = (self.left + self.right) / 2
         return (
             _Cell(self.left, middle, self.new, (self.shares[1], share), self.halved + 1),
@@ -208,8 +208,8 @@ class March:
     """Solves d w = tau_l - T from deflections at the start on.
 
     Args:
-        springs: of the joint.
-        demand: what the joint is asked to do at times (samples,), s.
+        springs: Springs of the joint.
+        demand: Function from times (samples,), s, to the command of the joint.
     """
 
     def __init__(self, springs: DampedSprings, demand: Callable[[FloatArray], Command]) -> None:
@@ -242,7 +242,7 @@ class March:
         return Marched(*_joined(ended, solved), ended[-1], None)
 
     def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
-        """Coefficients of deflections and rates; the latter by the equation, in fast cells derivatives."""
+        """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         from numpy.polynomial import chebyshev
 
         phi = self._rule.coefficients(found.phi)
@@ -254,12 +254,12 @@ class March:
         return phi, np.stack((first, second))
 
     def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
-        """Deflections in a cell from those at its start, by Newton's method; or why there are none.
+        """Return deflections in a cell from those at its start, by Newton's method, or a reason of failure.
 
         Args:
-            cell: where.
-            start: deflections (2, 1).
-            peak: torque so far, N m (N).
+            cell: Cell to solve.
+            start: Deflections (2, 1).
+            peak: Torque so far, N m (N).
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
@@ -297,9 +297,9 @@ class _Peaks:
     A motion from rest begins with torques that are nothing but rounding, so these are looked at beforehand.
 
     Args:
-        springs: of the joint.
-        demand: at the ends of the first cells.
-        start: deflections at the first of them.
+        springs: Springs of the joint.
+        demand: Commands at the ends of the first cells.
+        start: Deflections at the first of them.
 
     Attributes:
         torque: N m (N).
@@ -331,7 +331,7 @@ def _largest(values: FloatArray) -> float:
 def _joined(
     ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[Piecewise | None, Piecewise | None]:
-    """Deflections and rates over all cells."""
+    """Return the deflections and rates over all cells."""
     if not solved:
         return None, None
     phi, rates = (Piecewise(np.array(ended), np.stack(each)) for each in zip(*solved, strict=True))
@@ -343,8 +343,8 @@ class InternalMotions:
     """The motion inside each damped transmission; joints whose damping is zero all the time have none.
 
     Attributes:
-        joints: indices of those that have one.
-        stops: for each of these whose motion ends before the trajectory does, where.
+        joints: Indices of those that have one.
+        stops: Time and reason, by joint, if the motion ends before the trajectory does.
     """
 
     joints: tuple[int, ...]
@@ -410,9 +410,9 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
     """Refuse what looks at steps one by one, where a step depends on all before.
 
     Args:
-        robot: the robot.
-        trajectory: fitted to the robot.
-        work: what refuses, a plural.
+        robot: Robot.
+        trajectory: Fitted to the robot.
+        work: Subject of the message, a plural.
 
     Raises:
         InputError: a transmission is damped.

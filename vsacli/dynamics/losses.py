@@ -18,12 +18,12 @@ from vsacli.robot.model import Robot
 
 
 def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> FloatArray:
-    """Time integral over each interval, by the cubic with the values and rates at its ends; error O(h^5).
+    """Return the time integral over each interval of the cubic with these values and rates; error O(h^5).
 
     Args:
-        intervals: lengths h, (samples - 1,), s.
-        values: of the integrand, (..., samples).
-        rates: its derivative, as above.
+        intervals: Lengths h, (samples - 1,), s.
+        values: Integrand, (..., samples).
+        rates: Derivative of the integrand, (..., samples).
     """
     before, after = ((values[..., part], rates[..., part]) for part in (slice(None, -1), slice(1, None)))
     return integral(intervals, before, after)
@@ -40,15 +40,15 @@ def integral(
 def work_on_each_other(
     interval: FloatArray, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """Integral of each motor's velocity times the acceleration of the other over each interval, (2, ...).
+    """Integrate each motor's velocity times the acceleration of the other over each interval, (2, ...).
 
     By the cubics with the velocities and accelerations at the ends; error O(h^5). The sum of both is the
     difference of theta_1' theta_2', as it must be.
 
     Args:
-        interval: length h, s.
-        before: velocities and accelerations of both motors, each (2, ...).
-        after: the same at the end of the interval.
+        interval: Length h, s.
+        before: Velocities and accelerations of both motors, each (2, ...).
+        after: Same at the end of the interval.
     """
     (begin, rise), (end, rise_after) = before, after
     rise, rise_after = interval * rise, interval * rise_after
@@ -64,12 +64,12 @@ def work_on_each_other(
 
 
 def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:
-    """Time integral of the positive part of a power over each interval.
+    """Return the time integral of the positive part of a power over each interval.
 
     Args:
-        intervals: lengths h, (samples - 1,), s.
+        intervals: Lengths h, (samples - 1,), s.
         power: (..., samples); where it changes its sign in an interval it is taken for linear, error O(h^3).
-        work: its integral over each interval, (..., samples - 1); no positive part is less.
+        work: Integral of the power over each interval, (..., samples - 1), a lower bound of the result.
     """
     return positive_work(np.broadcast_to(intervals, work.shape), power[..., :-1], power[..., 1:], work)
 
@@ -92,7 +92,7 @@ def _linear(
 
 
 def trapezoids(intervals: FloatArray, values: FloatArray) -> FloatArray:
-    """Time integral over each interval of what is linear in it; error O(h^3)."""
+    """Return the time integral over each interval of a piecewise linear function; error O(h^3)."""
     integral: FloatArray = intervals / 2 * (values[..., 1:] + values[..., :-1])
     return integral
 
@@ -105,10 +105,10 @@ DAMPED = ("damping", "ddamping", "dphi")
 
 
 def dissipated_power(joint: Joint, motion: Mapping[str, Any]) -> FloatArray:
-    """Power that friction and damping of a joint and its motors take, (samples,), W.
+    """Return the power dissipated by friction and damping of a joint and its motors, (samples,), W.
 
     Args:
-        joint: the joint with its actuator.
+        joint: Joint with its actuator.
         motion: `dq`, (samples,), and `dtheta`, (2, samples), among other variables of the joint; of one with
             a damper `damping` and `dphi` as well.
     """
@@ -132,9 +132,9 @@ class Lost(NamedTuple):
     """Energy that is lost in intervals between steps, J.
 
     Attributes:
-        motor_friction: to dry friction of each motor, (joints, 2, intervals).
-        dissipated: to all friction and damping of each joint, (joints, intervals).
-        copper: to the windings of each motor, (joints, 2, intervals); None if no resistance is given.
+        motor_friction: Energy lost to dry friction of each motor, (joints, 2, intervals).
+        dissipated: Energy lost to all friction and damping of each joint, (joints, intervals).
+        copper: Heat in the windings of each motor, (joints, 2, intervals); None without a resistance.
     """
 
     motor_friction: FloatArray

@@ -46,7 +46,7 @@ class Uncertainty:
     away to either side.
 
     Attributes:
-        unstated: by name of the variable, where it depends on components whose deviation is a mere bound and
+        unstated: By name of the variable, where it depends on components whose deviation is a mere bound and
             must not be stated, (joints[, 2]).
     """
 
@@ -54,9 +54,9 @@ class Uncertainty:
         """Compute them.
 
         Args:
-            robot: the robot.
-            trajectory: for this robot, with estimated signals.
-            engine: the backend.
+            robot: Robot.
+            trajectory: Trajectory for this robot, with estimated signals.
+            engine: Backend.
         """
         estimates = trajectory.estimates
         self._start, self._elapsed = trajectory.start, probed_times(trajectory)
@@ -88,7 +88,7 @@ class Uncertainty:
 
 
 def probed_times(trajectory: Trajectory) -> FloatArray:
-    """Times at which deviations along a trajectory are computed, equally spaced, from the first step on."""
+    """Return the times at which deviations are computed, equally spaced, from the first sample on."""
     fits = [estimate.fit for estimate in trajectory.estimates.values()]
     knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
     wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
@@ -100,7 +100,7 @@ class Deviations(NamedTuple):
 
     Attributes:
         deviations: (times, joints[, 2]), NaN where there is no value, infinite where nothing can be said.
-        unstated: where they must not be stated, (joints[, 2]).
+        unstated: Whether a deviation must not be stated, (joints[, 2]).
     """
 
     deviations: dict[str, FloatArray]
@@ -111,10 +111,10 @@ class _Shift(NamedTuple):
     """A change of one function of one component by its standard deviation, (times,).
 
     Attributes:
-        name: of the function.
-        component: its index.
-        stated: whether the deviation may be stated.
-        size: of the deviation.
+        name: Name of the function.
+        component: Index of the component.
+        stated: Whether the deviation may be stated.
+        size: Standard deviation, (times,).
     """
 
     name: str
@@ -133,11 +133,11 @@ def deviations(
     """Return the deviations of all variables that depend on recorded signals, along a motion.
 
     Args:
-        robot: the robot.
-        motion: at some times.
-        estimates: the signals that were recorded.
-        covariances: of these at the times, (components, orders, orders, times), as of `SampledProfile`.
-        engine: the backend.
+        robot: Robot.
+        motion: Motion at some times.
+        estimates: Signals that were recorded.
+        covariances: Their covariances, (components, orders, orders, times), as in `SampledProfile`.
+        engine: Backend.
     """
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
@@ -175,12 +175,12 @@ def _ignored(robot: Robot, signal: Signal) -> list[int]:
 
 
 def _spreads(covariance: FloatArray) -> FloatArray:
-    """Standard deviations, (components, orders, times)."""
+    """Return the standard deviations, (components, orders, times)."""
     return np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=1, axis2=2), -1, 1))
 
 
 def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
-    """Zero of what is given, or not known: gradients by the latter are NaN as far as they count."""
+    """Return correlations from covariances; zero for components that are given or unknown."""
     product = spread[:, :, None] * spread[:, None]
     return np.divide(covariance, product, out=np.zeros_like(covariance), where=product > 0)
 
@@ -188,7 +188,7 @@ def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
 def _values_and_gradients(
     robot: Robot, motion: Motion, shifts: Sequence[_Shift], engine: Engine
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Variables by name, (times, joints[, 2]), and their changes by the shifts, (shifts, times, ...)."""
+    """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
     undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
     frame = None if motion.wrench is None else motion.wrench.frame
     kernel = BalancedDynamics(undamped, frame)  # as that of the run, which is compiled
@@ -237,8 +237,8 @@ def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:
     """Return the variance of variables that depend on one signal, (times, joints[, 2]).
 
     Args:
-        gradient: changes by one deviation of each component and order, (components * orders, times, ...).
-        correlation: of the orders of each component, (components, orders, orders, times).
+        gradient: Changes by one deviation of each component and order, (components * orders, times, ...).
+        correlation: Correlation of the orders of each component, (components, orders, orders, times).
     """
     components, orders = correlation.shape[:2]
     by_order = gradient.reshape(components, orders, *gradient.shape[1:])
