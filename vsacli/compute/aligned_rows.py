@@ -11,7 +11,7 @@ LINE = 64
 
 
 def aligned_rows(rows: int, samples: int, dtype: type[np.generic] = np.float64) -> AnyArray:
-    """Space for rows (rows, samples), not set, that each begin at a whole vector.
+    """Return uninitialized rows, (rows, samples), each of which begins at a multiple of `LINE` bytes.
 
     They are an odd number of lines apart: at a power of two, all would fall into the same sets of a cache.
     """

@@ -27,8 +27,8 @@ class Dual(NDArrayOperatorsMixin):
     """Values and their derivatives in some directions, by the protocols of NumPy (NEP 13 and 18).
 
     Attributes:
-        value: the values, of any shape; exact constants of `compute.vector` fold.
-        tangents: their derivatives by direction.
+        value: Values, of any shape; exact constants of `compute.vector` fold.
+        tangents: Their derivatives by direction.
     """
 
     def __init__(self, value: Any, tangents: Tangents) -> None:
@@ -120,7 +120,7 @@ class Dual(NDArrayOperatorsMixin):
 
 
 def seeds(values: Sequence[Any], first: int = 0) -> list[Dual]:
-    """Values as dual numbers, each array with a direction of its own, from the direction `first` on."""
+    """Return values as dual numbers, each array with its own direction, from the direction `first` on."""
     return [Dual(value, {first + at: 1}) for at, value in enumerate(values)]
 
 
@@ -216,7 +216,7 @@ def _(angle: Dual, name: str) -> Dual:
 
 @cell_on.register
 def _(position: Dual, count: int) -> IndexArray:
-    """Cells are chosen by the values."""
+    """Choose cells by the values."""
     return cell_of(position.value, count)
 
 
@@ -283,7 +283,7 @@ def _clip(values: Any, low: Any, high: Any) -> Any:
 
 
 def _joined(function: Callable[..., Any]) -> Callable[..., Dual]:
-    """Stacking or concatenating, for which all parts must have tangents."""
+    """Wrap stacking or concatenating, for which all parts need tangents."""
 
     def joined(arrays: Sequence[Any], axis: int = 0) -> Dual:
         value = function([value_of(each) for each in arrays], axis=axis)

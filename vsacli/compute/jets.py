@@ -30,10 +30,10 @@ class Truncation:
     """The set of derivatives that jets hold, closed under fewer differentiations.
 
     Attributes:
-        variables: number of variables.
-        orders: of the derivatives, the lower ones first.
-        degree: most differentiations.
-        zeroth: the order of the function itself.
+        variables: Number of variables.
+        orders: Orders of the derivatives, the lower ones first.
+        degree: Most differentiations.
+        zeroth: Order of the function itself.
     """
 
     def __init__(self, orders: Iterable[Order]) -> None:
@@ -138,7 +138,7 @@ class Jet:
         return _compose(_exponential, self * np.log(base))
 
     def composed(self, outer: Iterator[Scalar]) -> Jet:
-        """Another function of this one, from the Taylor coefficients of that at the value of this."""
+        """Return the composition with an outer function, from its Taylor coefficients at `value`."""
         zeroth = self._truncation.zeroth
         inner = Jet(self._truncation, {order: term for order, term in self._terms.items() if order != zeroth})
         result, power = Jet(self._truncation, {zeroth: next(outer)}), inner
@@ -172,7 +172,7 @@ def _reciprocal(base: Jet) -> Jet:
 
 
 def _binomial(first: Scalar, value: Scalar, exponent: float) -> Iterator[Scalar]:
-    """Taylor coefficients of a power of the value, from the power itself; without end, as those below are."""
+    """Yield the Taylor coefficients of a power of the value, from the power itself, without end."""
     coefficient = first
     for number in count():
         yield coefficient

@@ -19,7 +19,7 @@ class OfRounding(float):
     It computes as a float does, but recorded programs keep what it is.
 
     Attributes:
-        power: the power; 1/2 where a step that converges quadratically takes what is left to rounding.
+        power: Power; 1/2 where a step that converges quadratically takes what is left to rounding.
     """
 
     power: float

@@ -17,8 +17,8 @@ class RowLayout:
     """Arrays whose entries lie one after the other, a row each, as a kernel takes and gives them.
 
     Attributes:
-        shapes: of each array at one instant, by name, in the order of the rows.
-        size: number of rows.
+        shapes: Shape of each array at one instant, by name, in the order of the rows.
+        size: Number of rows.
     """
 
     def __init__(self, shapes: Mapping[str, tuple[int, ...]]) -> None:

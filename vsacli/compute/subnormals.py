@@ -24,7 +24,7 @@ RESULTS_ARE_ZERO, OPERANDS_ARE_ZERO = 0x8000, 0x0040
 
 @contextmanager
 def subnormals_as_zero() -> Iterator[None]:
-    """Small operands and results are zero, in this thread; that is so in Linux on x86-64 only."""
+    """Treat subnormal operands and results as zero in this thread; Linux on x86-64 only."""
     library = _mathematics()
     if library is None:
         yield

@@ -48,7 +48,7 @@ class Cache:
         """Return the library of a key, if there is one.
 
         Raises:
-            CacheError: there is, but its content has changed; it is removed.
+            CacheError: There is, but its content has changed; it is removed.
         """
         library = self.folder / key / LIBRARY
         if not library.parent.exists():
@@ -65,12 +65,12 @@ class Cache:
         raise CacheError(f"{library} was damaged; it is removed")
 
     def store(self, key: str, library: Path) -> None:
-        """Copy a library to its place, whole or not at all; of two processes at it, the first one's stays.
+        """Copy a library to its place, completely or not at all; the first of two processes wins.
 
         Others that were not used for long make room for it.
 
         Raises:
-            CacheError: there is no room or no permission.
+            CacheError: There is no room or no permission.
         """
         try:
             with self._staged() as folder:
@@ -96,7 +96,7 @@ class Cache:
         """Remove all libraries.
 
         Raises:
-            CacheError: no permission.
+            CacheError: No permission.
         """
         sweep(self.folder)
         for entry in self.entries():
@@ -112,10 +112,10 @@ class Cache:
                 excess -= entry.size
 
     def _remove(self, key: str) -> None:
-        """Out of the way of others at once, then for good.
+        """Remove a folder: rename it first, so that it vanishes for other processes at once.
 
         Raises:
-            CacheError: no permission.
+            CacheError: No permission.
         """
         try:
             with self._staged() as folder:
@@ -127,7 +127,7 @@ class Cache:
 
     @contextmanager
     def _staged(self) -> Iterator[Path]:
-        """A name for a folder of this process, which goes; those of processes that were killed go as well."""
+        """Yield a folder name of this process; remove it at the end, and those of killed processes."""
         sweep(self.folder)
         staged = self.folder / staging_name()
         try:
@@ -140,7 +140,7 @@ def open_cache() -> Cache:
     """Return the cache of the user, made if need be.
 
     Raises:
-        CacheError: it cannot be made, is not the user's, or others may write to it.
+        CacheError: It cannot be made, is not the user's, or others may write to it.
     """
     try:
         folder = _cache_folder()
@@ -178,7 +178,7 @@ def _checksum(path: Path) -> str:
 
 
 def _move(entry: Path, target: Path) -> None:
-    """Rename a folder, unless the target is there: a folder with files in it is not replaced."""
+    """Rename a folder, unless the target exists: a folder with files in it is not replaced."""
     try:
         entry.rename(target)
     except OSError:

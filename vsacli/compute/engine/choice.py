@@ -48,10 +48,10 @@ class Choice(NamedTuple):
     """An engine, and why it is this one.
 
     Attributes:
-        engine: the engine chosen.
-        reason: the backend, and why; a clause.
-        compiler: of the code, empty without one.
-        threads: of compiled code.
+        engine: Engine chosen.
+        reason: Backend, and why; a clause.
+        compiler: Compiler of the code; empty without one.
+        threads: Number of threads of compiled code.
     """
 
     engine: Engine
@@ -78,15 +78,15 @@ def choose(
     """Return the engine for a computation.
 
     Args:
-        name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: to be computed.
-        samples: over how many samples.
-        threads: of compiled code; as many as there are processors if None.
-        tell: receives problems on the way, and announcements of long work.
-        busy: how many of the threads do something else meanwhile, as long as one is left.
+        name: One of `NAMES`; "auto" takes compiled code where that saves time.
+        kernel: Kernel to compute.
+        samples: Over how many samples.
+        threads: Number of threads of compiled code; by default the number of CPU cores.
+        tell: Receives problems on the way, and announcements of long work.
+        busy: Number of threads that are occupied otherwise; at least one is left.
 
     Raises:
-        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
+        InputError: There is no engine of that name, or it is "c" and there is no C compiler that works, or
             nothing that it could compile.
     """
     check_engine(name)
@@ -127,12 +127,12 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
     So it does not depend on what was compiled before.
 
     Args:
-        name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: of most of them.
-        samples: over how many samples all of them compute it.
+        name: One of `NAMES`; "auto" takes compiled code where that saves time.
+        kernel: Kernel of most runs.
+        samples: Over how many samples all of them compute it.
 
     Raises:
-        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
+        InputError: There is no engine of that name, or it is "c" and there is no C compiler that works.
     """
     check_engine(name)
     usual = in_usual_blocks(samples, kernel.inputs)
@@ -155,7 +155,7 @@ def check_engine(name: str) -> None:
     """Refuse the name of no engine.
 
     Raises:
-        InputError: naming the nearest one that there is.
+        InputError: Naming the nearest one that there is.
     """
     if name not in NAMES:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
@@ -163,10 +163,10 @@ def check_engine(name: str) -> None:
 
 @contextmanager
 def compiled_as_asked() -> Iterator[None]:
-    """Around what compiles for the engine "c", where no other will do.
+    """Convert errors of the compiler into input errors, for code that requires the engine "c".
 
     Raises:
-        InputError: there is no C compiler that works, or nothing that it could compile.
+        InputError: There is no C compiler that works, or nothing that it could compile.
     """
     from vsacli.compute.engine.compiler import CompilerError
 

@@ -22,9 +22,9 @@ class CompiledEngine:
     """Machine code, compiled for each kernel when it is first needed.
 
     Args:
-        compiler: to be used.
-        threads: how many run at once.
-        tell: receives problems with the cache of compiled code, and announcements of long work.
+        compiler: Compiler to use.
+        threads: Number of threads that run at once.
+        tell: Receives problems with the cache of compiled code, and announcements of long work.
     """
 
     def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
@@ -37,7 +37,7 @@ class CompiledEngine:
         """Load a kernel's code, compiled if need be and if that is worthwhile; None if there is no such code.
 
         Raises:
-            CompilerError: it cannot be compiled.
+            CompilerError: It cannot be compiled.
         """
         if kernel not in self._loaded:
             opened = partial(Library, outputs=kernel.outputs)
@@ -58,7 +58,7 @@ def kernel_code(kernel: Kernel) -> Code:
     """Return the code of a kernel to be compiled.
 
     Raises:
-        NotImplementedError: it cannot be recorded.
+        NotImplementedError: It cannot be recorded.
     """
     program = kernel_program(kernel)
     calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]

@@ -54,8 +54,8 @@ class Compiler:
     """A C compiler.
 
     Attributes:
-        command: how it is called.
-        identity: all that decides on its code: version, processor, C library, flags.
+        command: Command that calls it.
+        identity: All that decides on its code: version, processor, C library, flags.
     """
 
     command: tuple[str, ...]
@@ -71,7 +71,7 @@ class Compiler:
         """Compile a source file to a shared library.
 
         Raises:
-            CompilerError: it could not be done.
+            CompilerError: It could not be done.
         """
         _output(self.command, *FLAGS, "-o", str(library), str(source), "-lm", kept=library.parent)
         if not library.exists():
@@ -82,7 +82,7 @@ def system_compiler() -> Compiler:
     """Return the compiler that CC names; else `cc`, else that of the package ziglang.
 
     Raises:
-        CompilerError: there is none, or it does not work.
+        CompilerError: There is none, or it does not work.
     """
     path = os.environ.get("PATH", "")
     if wanted := os.environ.get("CC"):
@@ -147,11 +147,11 @@ class Library:
     """A compiled program.
 
     Args:
-        path: of the shared library; it may be removed once loaded.
-        outputs: rows that the program computes.
+        path: Path of the shared library; it may be removed once loaded.
+        outputs: Rows that the program computes.
 
     Raises:
-        CompilerError: it cannot be loaded.
+        CompilerError: It cannot be loaded.
     """
 
     def __init__(self, path: Path, outputs: int) -> None:
@@ -189,7 +189,7 @@ def _load_vector_functions() -> None:
 
 @lru_cache(maxsize=1)
 def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads beside the calling one; they last as long as the process."""
+    """Return the threads in addition to the calling one; they last as long as the process."""
     return ThreadPoolExecutor(threads)
 
 

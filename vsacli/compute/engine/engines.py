@@ -46,14 +46,14 @@ class Kernel(Hashable, Protocol):
         """Number of output rows."""
 
     def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
-        """Rows of results, (samples,), or constants in their place.
+        """Return rows of results, (samples,), or constants in their place.
 
         Every sample is computed on its own, without a branch on its values.
         """
 
 
 def samples_per_pass(inputs: int) -> int:
-    """Samples that NumPy takes at a time of a kernel with this many inputs."""
+    """Return the number of samples per pass of NumPy, for a kernel with this many inputs."""
     return max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // inputs))
 
 
@@ -87,7 +87,7 @@ class NumPyEngine:
 
 @cache
 def keep_freed_memory() -> None:
-    """Have the C library use the memory again that arrays have left.
+    """Make the C library reuse the memory of freed arrays.
 
     That of glibc gives blocks back to the system from a size on that it adjusts to the largest block freed so
     far, mallopt(3), and the system clears them page by page when they are asked for again. The one freed here
@@ -137,7 +137,7 @@ def kernel_program(kernel: Kernel) -> Program:
     """Return the program of a kernel for one sample, with calls if it is long.
 
     Raises:
-        NotImplementedError: as of `trace`.
+        NotImplementedError: See `trace`.
     """
     from vsacli.compute.tracing import Kind, trace_by_size
 

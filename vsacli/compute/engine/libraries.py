@@ -30,9 +30,9 @@ class Code(NamedTuple):
     """C text, and its cost.
 
     Attributes:
-        text: the text.
-        operations: that are carried out for a sample.
-        functions: operations of each function that is compiled.
+        text: Text.
+        operations: Number of operations per sample.
+        functions: Operations of each function that is compiled.
     """
 
     text: str
@@ -73,14 +73,14 @@ def load(
     """Return the library of some code; None if it is not there and not worth compiling.
 
     Args:
-        code: to be compiled.
-        opened: loads a library, the same way wherever the text is the same; it may be removed once loaded.
-        compiler: to be used.
-        tell: learns what is wrong with the cache, which is no reason to fail, and what will take long.
-        worthwhile: whether to compile it if it is not in the cache.
+        code: Code to compile.
+        opened: Loads a library, the same way wherever the text is the same; it may be removed once loaded.
+        compiler: Compiler to use.
+        tell: Learns what is wrong with the cache, which is no reason to fail, and what will take long.
+        worthwhile: Whether to compile it if it is not in the cache.
 
     Raises:
-        CompilerError: it cannot be compiled or loaded.
+        CompilerError: It cannot be compiled or loaded.
     """
     key = key_of(code.text, compiler.identity)
     if key not in _loaded:
@@ -95,10 +95,10 @@ def load(
 
 
 def _announce(code: Code, tell: Tell) -> None:
-    """Say that it takes long, if it does.
+    """Announce a compilation that takes long.
 
     Raises:
-        CompilerError: it takes too long.
+        CompilerError: It takes too long.
     """
     seconds = code.compiling_seconds
     if code.takes_too_long:

@@ -114,7 +114,7 @@ _COMPOSED: dict[str, Callable[..., Operand]] = {
 
 
 def _matmul(tape: Tape, a: Cells, b: Cells) -> Cells:
-    """Matrix product; zeros of a constant matrix are taken as the absence of a term."""
+    """Return the matrix product; zeros of a constant matrix add no term."""
 
     def dot(row: Cells, column: Cells) -> Operand:
         pairs = [pair for pair in zip(row, column, strict=True) if 0 not in pair]
@@ -177,8 +177,8 @@ class TracedArray(NDArrayOperatorsMixin):
     A row of samples is an array (1,): what NumPy broadcasts along samples is broadcast along the one.
 
     Attributes:
-        tape: where operations go.
-        cells: the entries.
+        tape: Tape that records the operations.
+        cells: Entries.
     """
 
     def __init__(self, tape: Tape, cells: Any) -> None:
@@ -300,7 +300,7 @@ def cells_of(array: Any) -> Cells:
 
 
 def _unpacked(argument: Any) -> Any:
-    """Cells in place of traced arrays, inside of lists and tuples also."""
+    """Return cells in place of traced arrays, also inside lists and tuples."""
     if isinstance(argument, TracedArray):
         return argument.cells
     if isinstance(argument, list | tuple):
@@ -324,14 +324,14 @@ def trace(
     """Return the program of a function of rows of samples: what it does to one sample.
 
     Args:
-        function: from rows of samples to rows of results; each sample is computed on its own.
-        kinds: of the rows that it takes.
-        most: operations that are recorded.
-        calling: whether calls are recorded as such, or expanded.
-        short: whether subroutines are functions of their own.
+        function: Function from rows of samples to rows of results; each sample is computed independently.
+        kinds: Kinds of the input rows.
+        most: Operations that are recorded.
+        calling: Whether calls are recorded as such, or expanded.
+        short: Whether subroutines are functions of their own.
 
     Raises:
-        NotImplementedError: it has no such program, or, as `TooLongError`, one of more operations.
+        NotImplementedError: It has no such program, or, as `TooLongError`, one of more operations.
     """
     tape = Tape(most, calling, short)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
@@ -349,14 +349,14 @@ def trace_by_size(
     """Return the program of a function, as of `trace`: written out if it is short, else of calls.
 
     Args:
-        function: as of `trace`.
-        kinds: as of `trace`.
-        written_out: operations of the longest program that is written out.
-        most: operations, calls among them, of the longest other program.
-        short: as of `trace`.
+        function: See `trace`.
+        kinds: See `trace`.
+        written_out: Operations of the longest program that is written out.
+        most: Operations, calls among them, of the longest other program.
+        short: See `trace`.
 
     Raises:
-        NotImplementedError: as of `trace`.
+        NotImplementedError: See `trace`.
     """
     try:
         return trace(function, kinds, written_out, short=short)

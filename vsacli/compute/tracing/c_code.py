@@ -60,9 +60,9 @@ class ConstantArray(NamedTuple):
     """An array of constants.
 
     Attributes:
-        name: as in C.
-        type: of its entries, as in C.
-        values: its entries.
+        name: Name in C.
+        type: Type of the entries in C.
+        values: Entries.
     """
 
     name: str
@@ -90,11 +90,11 @@ class Tables:
     """All tables of some programs.
 
     Args:
-        programs: whose tables they are.
-        array_type: of the entries of each array.
+        programs: Programs with the tables.
+        array_type: Type of the entries of each array.
 
     Attributes:
-        arrays: in which they lie, the longest first.
+        arrays: Arrays that contain the tables, the longest first.
     """
 
     def __init__(self, programs: Iterable[Program], array_type: ArrayType) -> None:
@@ -118,7 +118,7 @@ class Tables:
 
 
 def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple[int, int]:
-    """Number of the array in which values follow each other, bit for bit, or of a new one, and where."""
+    """Return the index of an array that contains the values bit for bit, or of a new one, and the offset."""
     wanted = array("d", values)
     for number, others in enumerate(contents):
         whole, at = array("d", others).tobytes(), -1
@@ -134,17 +134,17 @@ class Dialect(NamedTuple):
 
     Attributes:
         types: C type of each kind of value.
-        real: writes a real constant.
-        literal: writes a real constant in an array.
-        array_type: chooses the type of the entries of an array.
-        take: writes the entry of a table at an index.
-        function: names the function for values of a kind: one of math.h; `maximum`, `minimum`, which let NaN
+        real: Writes a real constant.
+        literal: Writes a real constant in an array.
+        array_type: Chooses the type of the entries of an array.
+        take: Writes the entry of a table at an index.
+        function: Names the function for values of a kind: one of math.h; `maximum`, `minimum`, which let NaN
             pass; or `search` in a table, which is given as a pointer and a number of entries.
         templates: `integer` (a constant field of bits or index), `true`, `false`; `and`, `or`, `not` of truth
             values; `bits` (a mask where a truth value holds, else 0); `any` (whether a truth value holds for
             any sample, as a condition of C); `spread` (a real value from an array of constants).
-        where: template, for each kind, of one of two values by a truth value.
-        replaced: template of a new value where a truth value holds, else the old one, in a block of C that
+        where: Template, for each kind, of one of two values by a truth value.
+        replaced: Template of a new value where a truth value holds, else the old one, in a block of C that
             is entered where it holds for any sample.
     """
 
@@ -200,9 +200,9 @@ class Writer:
     """Writes programs in a dialect.
 
     Args:
-        dialect: how to write.
-        tables: where their constants are.
-        subroutines: names the function of a subroutine.
+        dialect: Notation of the target language.
+        tables: Tables of constants.
+        subroutines: Names the function of a subroutine.
     """
 
     def __init__(
@@ -213,7 +213,7 @@ class Writer:
         self._name_of = subroutines
 
     def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
-        """Declarations of the values of operations, in their order; names of values begin with the prefix."""
+        """Yield declarations of the values of operations in order; names of values begin with the prefix."""
         for symbol in operations:
             if symbol.operation == "subroutine":
                 yield from self._subroutine(symbol, names, prefix)
@@ -280,7 +280,7 @@ class Writer:
         return self.dialect.call(Kind.INDEX, C_NAMES[symbol.operation], searched)
 
     def _loop(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """Variables of the state, and the loop that changes them."""
+        """Yield the variables of the state, and the loop that changes them."""
         loop, *operands = symbol.operands
         own, body, dialect = _name(symbol, names, prefix), loop.body, self.dialect
         state = [f"{own}_{number}" for number in loop.numbers]
@@ -300,7 +300,7 @@ class Writer:
         yield "}"
 
     def _branch(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """Variables of the results, and the block that changes them."""
+        """Yield the variables of the results, and the block that changes them."""
         branch, *operands = symbol.operands
         own, body, dialect = _name(symbol, names, prefix), branch.body, self.dialect
         count = len(body.outputs)
@@ -325,7 +325,7 @@ class Writer:
             yield f"{self.dialect.types[kind]} {name} = {value};"
 
     def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
-        """Statements of a body, and its outputs put into variables all at once."""
+        """Yield the statements of a body, and the simultaneous assignment of its outputs."""
         prefix = f"{own}_v"
         yield from self.statements(body.operations, names, prefix)
         kinds = [kind_of(output) for output in body.outputs]
@@ -337,7 +337,7 @@ class Writer:
 
 
 def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
-    """Constants at the head of a file."""
+    """Yield the declarations of constants at the head of a file."""
     for name, array_type, values in tables.arrays:
         entries = ", ".join(dialect.entry(value, array_type) for value in values)
         yield f"static const {array_type} {name}[{len(values)}] = {{{entries}}};"

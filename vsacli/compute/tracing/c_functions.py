@@ -22,7 +22,7 @@ class Subroutines:
     """All subroutines of some programs; those that do the same are one.
 
     Attributes:
-        bodies: by the name of the function, after those that it needs.
+        bodies: Bodies by the name of the function, each after those that it calls.
     """
 
     def __init__(self, programs: Iterable[Program] = ()) -> None:
@@ -94,13 +94,13 @@ class CallingCode:
     """The parts of C code for a program of calls.
 
     Args:
-        name: beginning of the names of functions and tables.
-        program: one of nothing but calls and their items.
-        writer: writes the bodies.
+        name: Beginning of the names of functions and tables.
+        program: One of nothing but calls and their items.
+        writer: Writes the bodies.
 
     Attributes:
-        slots: how many values the workspace holds.
-        slot: place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
+        slots: Number of values in the workspace.
+        slot: Place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
     """
 
     def __init__(self, name: str, program: Program, writer: Writer) -> None:
@@ -119,7 +119,7 @@ class CallingCode:
         self.slot, self.slots = workspace.slot, workspace.counts[Kind.REAL]
 
     def declarations(self, qualifiers: str) -> Iterator[str]:
-        """Tables, and functions with these qualifiers."""
+        """Return the tables, and the functions with these qualifiers."""
         constants = ", ".join(self._dialect.entry(value, self._number) for value in self._constants) or "0"
         yield f"static const {self._number} {self._name}_{CONSTANTS}[] = {{{constants}}};"
         yield f"static const int {self._name}_{PLACES}[] = {{{', '.join(map(str, self._places))}}};"

@@ -48,7 +48,7 @@ def with_outlined_runs(program: Program) -> Program:
 
 
 def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _Run]:
-    """Calls and their items as they are, and the operations between in runs."""
+    """Yield calls and their items unchanged, and the operations between them in runs."""
     run: list[Symbol] = []
     for symbol in operations:
         of_call = symbol.operation == "call" or _is_item_of_call(symbol)
@@ -227,12 +227,12 @@ class Workspace:
     """Places of values; those that a call gives never lie where those do that it takes.
 
     Args:
-        program: one of nothing but calls and their items.
-        by_kind: whether values of each kind have places of their own, else all have real ones.
+        program: One of nothing but calls and their items.
+        by_kind: Whether values of each kind have places of their own, else all have real ones.
 
     Attributes:
-        slot: place of each value among those of its kind, by index; inputs come first, in their order.
-        counts: how many places there are for each kind.
+        slot: Place of each value among those of its kind, by index; inputs come first, in their order.
+        counts: Number of places for each kind.
     """
 
     def __init__(self, program: Program, *, by_kind: bool = False) -> None:

@@ -41,11 +41,11 @@ class Symbol:
     """An input of a program, or the result of an operation, as a scalar with + - * / cos sin tanh.
 
     Attributes:
-        tape: where the operation is.
-        index: number of the value on the tape.
-        operation: as `Tape.emit` has it; "input" for an input.
-        operands: of the operation; first comes what is fixed, a table or the body of a loop, if anything is.
-        kind: of the value.
+        tape: Tape that contains the operation.
+        index: Number of the value on the tape.
+        operation: Operation, as for `Tape.emit`; "input" for an input.
+        operands: Of the operation; first comes what is fixed, a table or the body of a loop, if anything is.
+        kind: Kind of the value.
     """
 
     __slots__ = ("index", "kind", "operands", "operation", "tape")
@@ -88,15 +88,15 @@ class Symbol:
         return self.tape.emit("negative", self)
 
     def cos(self) -> Operand:
-        """Cosine; what `numpy.cos` calls."""
+        """Return the cosine; `numpy.cos` calls this method."""
         return self.tape.emit("cos", self)
 
     def sin(self) -> Operand:
-        """Sine; what `numpy.sin` calls."""
+        """Return the sine; `numpy.sin` calls this method."""
         return self.tape.emit("sin", self)
 
     def tanh(self) -> Operand:
-        """Hyperbolic tangent; what `numpy.tanh` calls."""
+        """Return the hyperbolic tangent; `numpy.tanh` calls this method."""
         return self.tape.emit("tanh", self)
 
 
@@ -108,9 +108,9 @@ class Program(NamedTuple):
     """A program: what its outputs need, without a jump.
 
     Attributes:
-        inputs: symbols of its inputs.
-        operations: in their order.
-        outputs: symbols or constants of its results.
+        inputs: Symbols of its inputs.
+        operations: Operations in order.
+        outputs: Symbols or constants of its results.
     """
 
     inputs: tuple[Symbol, ...]
@@ -127,9 +127,9 @@ class Loop(NamedTuple):
     """A program that is repeated.
 
     Attributes:
-        body: receives the state and constants; returns the next state and whether that is the last one.
-        limit: largest number of times.
-        numbers: of the entries of the state among those that were traced.
+        body: Receives the state and constants; returns the next state and whether that is the last one.
+        limit: Largest number of times.
+        numbers: Indices of the entries of the state among those that were traced.
     """
 
     body: Program
@@ -141,8 +141,8 @@ class Branch(NamedTuple):
     """A program that runs only where a truth value holds.
 
     Attributes:
-        body: the program.
-        numbers: of its outputs among those that were traced.
+        body: Program.
+        numbers: Indices of the outputs among those that were traced.
     """
 
     body: Program
@@ -153,8 +153,8 @@ class Call(NamedTuple):
     """A program that others call as well.
 
     Attributes:
-        body: the program.
-        numbers: of its outputs among those that were traced.
+        body: Program.
+        numbers: Indices of the outputs among those that were traced.
     """
 
     body: Program
@@ -165,7 +165,7 @@ class Subroutine(NamedTuple):
     """A program that stands in a function of its own; its inputs and outputs are real numbers.
 
     Attributes:
-        body: the program, whichever of its outputs are read.
+        body: Program, whichever of its outputs are read.
     """
 
     body: Program
@@ -230,7 +230,7 @@ def result_kind(operation: str, operands: Sequence[Any]) -> Kind:
     """Return the kind of an operation's result.
 
     Raises:
-        NotImplementedError: it is none of those that can be recorded.
+        NotImplementedError: It is none of those that can be recorded.
     """
     if operation in _KINDS:
         return _KINDS[operation]

@@ -53,12 +53,12 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int]) -> 
     It calls functions by their names in NumPy.
 
     Args:
-        program: one without loops and branches.
-        name: of the function.
-        arguments: how many inputs there are in each of its arguments, by name.
+        program: One without loops and branches.
+        name: Name of the function.
+        arguments: Number of inputs in each argument, by name.
 
     Raises:
-        NotImplementedError: the program has loops or branches.
+        NotImplementedError: The program has loops or branches.
     """
     distinct = dict.fromkeys(table for table, _ in table_uses(program))
     tables = {table: f"table_{number}" for number, table in enumerate(distinct)}
@@ -98,7 +98,7 @@ def number_function(program: Program) -> NumberFunction:
     """Return a program as a function of plain numbers.
 
     Raises:
-        NotImplementedError: it has loops or branches.
+        NotImplementedError: It has loops or branches.
     """
     function: NumberFunction = defined(_code(program), "run", dict(_ON_NUMBERS))
     return function

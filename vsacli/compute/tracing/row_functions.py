@@ -37,11 +37,11 @@ class RowFunction:
     the last bit.
 
     Attributes:
-        rows: how many intermediate values of each kind are kept at most at a time.
-        run: computes, given rows of inputs, the rows of each kind that it needs, and rows for the outputs.
+        rows: Largest number of intermediate values of each kind kept at a time.
+        run: Computes, given rows of inputs, the rows of each kind that it needs, and rows for the outputs.
 
     Raises:
-        NotImplementedError: the program has loops, branches or tables.
+        NotImplementedError: The program has loops, branches or tables.
     """
 
     def __init__(self, program: Program) -> None:
@@ -53,7 +53,7 @@ class RowFunction:
         self.rows = allocation.counts
 
     def workspace(self, samples: int) -> RowSpace:
-        """Rows for the intermediate values of at most this many samples."""
+        """Return rows for the intermediate values of at most this many samples."""
         return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in DTYPES.items())
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:
@@ -67,8 +67,8 @@ class _RowAllocation:
     """The row of each value of a program while it is live, as a compiler allocates registers.
 
     Attributes:
-        counts: how many rows there are of each kind.
-        constants: by their names, as arrays (): NumPy would make one of each number, at every call.
+        counts: Number of rows of each kind.
+        constants: Constants by name, as arrays (): NumPy would convert each number at every call.
     """
 
     def __init__(self, program: Program) -> None:
@@ -92,7 +92,7 @@ class _RowAllocation:
         self._calls = [line for number in range(len(program.operations)) for line in self._operation(number)]
 
     def heading(self) -> Iterator[str]:
-        """Statements that give the rows their names."""
+        """Return statements that assign names to the rows."""
         spaces = ("real", "truth", "bits")
         yield f" {', '.join(spaces)} = workspace"
         yield _unpacking("x", len(self._program.inputs), "inputs")
@@ -101,7 +101,7 @@ class _RowAllocation:
             yield _unpacking(letter, self.counts[kind], space)
 
     def statements(self) -> Iterator[str]:
-        """Statements that compute."""
+        """Return the statements that compute."""
         yield from self._calls
         for number, output in enumerate(self._program.outputs):
             if not (isinstance(output, Symbol) and self._output_row.get(output.index) == f"o{number}"):
@@ -144,7 +144,7 @@ class _RowAllocation:
         return row
 
     def _free_dead_operands(self, symbol: Symbol, number: int) -> None:
-        """The rows of operands that are not needed any more, and of no output, may be used again."""
+        """Free the rows of operands that are used neither later nor as an output."""
         for operand in dict.fromkeys(part for part in symbol.operands if isinstance(part, Symbol)):
             dead = self._last_use[operand.index] == number and operand.index not in self._returned
             if dead and operand.operation != "input":
@@ -178,7 +178,7 @@ class CallingRowFunction:
     """A program of calls on rows of any length; elsewise as `RowFunction`.
 
     Raises:
-        NotImplementedError: the program has loops, branches or tables.
+        NotImplementedError: The program has loops, branches or tables.
     """
 
     def __init__(self, program: Program) -> None:
@@ -200,7 +200,7 @@ class CallingRowFunction:
                 yield _Call(self._functions[id(body)], given, results)
 
     def workspace(self, samples: int) -> RowSpace:
-        """Rows for what calls hand on, and then for the intermediate values of any of the functions."""
+        """Return rows for the arguments and results of calls, and for intermediate values of any function."""
         own = {
             kind: max((function.rows[kind] for function in self._functions.values()), default=0)
             for kind in DTYPES

@@ -204,6 +204,6 @@ def _chosen(entries: Sequence[Any], places: Iterable[int]) -> list[Any]:
 
 
 def _used(program: Program) -> set[int]:
-    """Values that a program reads or returns."""
+    """Return the values that a program reads or returns."""
     operands = (operand for symbol in program.operations for operand in symbol.operands)
     return {operand.index for operand in (*operands, *program.outputs) if isinstance(operand, Symbol)}

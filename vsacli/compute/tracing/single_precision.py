@@ -45,8 +45,8 @@ def in_single_precision(program: Program, rows: Sequence[FloatArray] | FloatArra
     place of that, whereas the accuracy of NumPy's own in single precision depends on the processor.
 
     Args:
-        program: the program.
-        rows: its inputs, (samples,), which are rounded, too.
+        program: Program.
+        rows: Inputs of the program, (samples,), which are rounded, too.
 
     Returns:
         Its outputs, (samples,): single precision, truth values or bits.
@@ -84,7 +84,7 @@ def _result(operation: str, operands: Values) -> Any:
 
 
 def _loop(loop: Loop, *operands: Any) -> Results:
-    """Samples that are done keep their state while the others go on."""
+    # Samples that are done keep their state while the others continue.
     count = len(loop.numbers)
     state, constants = list(operands[:count]), operands[count:]
     going: Any = np.bool_(True)

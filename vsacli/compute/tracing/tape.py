@@ -37,12 +37,12 @@ class Tape:
     """Operations in the order in which they were carried out; a common subexpression is there once.
 
     Args:
-        most: how many there may be; with one more it raises `TooLongError`.
-        calling: whether calls are recorded as such, or expanded.
-        short: whether subroutines are functions of their own, else they are recorded where they stand.
+        most: Largest number of operations; beyond it `TooLongError` is raised.
+        calling: Whether calls are recorded as such, or expanded.
+        short: Whether subroutines are functions of their own, else they are recorded where they stand.
 
     Attributes:
-        calls: what has been recorded of calls, by what tells them apart.
+        calls: Recorded calls, by their keys.
     """
 
     def __init__(self, most: int = sys.maxsize, calling: bool = False, short: bool = False) -> None:
@@ -55,7 +55,7 @@ class Tape:
         self._ended = False
 
     def inputs(self, count: int) -> list[Symbol]:
-        """New real variables, which a program receives in this order."""
+        """Return new real variables, which a program receives in this order."""
         return [self.input(Kind.REAL) for _ in range(count)]
 
     def input(self, kind: Kind) -> Symbol:
@@ -132,7 +132,7 @@ class Tape:
 
 
 def _python_number(operand: Any) -> Any:
-    """Constants as Python's own numbers."""
+    """Return constants as numbers of Python."""
     return operand if isinstance(operand, Symbol | Table | int | OfRounding) else float(operand)
 
 

@@ -34,7 +34,7 @@ LEAST_OPERATIONS = 15
 def repeat_traced(
     first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.repeat`: the step is traced once, and repeated when the program runs."""
+    """Record `control_flow.repeat`: the step is traced once, and repeated when the program runs."""
     count = len(state)
 
     def body(rows: Sequence[Any]) -> Sequence[Any]:
@@ -52,7 +52,7 @@ def repeat_traced(
 def where_needed_traced(
     mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.where_needed`: the function is traced, and runs where the mask holds."""
+    """Record `control_flow.where_needed`: the function is traced, and runs where the mask holds."""
     count = len(otherwise)
 
     def branch(truth: Operand, *entries: Operand) -> Sequence[Operand]:
@@ -66,7 +66,7 @@ def where_needed_traced(
 
 @subroutine_on.register(TracedArray)
 def subroutine_traced(first: TracedArray, function: Function, arguments: Sequence[Any]) -> tuple[Any, ...]:
-    """`vsacli.compute.control_flow.subroutine`: a function of its own if the code is to be short."""
+    """Record `control_flow.subroutine`: a separate function if the code is to be short."""
     if not first.tape.short:
         return tuple(function(*arguments))
     entries: list[Any] = [cells_of(each).flat[0] for each in arguments]
@@ -87,7 +87,7 @@ def _nested(
 
 @look_up_on.register(TracedArray)
 def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.look_up`."""
+    """Record `control_flow.look_up`."""
     return tuple(
         _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
     )
@@ -95,7 +95,7 @@ def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArr
 
 @cell_on.register(TracedArray)
 def cell_traced(position: Any, count: int) -> Any:
-    """`cell_of`: as many of the edges between the cells as the position is not below."""
+    """Record `cell_of`: the number of edges between cells that the position is not below."""
     return np.searchsorted(np.arange(1, count), position, side="right")
 
 
@@ -157,7 +157,7 @@ class _Several(NamedTuple):
 
 @call_on.register(TracedArray)
 def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) -> Any:
-    """`vsacli.compute.control_flow.call`, on a tape that records calls; else what is called is recorded."""
+    """Record `control_flow.call` on a tape that records calls; otherwise record the function inline."""
     tape = row.tape
     if not tape.calling:
         return function(*arguments)
@@ -180,9 +180,9 @@ class _Called(NamedTuple):
     """A function that has been called.
 
     Attributes:
-        body: its program.
-        result: form of its result.
-        returned: of each value in that, which of the inputs it is; None if it is an output of the body.
+        body: Program of the body.
+        result: Form of its result.
+        returned: Of each value in that, which of the inputs it is; None if it is an output of the body.
     """
 
     body: Program
@@ -222,7 +222,7 @@ def _key(constant: Any) -> Hashable:
 
 
 def _made(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
-    """Arguments or a result of a form, with values on a tape."""
+    """Return arguments or a result of a form, with values on a tape."""
     if isinstance(form, _Value):
         return values[form.number]
     if isinstance(form, _Constant):
