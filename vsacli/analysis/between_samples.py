@@ -48,12 +48,12 @@ class Minima(NamedTuple):
     """Minima between the steps of a block.
 
     Attributes:
-        block: of each minimum everything of its own joint, as of the only joint there is; a row each.
-        quantity: what is least there, by number of `Between.quantities`.
-        joint: whose it is, by index.
-        clearance: how little.
-        step: the nearest step, by its place in the block.
-        crossed: whether more is flagged there than at the steps around.
+        block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
+        quantity: Quantity that has the minimum, by index in `Between.quantities`.
+        joint: Joint of the quantity, by index.
+        clearance: Clearance at the minimum.
+        step: Nearest step, by its place in the block.
+        crossed: Whether more is flagged there than at the steps around.
     """
 
     block: Block
@@ -75,7 +75,7 @@ class Minima(NamedTuple):
         )
 
     def of_joint(self, index: int) -> Block:
-        """Everything of one joint at its minima, in its place; joints before it are views of the same."""
+        """Return a joint's variables at its minima, in its column; the columns before are views of it."""
         own = self.block.taken(self.joint == index)
         return own.replaced(
             **{
@@ -89,15 +89,15 @@ class Between:
     """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
-        robot: the robot.
-        trajectory: along which it is computed.
-        near_singular: margin that is flagged.
-        compute: what computes its blocks.
-        judged: what corrects their flags, if anything does.
+        robot: Robot.
+        trajectory: Trajectory of the run.
+        near_singular: Margin that is flagged.
+        compute: Function that computes the block of a motion.
+        judged: Function that corrects the flags of a block for uncertainty.
 
     Attributes:
-        quantities: everything that has bounds.
-        notes: what keeps it from looking, if anything does: a sentence.
+        quantities: Everything that has bounds.
+        notes: Reason why the search is impossible, if it is: a sentence.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Between:
         return self._passed + samples < self._seen
 
     def mark(self, block: Block) -> list[Minima]:
-        """Give the next block flags that hold between its samples; return the minima that are nearest."""
+        """Set flags of minima between samples in the next block; return the minima nearest to its samples."""
         stop, own, later = self._passed + len(block.time), [], []
         for found in self._found:
             inside = found.step < stop
@@ -228,7 +228,7 @@ class Between:
         return np.where(clearance >= first, first, np.where(clearance >= 0, 0.0, -np.inf))
 
     def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
-        """Everything at minima, with the flags of what is least there, for the block of the nearest step."""
+        """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         for part in self._parts(len(steps)):
             quantity, time = found.function[part], found.time[part, 1]
             block, joint = self._judged(self._compute(self._trajectory.at(time))), self._joint[quantity]

@@ -120,7 +120,7 @@ def ladder(
     engine: Engine = NUMPY,
     internal: InternalMotions | None = None,
 ) -> tuple[float, float]:
-    """Largest error of a derivative of `RUNGS`, or of a power, relative to its peak; its bound.
+    """Return the largest error of a derivative of `RUNGS` or of a power, relative to its peak, and its bound.
 
     Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
     Motor motion is compared where it is smooth over the difference. Of the errors that is the largest which
@@ -155,14 +155,14 @@ def _ladder(
     times: FloatArray,
     steps: FloatArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Errors (derivatives, times) by the best of some steps, what noise admits, and whether all was compared.
+    """Return errors (derivatives, times) at the best scale, bounds by noise, and whether all was compared.
 
     This many times are computed together as fill a block, since a run has the memory for one.
 
     Args:
-        kernel: of the robot.
-        trajectory: the commanded motion.
-        compute: gives everything at times.
+        kernel: Kernel of the robot.
+        trajectory: Commanded motion.
+        compute: Gives everything at times.
         times: (times,), s.
         steps: (scales, times), s.
     """
@@ -193,7 +193,7 @@ def _ladder(
 
 
 def _energy_balances(kernel: BalancedDynamics, block: Block) -> Iterator[FloatArray]:
-    """Energy, the power that changes it, the size of its terms, and the grain; each (samples, joints + 1).
+    """Return energy, the power that changes it, the size of its terms, and the grain; (samples, joints + 1).
 
     Rotors and springs of each joint, then all links together. The grain is what rounding may leave of the
     energy in springs, which formulas compute as differences of terms as large as stiffness times a radian
@@ -224,10 +224,10 @@ def _compared(actuator: Actuator, name: str) -> list[bool]:
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
-    """Over which differences, (scales, times, joints), of a block of the shape (scales, offsets, times).
+    """Return which differences, (scales, times, joints), are smooth in a block (scales, offsets, times).
 
-    No step is infeasible, singular or near-singular, and the margin changes by less than a tenth: the motors'
-    motion has features as short as the way to the end of the corridor.
+    No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
+    motion has features as short as the distance to the end of the attainable range.
     """
     troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
     gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper).reshape(*shape, -1)
@@ -259,11 +259,11 @@ class _RungErrors:
         """Merge some times.
 
         Args:
-            values: of what is derived, (scales, offsets, times, joints, motors).
-            derivatives: that are to be checked, as above.
+            values: Values of the variable, (scales, offsets, times, joints, motors).
+            derivatives: Derivatives to be checked, as above.
             compared: (scales, times, joints).
-            size: what errors are measured against, if it is the largest; (times, joints, motors).
-            grain: least noise of the values, (scales, times, joints, motors).
+            size: What errors are measured against, if it is the largest; (times, joints, motors).
+            grain: Least noise of the values, (scales, times, joints, motors).
         """
         difference, *noise = (
             _combined(weights, each)
@@ -338,11 +338,11 @@ class SelfCheck(Stored):
     """Outcome of the self-check.
 
     Attributes:
-        spring_residual: largest scaled residual of (14); NaN, like `ladder`, if a number is missing.
-        ladder: largest relative error of a derivative against differences of what it derives.
-        spring_bound: bound on the residual of (14).
-        ladder_bound: bound on the error of a derivative, where it is nearest to its bound.
-        shaft_residual: largest scaled residual of the balances of motors and windings, NaN there, too; 0 in
+        spring_residual: Largest scaled residual of (14); NaN, like `ladder`, if a number is missing.
+        ladder: Largest relative error of a derivative against differences of what it derives.
+        spring_bound: Bound on the residual of (14).
+        ladder_bound: Bound on the error of a derivative, where it is nearest to its bound.
+        shaft_residual: Largest scaled residual of the balances of motors and windings, NaN there, too; 0 in
             results of before these were balanced.
     """
 

@@ -103,13 +103,13 @@ class DryFriction(Stored):
 
     Attributes:
         motor: 1 or 2.
-        lowest: what may add to the stated torque at rest, N m (N), joint side; zero or negative.
-        highest: the other end of that range; zero or positive.
-        start: steps at rest from the first step on.
-        between: steps at rest on the way.
-        end: steps at rest up to the last step.
-        reversals: how often it turns back; its torque jumps by `highest` - `lowest` there.
-        first_reversal: time of the first step after it first does, s; NaN if it never does.
+        lowest: What may add to the stated torque at rest, N m (N), joint side; zero or negative.
+        highest: Other end of that range; zero or positive.
+        start: Steps at rest from the first step on.
+        between: Steps at rest on the way.
+        end: Steps at rest up to the last step.
+        reversals: Number of reversals; the torque jumps by `highest` - `lowest` at each.
+        first_reversal: Time of the first step after it first does, s; NaN if it never does.
     """
 
     motor: int
@@ -139,7 +139,7 @@ class DryFrictionSummary:
     """Finds where one motor rests and turns back; `add` blocks in order, then ask for the `report`.
 
     Attributes:
-        number: of the motor, 1 or 2.
+        number: Number of the motor, 1 or 2.
     """
 
     def __init__(self, number: int, motor: JointMotor) -> None:

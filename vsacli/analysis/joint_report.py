@@ -55,15 +55,15 @@ class Spread(Stored):
     """The uncertainty of a variable of a joint, away from the unreliable ends of recordings.
 
     Attributes:
-        name: of the variable.
-        rms: root mean square of its standard deviation; of the motor with the larger one, if it is one of
+        name: Name of the variable.
+        rms: Root mean square of its standard deviation; of the motor with the larger one, if it is one of
             motors. NaN if none can be stated, as the records do not determine a derivative.
-        max: largest standard deviation.
-        share: of the root mean square of the variable itself that `rms` is; the larger one of both motors.
-        bound: share by which the variable may be wrong, twice `share`; where none is stated, what trials with
+        max: Largest standard deviation.
+        share: Of the root mean square of the variable itself that `rms` is; the larger one of both motors.
+        bound: Share by which the variable may be wrong, twice `share`; where none is stated, what trials with
             such records left. NaN if nothing can be said.
-        peak: largest size of the variable itself.
-        unit: of all but the share.
+        peak: Largest size of the variable itself.
+        unit: Unit of all but the share.
     """
 
     name: str
@@ -88,11 +88,11 @@ class JointUncertainty(Stored):
     """The uncertainty of a joint that recorded signals leave.
 
     Attributes:
-        variables: how uncertain the motor torque is, and each variable that was asked for.
-        asked: names of those that were asked for, and so decide.
-        steps: how many of the steps that are infeasible, and singular, would be otherwise within twice the
+        variables: Uncertainty of the motor torque, and of each requested variable.
+        asked: Names of those that were asked for, and so decide.
+        steps: How many of the steps that are infeasible, and singular, would be otherwise within twice the
             standard deviation of the margin.
-        limits: for each limit that is exceeded by no more than the uncertainty and does not count as
+        limits: For each limit that is exceeded by no more than the uncertainty and does not count as
             exceeded there, the step at which it is exceeded most.
     """
 
@@ -114,32 +114,32 @@ class JointReport(Stored):
     """The findings of a run at one joint; torques in N m (N), stiffness in N m/rad (N/m).
 
     Attributes:
-        name: of the joint.
+        name: Name of the joint.
         type: "revolute" or "prismatic".
-        actuator: its kind; what that does not have is NaN: motor 2, margin and corridor, stiffness.
-        steps: how many steps have each kind of trouble.
-        first_time: when each kind that occurs first does, s.
-        worst: the worst step of each kind that occurs; limits one by one.
-        margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
-        margin_time: when.
-        reachable: the corridor at that time.
-        stiffness_min: smallest commanded stiffness.
-        stiffness_max: the largest.
-        peak_tau_e: largest |tau_e|.
-        peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
-        start_theta: motor positions at the first step, to which the motors go before the start.
+        actuator: Kind of the actuator; values that it lacks are NaN: motor 2, margin, stiffness range.
+        steps: Number of samples with each kind of trouble.
+        first_time: Time of the first sample of each kind that occurs, s.
+        worst: Worst step of each kind that occurs; limits one by one.
+        margin: Smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
+        margin_time: Time of the smallest margin, s.
+        reachable: Corridor at that time.
+        stiffness_min: Smallest commanded stiffness.
+        stiffness_max: Largest.
+        peak_tau_e: Largest |tau_e|.
+        peak_tau_motor: Largest |tau_motor| of motors 1 and 2, over the steps where it exists.
+        start_theta: Motor positions at the first step, to which the motors go before the start.
         torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
             at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
-        other_preload: whether every infeasible step could be done with the opposite preload.
-        energy: work of the motors, elastic energy, co-contraction.
-        start_dtheta: motor velocities at the first step.
-        end_theta: motor positions at the last step of the trajectory; NaN if that was not computed.
-        end_dtheta: motor velocities there.
-        peak_dtheta: largest |dtheta| of motors 1 and 2, over the steps where it exists.
-        uncertainty: what recorded signals leave uncertain; None if nothing comes from fits of records.
-        between: what comes nearer to its bound between the steps than at any step: "margin" is the stiffness
+        other_preload: Whether every infeasible step could be done with the opposite preload.
+        energy: Work of the motors, elastic energy, co-contraction.
+        start_dtheta: Motor velocities at the first step.
+        end_theta: Motor positions at the last step of the trajectory; NaN if that was not computed.
+        end_dtheta: Motor velocities there.
+        peak_dtheta: Largest |dtheta| of motors 1 and 2, over the steps where it exists.
+        uncertainty: Uncertainty by recorded signals; None if no signal comes from a fit of a recording.
+        between: What comes nearer to its bound between the steps than at any step: "margin" is the stiffness
             in its corridor, others are called as the flags of their limits.
-        dry_friction: of each motor whose friction is sharp, where its torque is two-valued.
+        dry_friction: Dry friction of each motor with sharp friction, whose torque at rest is two-valued.
     """
 
     name: str
@@ -201,11 +201,11 @@ class JointDrift(Stored):
     """The drift of the integrated deflections of a joint.
 
     Attributes:
-        joint: its name.
-        largest: largest distance of a deflection from the root of (14), NaN if no step was integrated.
-        time: when, s.
-        unit: of the distance.
-        stop: from when on they could not be integrated, and why.
+        joint: Name of the joint.
+        largest: Largest distance of a deflection from the root of (14), NaN if no step was integrated.
+        time: Time of the largest distance, s.
+        unit: Unit of the distance.
+        stop: Time and reason at which the integration ended, if it did.
     """
 
     joint: str

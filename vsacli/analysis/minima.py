@@ -29,9 +29,9 @@ class Bounded(NamedTuple):
     """A quantity that has bounds.
 
     Attributes:
-        joint: whose it is.
-        number: of the joint.
-        limit: what bounds it; None is the stiffness in its corridor.
+        joint: Joint of the quantity.
+        number: Index of the joint.
+        limit: Limit that bounds it; None for the stiffness in its attainable range.
     """
 
     joint: Joint
@@ -44,7 +44,7 @@ class Bounded(NamedTuple):
         return REACH if self.limit is None else self.limit.flag
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
-        """Relative distance to the nearer bound, (samples,), negative beyond it.
+        """Return the relative distance to the nearer bound, (samples,), negative beyond it.
 
         Where the springs cannot carry the torque at all it is -inf. A number of a motor that does not exist
         is near no limit: +inf.
@@ -69,7 +69,7 @@ class Bounded(NamedTuple):
 
 
 def bounded_quantities(robot: Robot) -> list[Bounded]:
-    """Everything of a robot that has bounds."""
+    """Return all bounded quantities of a robot."""
     return [
         Bounded(joint, index, limit)
         for index, joint in enumerate(robot.joints)
@@ -78,7 +78,7 @@ def bounded_quantities(robot: Robot) -> list[Bounded]:
 
 
 def clearances(quantities: list[Bounded], block: Block) -> FloatArray:
-    """Clearances of all quantities, (quantities, samples)."""
+    """Return the clearances of all quantities, (quantities, samples)."""
     of_joints = {number: block.of_joint(number) for number in {quantity.number for quantity in quantities}}
     rows = [quantity.clearance(of_joints[quantity.number]) for quantity in quantities]
     return np.array(rows).reshape(-1, len(block.time))
@@ -110,9 +110,9 @@ class Known(NamedTuple):
     """Functions at consecutive times.
 
     Attributes:
-        first: number of the first time.
-        time: ascending, (times,).
-        value: at these times, (functions, times).
+        first: Number of the first time.
+        time: Ascending, (times,).
+        value: Values at these times, (functions, times).
     """
 
     first: int
@@ -146,9 +146,9 @@ class Brackets(NamedTuple):
     """Times around minima, the middle one of which has the lowest value.
 
     Attributes:
-        function: whose minimum it is, by number, (n,).
-        time: ascending, (n, 3).
-        value: at these times, (n, 3).
+        function: Index of the function, (n,).
+        time: Ascending, (n, 3).
+        value: Values at these times, (n, 3).
     """
 
     function: IndexArray
@@ -198,7 +198,7 @@ class Brackets(NamedTuple):
 
 
 def brackets(known: Known) -> Brackets:
-    """Brackets around the local minima of functions; the first and the last time are neighbours only.
+    """Return brackets of the local minima of functions; the first and the last time are neighbors only.
 
     Of equal values the last counts.
     """

@@ -126,19 +126,19 @@ def _span(low: float, high: float) -> str:
 
 
 def number(value: float) -> str:
-    """One decimal for large numbers, three digits for small ones and for those that no machine has."""
+    """Format with one decimal for large numbers, and three digits for small and for enormous ones."""
     return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
 
 
 def percent(share: float) -> str:
-    """Two decimals, or one digit of what is smaller."""
+    """Format a percentage with two decimals, or one digit of a smaller one."""
     if math.isnan(share):
         return "none"
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
 
 
 def apart(value: float, bound: float) -> tuple[str, str]:
-    """Both with as many digits as it takes to see how far they are apart, at least four."""
+    """Format two numbers with the digits that show their difference, at least four."""
     for digits in range(4, 17):
         shown = _rounded(value, digits), _rounded(bound, digits)
         if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
@@ -152,7 +152,7 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def count(steps: int) -> str:
-    """Steps by number."""
+    """Return a number of samples as text."""
     return f"{steps} step" if steps == 1 else f"{steps} steps"
 
 

@@ -123,7 +123,7 @@ class Result(Shown, Block):
         """Return the variables as an `xarray.Dataset`, with named dimensions, units and flags as in the file.
 
         Raises:
-            ModuleNotFoundError: xarray is not installed; the message says how to install it.
+            ModuleNotFoundError: Xarray is not installed; the message says how to install it.
         """
         from vsacli.results.exports.formats import labelled_dataset
 

@@ -33,8 +33,8 @@ def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
     What has no deviation of its own is judged by the motor torques, which depend on everything.
 
     Args:
-        names: of the variables that were asked for.
-        robot: whose limits count.
+        names: Names of the requested variables.
+        robot: Robot, with its limits.
     """
     judged: set[str] = set()
     for name in (name.removesuffix(deviation("")) for name in names):
@@ -55,10 +55,10 @@ class RunUncertainty:
         """Begin.
 
         Args:
-            robot: the robot.
-            trajectory: along which at least one signal was recorded and fitted.
-            asked: the variables that decide, see `judged_variables`.
-            engine: the backend.
+            robot: Robot.
+            trajectory: Trajectory with at least one recorded and fitted signal.
+            asked: Variables that decide, see `judged_variables`.
+            engine: Backend.
         """
         self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
         first, last = trajectory.times.span
@@ -142,7 +142,7 @@ class RunUncertainty:
 
 
 def _sum(before: FloatArray, terms: FloatArray) -> FloatArray:
-    """One term after the other, so that rounding does not depend on how they are divided into blocks."""
+    """Sum one term after the other, so that rounding does not depend on the division into blocks."""
     total: FloatArray = np.cumsum(np.concatenate([before[None], terms]), axis=0)[-1]
     return total
 
@@ -154,7 +154,7 @@ class _Powers:
         """Begin.
 
         Args:
-            unstated: of which the deviation must not be stated, (joints[, 2]).
+            unstated: Whether a deviation must not be stated, (joints[, 2]).
         """
         self._unstated = unstated
         self._count, self._values, self._deviations = np.zeros((3, *unstated.shape))

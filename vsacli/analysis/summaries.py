@@ -101,10 +101,10 @@ class JointSummary:
         """Return the report of the joint; at least one block must have been added.
 
         Args:
-            energy: of the joint.
-            between: what is worse between the steps than at them.
-            uncertainty: of the joint; None if no signal was recorded.
-            complete: whether the last step that was added is that of the trajectory.
+            energy: Energy of the joint.
+            between: Clearances that are lower between the samples than at them.
+            uncertainty: Uncertainty of the joint; None if no signal was recorded.
+            complete: Whether the last step that was added is that of the trajectory.
         """
         assert self._start is not None
         least, time, reachable = self._margin
@@ -156,7 +156,7 @@ class JointSummary:
             )
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
-        """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
+        """Record the worst sample of each kind; none where integrated deflections end inside the range."""
         outside = (gap < -SINGULAR_MARGIN) & ~has(flags, Flag.NOT_FINITE)
         for kind, bits in REACH.items():
             hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
@@ -170,7 +170,7 @@ class JointSummary:
                 self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
 
     def _record_not_finite(self, flags: FlagArray, time: FloatArray) -> None:
-        """The first step counts: what is not finite is as bad as any other."""
+        """Record the first sample: values that are not finite are equally bad."""
         hit, label = has(flags, Flag.NOT_FINITE), Flag.NOT_FINITE.label
         if hit.any() and label not in self._first_time:
             self._first_time[label] = first = float(time[hit.argmax()])
@@ -178,14 +178,14 @@ class JointSummary:
             self._keep(0.0, Worst(label, first, math.nan, math.nan, unit))
 
     def _record_without_stiffness(self, flags: FlagArray, time: FloatArray) -> None:
-        """The first singular step, where a spring whose stiffness is not commanded has none."""
+        """Record the first singular sample of a spring without a commanded stiffness."""
         hit = has(flags, Flag.SINGULAR)
         if hit.any():
             unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
             self._keep(0.0, Worst("singular", float(time[hit.argmax()]), 0.0, math.nan, unit))
 
     def _record_instability(self, flags: FlagArray, block: Block) -> None:
-        """The first step counts: from there on it grows."""
+        """Record the first sample: the instability grows from there on."""
         hit, label = has(flags, Flag.INTERNAL_INSTABILITY), Flag.INTERNAL_INSTABILITY.label
         if hit.any() and label not in self._first_time:
             step = int(hit.argmax())
@@ -249,7 +249,7 @@ class DriftSummary:
 
 
 def _motors_at(block: Block, step: int, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Position and velocity of the motors of a joint at a step."""
+    """Return position and velocity of the motors of a joint at a sample."""
     return block.theta[step, joint], block.dtheta[step, joint]
 
 

@@ -68,7 +68,7 @@ MOST_TOLD = 4
 
 
 def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
-    """One sentence for each kind of trouble of a joint, naming it.
+    """Return one sentence for each kind of trouble of a joint, with its name.
 
     Where many joints have a kind, the others follow in a few words each.
     """
