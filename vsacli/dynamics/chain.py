@@ -1,4 +1,4 @@
-"""Inputs and outputs of the recursion for a moving chain of links, with scalars of any kind."""
+"""Inputs and outputs of the recursion, with scalars of any kind."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class TorqueDerivatives(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that damper and friction take."""
+    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque against damper and friction."""
 
     cos: Scalar
     sin: Scalar
@@ -51,7 +51,7 @@ class JointState(NamedTuple):
 
 
 class TipLoad(NamedTuple):
-    """The force and moment of the end effector on the environment, at a point of the last link.
+    """Force and moment of the end effector on the environment, at a point of the last link.
 
     Attributes:
         force: Force and its first and second derivatives.

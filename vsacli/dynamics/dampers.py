@@ -1,7 +1,7 @@
-"""Dampers whose damping is commanded, in the equations of motion of links and motors.
+"""Dampers with commanded damping, in the equations of motion of links and motors.
 
-Between the links a damper takes d q' of the joint's torque. Beside the springs it passes d (theta_k' - q')
-from each motor that a spring lies behind to the link, as the springs pass their torques.
+A damper between the links resists the joint with the torque d q'. A damper parallel to the springs transmits
+d (theta_k' - q') to the link from each motor with a spring, in addition to the torque of the spring.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from vsacli.robot.model import Robot
 
 
 def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
-    """Return D v and its first two derivatives.
+    """Return the torque d v of a damper and its first two derivatives.
 
     Args:
         damping: d, d', d''.
@@ -58,7 +58,7 @@ def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArr
 
 
 class Passed(NamedTuple):
-    """Torques of dampers on the links, (..., joints), and against motors with springs, (..., springs)."""
+    """Torques of parallel dampers on the links, (..., joints), and against sprung motors, (..., springs)."""
 
     links: Scalar
     motors: Scalar
@@ -80,17 +80,14 @@ class Dampers:
     def of_links(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, ddq: Scalar = 0, d3q: Scalar = 0
     ) -> TorqueDerivatives:
-        """Return the torques of dampers between the links, with derivatives; exact zeros without any."""
+        """Return the torques of dampers between the links, with derivatives; exact zeros without dampers."""
         if not self._between_links.any():
             return TorqueDerivatives(0, 0, 0)
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
     def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
-        """Return the torques of dampers parallel to springs, at velocities of joints and of sprung motors.
-
-        Exact zeros if there is none.
-        """
+        """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
         if not self._beside.any():
             return Passed(0, 0)
         damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)

@@ -1,4 +1,4 @@
-"""Forward dynamics: the motion that follows from motor torques, for any mixture of actuators."""
+"""Forward dynamics: accelerations from motor torques, (5), for any mixture of actuators."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
         q: Joint positions, ([samples,] joints), rad (m).
 
     Raises:
-        InputError: q has another shape.
+        InputError: The shape of q does not fit the robot.
         TypeError: Robot is of another type.
     """
     check_robot(robot)
@@ -71,7 +71,7 @@ def state_derivative(
 ) -> Rates:
     """Compute the time derivative of the full state under motor torques: (5) solved for q'' and theta''.
 
-    A motor that rests stays at rest as long as its dry friction without a width can hold it.
+    A motor at rest stays at rest as long as its sharp dry friction (width 0) can hold it.
 
     Args:
         robot: Robot.
@@ -81,7 +81,7 @@ def state_derivative(
         damping: Damping of the dampers, ([samples,] joints); their minimum if None.
 
     Raises:
-        InputError: Shapes that do not fit, or a mass matrix that is not positive definite.
+        InputError: Shapes do not fit, or the mass matrix is not positive definite.
         TypeError: Robot or state is of another type.
     """
     check_robot(robot)
@@ -126,7 +126,7 @@ class Plant:
         """Return q, q' of the joints and theta, theta' of the motors with springs.
 
         Raises:
-            InputError: a part has another shape than the robot's.
+            InputError: a part of the state has a shape that does not fit the robot.
             TypeError: State is of another type.
         """
         check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
@@ -154,18 +154,18 @@ class Plant:
     ) -> Response:
         """Compute the accelerations of the joints and of the motors with springs, by (5).
 
-        A motor with sharp friction that rests stays at rest as long as its friction can hold it.
+        A motor with sharp friction at rest stays at rest as long as its friction can hold it.
 
         Args:
             q: Position of the joints, (..., joints).
-            dq: Their velocity.
+            dq: Velocity of the joints.
             theta: Position of the motors with springs, (..., springs).
-            dtheta: Their velocity.
+            dtheta: Velocity of the motors with springs.
             torque: Torques of all motors, (..., motors).
             wrench: Wrench of the environment, if the plant was made for one.
             commanded: Damping, by name, (..., joints); counts if there are dampers.
-            slip: Where friction is sharp the direction in which a motor slides, 0 while it is held,
-                (motors,); if None, a motor that rests is held as long as its friction can.
+            slip: Direction in which each motor with sharp friction slides, 0 while it is held, (motors,).
+                If None, a motor at rest is held as long as its friction suffices.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
         damper = self.dampers.passed(commanded, dq, dtheta)
@@ -209,7 +209,7 @@ class Plant:
 
         Args:
             dq: Velocity of the joints, (..., joints).
-            ddq: Their acceleration.
+            ddq: Acceleration of the joints.
             tau_e: Torques of the springs, (..., joints), 0 where there are none.
             torque: Torques of all motors minus their dry friction, (..., motors).
         """

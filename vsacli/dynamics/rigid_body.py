@@ -1,6 +1,6 @@
-"""The dynamics of the bare chain, solved for motion: M(q), n(q, q'), and the terms of (35) and (60).
+"""The dynamics of the chain of links without drives: M(q), n(q, q'), and the terms of (35) and (60).
 
-Each is a program recorded from the recursion (36)-(60), so that a single sample costs microseconds.
+Each is a program traced from the recursion (36)-(60), so that a single sample takes microseconds.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
 
 SMALLEST_PIVOT = 1e-12
-"""Pivot of M, relative to the diagonal entry, below which there is no mass but only rounding."""
+"""Smallest pivot of M, relative to the diagonal entry; a smaller one is rounding of a missing mass."""
 
 
 class Chain:
-    """Programs of a chain of joints, each recorded when it is first needed; get it from `chain_of`.
+    """Programs of a chain of joints, each traced at first use; use `chain_of` to obtain one.
 
     Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
     made for one.
@@ -176,7 +176,7 @@ def _last_pivot(matrices: FloatArray) -> float:
 
 
 def chain_of(robot: Robot, frame: str | None = None) -> Chain:
-    """Return the programs of a robot's links and joints; recorded once for equal chains.
+    """Return the programs of a robot's links and joints; equal chains share them.
 
     Args:
         robot: Robot; its actuators and dampers are ignored.
@@ -186,7 +186,7 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
 
 
 def bare(robot: Robot) -> Robot:
-    """Return the links and joints alone, which are equal for robots that differ only in drives."""
+    """Return the robot with a common placeholder for its drives, so that equal chains compare equal."""
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
     return Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints)

@@ -1,9 +1,9 @@
-"""Uncertainty of everything that follows from recorded signals, by propagation to first order.
+"""Uncertainty of result variables that depend on recorded signals, propagated to first order.
 
-Covariances C of recorded signals give what is computed from them the variance g C g', with g its gradient by
-the signals (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives
-of one component are correlated, components are independent of each other. Gradients are differences over one
-standard deviation to both sides, all of them one batch of samples for the kernel that computes the motion.
+With the covariance C of recorded signals, a variable with the gradient g over these has the variance g C g'
+(JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives of one
+component are correlated; components are independent of each other. Gradients are differences over one
+standard deviation to both sides, computed as one batch of samples by the kernel of the run.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
 
 MARGIN = "margin"
-"""Name of the margin of the stiffness, which has a deviation but is no variable of results."""
+"""Name of the margin of the stiffness, which has a deviation but is no result variable."""
 
 PROBES_OF_A_KNOT, FEWEST_PROBES, MOST_PROBES = 4, 2048, 32768
-"""Times at which deviations are computed; each costs some thirty steps of a run with three joints, and
-seventy with seven. Between knots of the fits they change as slowly as the motion does."""
+"""Numbers of times at which deviations are computed. Each costs about thirty samples of a run with three
+joints, and seventy with seven. Between knots of the fits, deviations change as slowly as the motion does."""
 
 
 class Uncertainty:
-    """Standard deviations of what recorded signals have a part in: computed at some times, linear in between.
+    """Standard deviations of variables that depend on recorded signals: computed at some times, else linear.
 
-    Times at which a value does not exist, as the step is infeasible or singular, play no part. The deviation
-    is NaN where the value depends on components of which nothing can be said, or does not exist one deviation
-    away to either side.
+    Times at which a value does not exist, at an infeasible or singular sample, are left out. A deviation is
+    NaN where the value depends on components of unknown deviation, or does not exist one deviation away to
+    either side.
 
     Attributes:
-        unstated: By name of the variable, where it depends on components whose deviation is a mere bound and
-            must not be stated, (joints[, 2]).
+        unstated: Whether a variable, by name, depends on components whose deviation is only a bound and must
+            not be stated, (joints[, 2]).
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> None:
-        """Compute them.
+        """Compute the deviations.
 
         Args:
             robot: Robot.
@@ -99,7 +99,7 @@ class Deviations(NamedTuple):
     """Standard deviations at some times, by variable.
 
     Attributes:
-        deviations: (times, joints[, 2]), NaN where there is no value, infinite where nothing can be said.
+        deviations: (times, joints[, 2]), NaN where there is no value, infinite where unknown.
         unstated: Whether a deviation must not be stated, (joints[, 2]).
     """
 
@@ -108,10 +108,10 @@ class Deviations(NamedTuple):
 
 
 class _Shift(NamedTuple):
-    """A change of one function of one component by its standard deviation, (times,).
+    """A change of one component of a signal or of a derivative by its standard deviation.
 
     Attributes:
-        name: Name of the function.
+        name: Name of the signal or derivative.
         component: Index of the component.
         stated: Whether the deviation may be stated.
         size: Standard deviation, (times,).
@@ -139,6 +139,7 @@ def deviations(
         covariances: Their covariances, (components, orders, orders, times), as in `SampledProfile`.
         engine: Backend.
     """
+    # A gradient has a row for each shift: signals in order, then components, then orders.
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
         _Shift(name, component, bool(estimates[signal].stated[component]), row)
@@ -167,7 +168,7 @@ def deviations(
 
 
 def _ignored(robot: Robot, signal: Signal) -> list[int]:
-    """Return the joints that do not take a signal, although there may be a column of it for them."""
+    """Return the joints that ignore a signal, although it may have a column for them."""
     commanded = signal.key in COMMANDED
     return [
         index for index, joint in enumerate(robot.joints) if commanded and signal.key not in joint.commanded
@@ -191,7 +192,7 @@ def _values_and_gradients(
     """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
     undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = BalancedDynamics(undamped, frame)  # as that of the run, which is compiled
+    kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
     shifted = block_of(kernel, _shifted(motion, shifts), engine)
     values, gradients = {}, {}
     for name, array in _uncertain(shifted).items():
@@ -206,13 +207,13 @@ def _values_and_gradients(
 def _without_inner_damper(joint: Joint) -> Joint:
     """Return the joint without a damper parallel to its springs.
 
-    With one, motors follow what the links demand later and less: what is found without is more than that.
+    With the damper, motors respond to the links later and less, so deviations without it are upper estimates.
     """
     return replace(joint, damper=joint.damper_at("link"))
 
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
-    """Return the motion, then for each shift the motion with it added, and with it subtracted, in a row."""
+    """Return the motion, followed for each shift by the motion with it added and with it subtracted."""
     given = motion.variables()
     times = given.pop("time")
     copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in given.items()}
