@@ -161,7 +161,7 @@ class Drivetrain:
         return values
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi, (..., springs), from joint (..., joints) and motor positions (..., springs); or rates."""
+        """Return phi or rates, (..., springs), from those of joints, (..., joints), and sprung motors."""
         parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
