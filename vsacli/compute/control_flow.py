@@ -1,9 +1,9 @@
 """Loops and conditionals per sample, and calls that are recorded once, for kernels that run or are traced.
 
 Everything else in the solvers is elementwise: NumPy functions, comparisons, `np.where`, and lookups in
-constant arrays with `np.searchsorted` and `look_up`. So the same code computes blocks of samples, or is traced
-to a program for one sample. The functions here have two implementations: `..._on` dispatches on the class of
-its first argument, and `vsacli.compute.tracing` registers the implementation for arrays of symbols.
+constant arrays with `np.searchsorted` and `look_up`. So the same code computes blocks of samples, or is
+traced to a program for one sample. The functions here have two implementations: `..._on` dispatches on the
+class of its first argument, and `vsacli.compute.tracing` registers the one for arrays of symbols.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ def subroutine(function: Function, arguments: Values) -> Values:
 def call(row: Any, function: Callable[..., Any], *arguments: Any) -> Any:
     """Return `function(*arguments)`; while tracing, equal calls share one recorded body.
 
-    Calls are equal if their functions are, and their arguments except for rows of samples. So the program of a
-    long chain contains the computation of equal joints once. Without tracing, this is a plain call.
+    Calls are equal if their functions are, and their arguments except for rows of samples. So the program of
+    a long chain contains the computation of equal joints once. Without tracing, this is a plain call.
 
     Args:
         row: Any row of samples among the arguments; its class chooses the implementation.

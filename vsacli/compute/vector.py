@@ -1,8 +1,8 @@
 """3-vectors of arbitrary scalars with + - *, in which exact zeros and ones cost nothing.
 
 A component is a number, a NumPy row of samples, a complex number, a fraction or a symbol. The Python integers
-0, 1 and -1 stand for exact constants: products and sums with them are folded instead of computed, so that one
-text serves every geometry without a branch on a value.
+0, 1 and -1 are exact constants: products and sums with them are folded instead of computed, so that the same
+code is efficient for every geometry, without a conditional on values.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Scalar = Any
-"""Anything with + - * among its kind and with Python integers."""
+"""Any type with + - * among its instances and with Python integers."""
 
 
 @singledispatch
@@ -79,7 +79,7 @@ def _times_integer(factor: int, a: Scalar) -> Scalar:
 
 
 class Vector(NamedTuple):
-    """Components in one frame; `+` and `-` act on vectors, `*` takes a scalar on its right."""
+    """Components in one frame; `+` and `-` act on vectors, `*` on a vector and a scalar on its right."""
 
     x: Scalar
     y: Scalar

@@ -1,9 +1,9 @@
 """Programs as statements of C.
 
-A `Writer` writes the operations of a program one after the other. A `Dialect` says how types, constants and
-choices are written: plain C99 for a single sample (`vsacli.control.codegen.scalar`), or vectors with one
-sample a lane (`vsacli.compute.engine.lanes`). `Tables` places the constant tables of programs in as few
-arrays as hold them all.
+A `Writer` writes the operations of a program one after the other. A `Dialect` is the notation of types,
+constants and choices: plain C99 for a single sample (`vsacli.control.codegen.scalar`), or vectors with one
+sample in each lane (`vsacli.compute.engine.lanes`). `Tables` merges the constant tables of programs into few
+arrays.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ C_NAMES = {
     "searchsorted": "search",
     **{f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "tan2", "sinh")},
 }
-"""Functions that have another name than in NumPy."""
+"""Functions of math.h whose names differ from NumPy's."""
 
 REAL_TYPES = ("double", "float")
 """Types of C for real numbers."""
@@ -71,19 +71,19 @@ class ConstantArray(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The place of a table."""
+    """Place of a table: an array and an offset."""
 
     array: ConstantArray
     offset: int
 
     @property
     def pointer(self) -> str:
-        """Expression of C for its first entry."""
+        """C expression of a pointer to the first entry."""
         return f"{self.array.name} + {self.offset}" if self.offset else self.array.name
 
 
 ArrayType = Callable[[tuple[float, ...], bool], str]
-"""Type in C of an array with some values, and whether they are searched."""
+"""Function from values, and whether they are searched, to the C type of their array."""
 
 
 class Tables:
@@ -179,16 +179,16 @@ class Dialect(NamedTuple):
         return f"{self.function(kind, name)}({', '.join(operands)})"
 
     def from_slot(self, kind: Kind, slot: str) -> str:
-        """Return the value of a kind that lies in a place for real ones."""
+        """Return the value of a kind that is stored in a place for real values."""
         return slot if kind is Kind.REAL else f"({self.types[kind]}){slot}"
 
     def to_slot(self, kind: Kind, value: str) -> str:
-        """Return a value of a kind as it lies in a place for real ones, which holds all flags and indices."""
+        """Return a value of a kind as stored in a place for real values, exact for all flags and indices."""
         return value if kind is Kind.REAL else f"({self.types[Kind.REAL]}){value}"
 
 
 def digits(number: float) -> str:
-    """Return a constant with all its digits; those that are not finite by their names of math.h."""
+    """Return a constant with all digits; NaN and infinity by their names in math.h."""
     if math.isnan(number):
         return "NAN"
     if math.isinf(number):
@@ -254,7 +254,7 @@ class Writer:
         return dialect.call(symbol.kind, C_NAMES.get(operation, operation), texts)
 
     def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
-        """Yield a function that puts the results of a program into an array of real numbers."""
+        """Yield a function that writes the results of a program to an array of real numbers."""
         yield head
         yield "{"
         yield from self.statements(program.operations, names)
@@ -352,5 +352,5 @@ def _name(symbol: Symbol, names: Names, prefix: str) -> str:
 
 
 def _renamed(body: Program, texts: list[str]) -> Names:
-    """Return the inputs of a body by what they are given."""
+    """Return the names of the inputs of a body: the texts of its arguments."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}

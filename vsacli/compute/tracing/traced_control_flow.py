@@ -1,7 +1,7 @@
 """Control flow on arrays of symbols: loops, branches, tables and subroutines of a sample, and shared calls.
 
-These are the second texts of the functions of `vsacli.compute.control_flow`. The body of a loop or branch is
-traced once; a call of a function with arguments of the same form, too.
+These are the traced implementations of the functions of `vsacli.compute.control_flow`. The body of a loop or
+branch is traced once, and so is a function called several times with arguments of the same form.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from vsacli.compute.tracing.tape import Tape
 Function = Callable[..., Any]
 
 LEAST_OPERATIONS = 15
-"""Operations from which a subroutine shortens code: passing arguments and results costs some five."""
+"""Smallest number of operations with which a subroutine shortens code; passing arguments costs about five."""
 
 
 @repeat_on.register(TracedArray)
@@ -81,7 +81,7 @@ def subroutine_traced(first: TracedArray, function: Function, arguments: Sequenc
 def _nested(
     tape: Tape, function: Callable[[Sequence[Any]], Sequence[Any]], entries: Sequence[Operand]
 ) -> Program:
-    """Return the program of a body within one on a tape."""
+    """Return the program of a body nested in the program of a tape."""
     return trace(function, list(map(kind_of, entries)), short=tape.short)
 
 
@@ -126,7 +126,7 @@ def _shaped(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
 
 
 class _Value(NamedTuple):
-    """A symbol: the how manieth of those in arguments or a result, and its kind."""
+    """A symbol: its index among those of the arguments or the result, and its kind."""
 
     number: int
     kind: Kind
@@ -134,7 +134,7 @@ class _Value(NamedTuple):
 
 @dataclass(frozen=True)
 class _Constant:
-    """Anything that is no symbol, and what tells it apart: 0 and 0.0 and False are three constants."""
+    """A constant, and its key, by which 0, 0.0 and False are distinguished."""
 
     key: Hashable
     value: Any = field(compare=False)
@@ -148,7 +148,7 @@ class _Array(NamedTuple):
 
 
 class _Several(NamedTuple):
-    """A tuple, list or dictionary; of a dictionary the keys."""
+    """A tuple, list or dictionary with the forms of its entries, and the keys of a dictionary."""
 
     type: type
     keys: tuple[Any, ...]
@@ -165,7 +165,7 @@ def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) 
     form = _form(list(arguments), given)
     try:
         called = tape.calls.get((function, form))
-    except TypeError:  # what cannot be hashed may hold symbols
+    except TypeError:  # an unhashable argument may contain symbols
         return function(*arguments)
     if called is None:
         called = _recorded(function, form, [symbol.kind for symbol in given], short=tape.short)
@@ -182,7 +182,7 @@ class _Called(NamedTuple):
     Attributes:
         body: Program of the body.
         result: Form of its result.
-        returned: Of each value in that, which of the inputs it is; None if it is an output of the body.
+        returned: For each value in the result, the input that it is, or None for an output of the body.
     """
 
     body: Program
