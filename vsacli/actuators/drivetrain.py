@@ -1,4 +1,4 @@
-"""Motors and springs of all joints in a row, with the inertia B of rotors, for the equations of motion."""
+"""Motors and springs of all joints, with the inertia B of rotors, for the equations of motion (5)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from vsacli.base.variables import VARIABLES
 
 
 def largest_coupling(first: float, second: float) -> float:
-    """Return what the size of a coupled inertia must be below, or B is not positive definite.
+    """Return the bound below which a coupled inertia leaves B positive definite.
 
     Args:
-        first: Inertia of one rotor, on the same side of its gear as the coupled one.
+        first: Inertia of one rotor, on the same side of its gear as the coupled inertia.
         second: Inertia of the other rotor.
     """
     return math.sqrt(first * second)
 
 
 class Rotors:
-    """Rotors of all motors with springs in a row, joint by joint; arrays (..., motors).
+    """Rotors of all motors with springs, joint by joint; arrays (..., motors).
 
-    Where motor 2 is carried around by motor 1, both feel either acceleration: B is a symmetric 2x2 matrix.
+    Where motor 1 carries motor 2, the acceleration of each acts on the other: B is a symmetric 2x2 matrix.
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -69,7 +69,7 @@ class Rotors:
 
 
 SIDES = 2
-"""Motors that a joint has at most."""
+"""Largest number of motors of a joint."""
 
 
 class _Group(NamedTuple):
@@ -81,21 +81,23 @@ class _Group(NamedTuple):
 
 
 class Drivetrain:
-    """The motors of all joints, those with a spring apart from those that move their link directly.
+    """Motors of all joints, separated into those with springs and those that move their link directly.
+
+    "Sprung" motors have springs; a rigid joint has one motor without. In shapes, `springs` are sprung motors.
 
     Attributes:
-        present: (joints, 2), where there is a motor.
-        sprung: (motors,), whether the motor acts through a spring; of motors without one, one a joint.
-        joint: (motors,), index of the joint of each motor.
-        inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
+        present: Whether there is a motor, (joints, 2).
+        sprung: Whether the motor acts through a spring, (motors,).
+        joint: Index of the joint of each motor, (motors,).
+        inertia, damping, max_torque: Constants of the motors, joint side of the gear, (motors,).
         rotors: Rotors of the motors with springs.
-        friction: Dry friction of the motors, joint side; None if none has any.
-        windings: Constants of the motors that give current and voltage; None if none is given.
-        rigid: (joints,), whether the joint has no spring.
-        deflected: (joints, 2), where there is a motor whose phi is a deflection.
+        friction: Dry friction of the motors, joint side; None without friction.
+        windings: Constants of the windings; None if no torque constant is given.
+        rigid: Whether the joint has no spring, (joints,).
+        deflected: Whether there is a motor whose phi is a deflection, (joints, 2).
         chosen: Indices of the joints whose stiffness is commanded.
-        spring_joint: (springs,), index of the joint of each spring.
-        domain: (2, springs), lowest and highest `ranged` for which each law holds.
+        spring_joint: Index of the joint of each sprung motor, (springs,).
+        domain: Lowest and highest `ranged` for which each law holds, (2, springs).
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -143,7 +145,7 @@ class Drivetrain:
     def merged(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
 
-        The latter are taken at motors without a spring.
+        Values of joints are used for motors without a spring.
         """
         return self.of_joints(self.of_all(rigid, sprung))
 
@@ -166,7 +168,7 @@ class Drivetrain:
         return self.of_springs(parts, theta)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates that `domain` bounds, (..., springs), at positions as above."""
+        """Return the coordinates that `domain` bounds, (..., springs), at positions as for `deflections`."""
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 

@@ -1,4 +1,4 @@
-"""One motor behind a spring: EJ-NEA, Buondonno & De Luca (2015), there with linear ones."""
+"""One motor behind a spring of any law; with a linear one, EJ-NEA of Buondonno & De Luca (2015)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 
 @dataclass(frozen=True)
 class Elastic(Actuator):
-    """One motor that moves the link through a spring: a linear one of some stiffness, or one of any law."""
+    """One motor that moves the link through a spring: a linear one, or one of any law."""
 
     motor: Motor = value(Record(Motor), "the motor")
     stiffness: float | None = number(
@@ -55,7 +55,7 @@ class Elastic(Actuator):
 
     @cached_property
     def law(self) -> SpringLaw:
-        """The law of its spring."""
+        """Law of the spring."""
         if self.stiffness is None:
             assert self.spring is not None, "see __post_init__"
             return self.spring
@@ -136,7 +136,7 @@ class Elastic(Actuator):
     def _nonlinear(self, command: Command) -> OfJoint:
         """Solve tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
 
-        NaN where tau_e cannot be carried; derivatives, which need 1/sigma, also where sigma is zero.
+        NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
         """
         law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
@@ -165,10 +165,7 @@ class Elastic(Actuator):
         )
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """Return the deflection at which the spring carries the torque.
-
-        It leaves no choice of the stiffness.
-        """
+        """Return the deflection at which the spring carries the torque; the stiffness cannot be chosen."""
         never = np.zeros_like(tau_e, dtype=bool)
         deflection = self.law.deflection(tau_e)
         return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)

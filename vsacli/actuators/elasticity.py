@@ -1,7 +1,7 @@
-"""Springs of joints as the equations of motion meet them: at any state of the joints and their motors.
+"""Interface of the springs of joints for the equations of motion: at any state of joints and motors.
 
-Arrays of joints are (..., joints), those of motors (..., joints, motors), whatever stands before: one
-instant, or samples.
+Arrays of joints are (..., joints), those of motors (..., joints, motors); the leading axes are free: none for
+one instant, or samples.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class Torques(NamedTuple):
 
 
 class Elasticity(ABC):
-    """The springs of joints whose actuators are of one kind: a potential of q and theta, and its derivatives.
+    """Springs of joints with one kind of actuator: a potential of q and theta, and its derivatives.
 
-    Springs are described by phi, one number for each motor, which depends linearly on q and theta. What else
-    they depend on belongs to the coordinates that the methods below take.
+    The state of the springs is phi, one coordinate per motor, linear in q and theta. The methods below take
+    `coordinates`: phi, and further variables that the springs depend on.
     """
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -54,7 +54,7 @@ class Elasticity(ABC):
 
 
 class ElasticState(ABC):
-    """The springs of joints at given coordinates: torque and stiffness, and how motions change them."""
+    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions."""
 
     @property
     @abstractmethod

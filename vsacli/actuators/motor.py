@@ -1,4 +1,4 @@
-"""A motor and its gear, as a file gives them and as they act on the joint, and what flows in its windings."""
+"""A motor and its gear: as declared in a robot file, on the joint side, and the current in the windings."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNKNOWN = {
 
 @dataclass(frozen=True)
 class JointMotor:
-    """A motor as its joint has it: at a prismatic joint it moves in m and pushes in N."""
+    """A motor on the joint side of its gear; at a prismatic joint in m and N."""
 
     inertia: float = number(units.MOTOR_INERTIA, "inertia of the drive, joint side of the gear")
     damping: float = number(units.DAMPING, "viscous damping, joint side of the gear")
@@ -66,7 +66,7 @@ class JointMotor:
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor as written down: on the joint side of its gear, or with a gear ratio on its own shaft."""
+    """A motor as declared: on the joint side of its gear, or, with a gear ratio, on its own shaft."""
 
     inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_SIDE}", check=POSITIVE)
     damping: float = number(units.DAMPING, f"viscous damping, {_SIDE}", check=NON_NEGATIVE, default=0.0)
@@ -161,15 +161,15 @@ class Motor:
 
 
 ELECTRICAL = ("current", "voltage", "copper_loss")
-"""The variables of it."""
+"""Result variables of the windings."""
 
 
 class Windings(NamedTuple):
-    """Constants of several motors; arrays that spread with those of their torques.
+    """Constants of several motors' windings; arrays that broadcast with their torques.
 
     Attributes:
-        torque_constant: Torque on the joint's side of the gear over current, and so voltage over velocity
-            there; negative if the gear turns the motor against the joint. NaN where it is not known.
+        torque_constant: Torque on the joint side of the gear over current, and so voltage over velocity
+            there; negative if the gear reverses the motion. NaN where unknown.
         resistance: Resistance of the windings, NaN where unknown.
     """
 
@@ -186,7 +186,7 @@ class Windings(NamedTuple):
         return cls(*map(np.stack, zip(*known, strict=True)))
 
     def with_axis_behind(self) -> Windings:
-        """Return the same with a further axis, for samples, behind those there are."""
+        """Return the constants with a further last axis, for samples."""
         return Windings(*(values[..., None] for values in self))
 
     def variables(self, torque: FloatArray, velocity: FloatArray) -> dict[str, FloatArray]:

@@ -1,6 +1,6 @@
-"""One motor that carries the load, and one that sets the springs behind it: MACCEPA, AwAS, levers, cams.
+"""Serial actuators: motor 1 carries the load, motor 2 adjusts the springs: MACCEPA, AwAS, levers, cams.
 
-The springs' potential, which the mechanism defines, takes the place of (14) and (61)-(72).
+The mechanism defines the potential of the springs, from which the counterparts of (14) and (61)-(72) follow.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, v
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
-"""Deflection, rad (m), whose torque is large compared with rounding. A motor that carries the load alone
-passes through zero, where its own torque is no measure."""
+"""Deflection, rad (m), whose torque is large compared with rounding. The load of motor 1 passes through zero,
+where the torque itself is no scale for its error."""
 
 
 @dataclass(frozen=True)
 class Serial(Actuator):
-    """Motor 1 moves the link through springs that motor 2 sets."""
+    """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
         Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which sets the springs"
@@ -89,7 +89,7 @@ class Serial(Actuator):
         return cls(motor=(motor, motor), mechanism=spring)
 
     def unfit_for(self, joint_type: str) -> FieldProblem | None:
-        """Return a mechanism that turns."""
+        """Return the mechanism as the problem, if it rotates and the joint does not."""
         if joint_type in self.mechanism.joint_types:
             return None
         others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
@@ -103,7 +103,7 @@ class Serial(Actuator):
 
     @property
     def coupled_rotors(self) -> float:
-        """The coupled inertia times both gear ratios, with their signs."""
+        """Coupled inertia times both gear ratios, with their signs."""
         first, second = (motor.gear_ratio or 1.0 for motor in self.motor)
         return self.coupled_inertia * first * second
 
@@ -144,7 +144,7 @@ class Serial(Actuator):
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
         """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
-        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
+        NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
         """
         stiffness, dstiffness, ddstiffness = (
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
@@ -178,8 +178,8 @@ class Serial(Actuator):
     def carried(self, of_joint: OfJoint) -> Carried:
         """Return torque and stiffness of the mechanism.
 
-        Its stiffness may be a difference of two large terms, next to zero. The last digits of phi and of the
-        setting then decide on it.
+        The stiffness may be a small difference of two large terms, which the last digits of phi and of the
+        setting determine.
         """
         state = self._state_of(of_joint)
         rows, size = state.rows, np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
@@ -199,7 +199,7 @@ class Serial(Actuator):
 
     @property
     def opposite_preload(self) -> str | None:
-        """Other branch of the mechanism."""
+        """Preload of the other branch of the mechanism."""
         return self.mechanism.opposite_preload
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:

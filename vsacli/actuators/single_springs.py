@@ -1,4 +1,4 @@
-"""One spring at each of several joints, at any state of these."""
+"""One spring at each of several joints, for the equations of motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vsacli.base.arrays import FloatArray
 
 
 class LinearRows:
-    """Linear springs, one at each joint, all evaluated at a time; else as `SpringRows`."""
+    """Linear springs, one at each joint, evaluated together; otherwise as `SpringRows`."""
 
     def __init__(self, stiffness: Sequence[float]) -> None:
         self._stiffness = np.array(stiffness)[:, None]
@@ -40,7 +40,7 @@ class SingleSprings(Elasticity):
         self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return the torques: the spring pulls link and motor equally."""
+        """Return the torques; the spring exerts the same torque on the link as against its motor."""
         tau = self._rows.torque(phi)
         return Torques(tau[..., 0], tau)
 

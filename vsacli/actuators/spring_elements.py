@@ -1,4 +1,4 @@
-"""Springs as single elements, as simulators of bodies know them: what stretches each, and how it pulls."""
+"""Springs as elements of multibody simulators: deflection and torque of each spring."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from vsacli.actuators.laws.law import SpringLaw
 
 
 class SpringElement(NamedTuple):
-    """A spring whose deflection is a weighted sum of positions, on which it pulls by the same weights.
+    """A spring whose deflection is a weighted sum of positions; its torques have the same weights.
 
     Attributes:
         law: Law of the spring.
@@ -22,9 +22,9 @@ class SpringElement(NamedTuple):
 
 
 class LeverSpring(NamedTuple):
-    """A linear spring from a lever that motor 1 turns to a point of the link, tightened by motor 2.
+    """A linear spring from a lever that motor 1 rotates to a point of the link, tightened by motor 2.
 
-    It is stretched by the distance of both ends beyond the least one, and by the pretension.
+    Its elongation is the distance of both ends minus its minimum, plus the pretension.
 
     Attributes:
         lever: Length of the lever, m.

@@ -17,14 +17,14 @@ from vsacli.documents.fields import POSITIVE, Check, number
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
 
 STRETCH_MARGIN = 1e-6
-"""Distance from 1 up to which the domain lets C sin(phi/2) come.
+"""Distance of C sin(phi/2) from 1 at the end of the domain.
 
-Beyond, where the torque grows without bound, adjacent doubles of the deflection differ in stiffness by more
-than 1e-10.
+Closer to 1, where the torque grows without bound, adjacent doubles of the deflection differ in stiffness by
+more than 1e-10.
 """
 
 GUESS_NODES = 20
-"""Points of the curve that the first guess of the inverse begins with."""
+"""Number of initial nodes of the first guess of the inverse."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class FourBar(SpringLaw):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Deflections up to the stretched linkage, all but a millionth."""
+        """Deflections up to the stretched linkage, less `STRETCH_MARGIN`."""
         end = 2 * np.arcsin((1 - STRETCH_MARGIN) / self.ratio)
         return (-end, end)
 

@@ -1,4 +1,4 @@
-"""Inverse of a spring law without a closed one: Halley's method in a shrinking bracket, a cubic guess."""
+"""Numerical inverse of a spring law: Halley's method within a shrinking bracket, from a cubic guess."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ def in_single(values: FloatArray) -> FloatArray:
 
 
 MAX_HALLEY_STEPS = 200
-"""More than bisection alone needs for all digits of a double."""
+"""Largest number of steps, more than bisection alone needs for all digits of a double."""
 
 HALLEY_RTOL = 2e-6
-"""Relative error of the torque from which one more step leaves rounding only: it takes the third power."""
+"""Relative error of the torque from which one more step converges to rounding: it takes the third power."""
 
 GUESS_RTOL = 1e-6
-"""Relative error of the torque with which a first guess is content."""
+"""Largest relative error of the torque in a first guess."""
 
 MAX_HALVINGS = 20
-"""Times that cells between the nodes of a first guess are halved; next to slack the deflection is a root of
-the torque, which no cubic comes close to."""
+"""Largest number of halvings of the cells of a first guess. Next to slack the deflection is a root of the
+torque, which no cubic approximates."""
 
 
 def inverse(
@@ -48,11 +48,11 @@ def inverse(
     Args:
         law: Spring.
         torque: Torque of the spring, N m (N).
-        low: Deflection that is not above the one sought, rad (m).
-        high: Deflection that is not below the one sought.
-        start: First guess; next to the solution one step does, without a loop.
+        low: Lower bound of the deflection, rad (m).
+        high: Upper bound of the deflection.
+        start: First guess; if it is close, one step suffices, without a loop.
     """
-    with np.errstate(all="ignore"):  # without stiffness at rest, a step leads nowhere
+    with np.errstate(all="ignore"):  # division by zero without stiffness at rest
         phi, error, state = _halley_step(law, torque, start)
         converged = _converges(torque, error) & (phi >= low) & (phi <= high)
         phi, *values = where_needed(
@@ -67,10 +67,8 @@ def inverse(
 def _halley_step(
     law: SpringLaw, torque: FloatArray, phi: FloatArray
 ) -> tuple[FloatArray, FloatArray, SpringState]:
-    """Return the deflection after a step, and the error of the torque and the state of the spring before it.
-
-    Halley's correction of the Newton step is kept between one half and two.
-    """
+    """Return the deflection after a step; also the error of the torque and the spring's state before it."""
+    # Halley's correction of the Newton step is kept between one half and two.
     state = state_of(law, phi)
     error = state.tau - torque
     newton = error / state.sigma
@@ -79,7 +77,7 @@ def _halley_step(
 
 
 def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
-    """Return whether a step from such an error of the torque leaves rounding only."""
+    """Return whether one more step converges to rounding, from the error of the torque."""
     converges: BoolArray = np.abs(error) <= HALLEY_RTOL * np.abs(torque)
     return converges
 
@@ -96,7 +94,7 @@ def _safeguarded(
         inside, middle = (halley >= low) & (halley <= high), (low + high) / 2
         next_phi = np.where(inside, halley, middle)
         converged = inside & _converges(torque, error)
-        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # that numbers can be
+        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # no double lies between
         return (next_phi, low, high, *spring.after(next_phi - phi)), converged | best
 
     low = np.where(np.isfinite(torque), low, np.nan)
@@ -111,10 +109,10 @@ def with_sign_of(torque: FloatArray, phi: FloatArray, state: SpringState) -> tup
 
 
 class FirstGuess:
-    """Deflection over the torque by Hermite's cubics between nodes of a law that are computed once."""
+    """Deflection over the torque by Hermite cubics, between nodes of a law that are computed once."""
 
     def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
-        """Begin with ascending nodes, and halve the cells that are too wide for a cubic."""
+        """Begin with ascending nodes, and halve cells until cubics are accurate."""
         self._interpolate(law, nodes)
         for _ in range(MAX_HALVINGS):
             middle = (nodes[:-1] + nodes[1:]) / 2
@@ -132,7 +130,7 @@ class FirstGuess:
         self._nodes = torque, nodes, in_single(compliance)
 
     def __call__(self, torque: FloatArray) -> FloatArray:
-        """Return the deflection under torques within those of the nodes."""
+        """Return the deflection at torques between those of the nodes."""
         cell = np.searchsorted(self._nodes[0][1:-1], torque, side="right")
         low, start, first = look_up(self._nodes, cell)
         high, end, last = look_up(self._nodes, cell + 1)

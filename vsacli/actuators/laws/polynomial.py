@@ -18,7 +18,7 @@ from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
 
 @dataclass(frozen=True)
 class Polynomial(SpringLaw):
-    """tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone it is a linear spring."""
+    """Spring tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone, a linear spring."""
 
     c1: float = number(units.STIFFNESS, "linear coefficient", check=POSITIVE)
     c3: float = number(units.CUBIC_STIFFNESS, "cubic coefficient", check=NON_NEGATIVE, default=0.0)
@@ -39,7 +39,7 @@ class Polynomial(SpringLaw):
 
     @property
     def polynomial(self) -> tuple[float, ...]:
-        """The coefficients, with zeros for even powers."""
+        """Coefficients with zeros for even powers."""
         return tuple(term for each in self._coefficients for term in (each, 0.0))[:-1]
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:

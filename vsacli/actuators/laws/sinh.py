@@ -14,13 +14,13 @@ from vsacli.documents.fields import POSITIVE, number
 
 @dataclass(frozen=True)
 class Sinh(SpringLaw):
-    """tau = k sinh(a phi), the qbmove and VSA-CubeBot family; qbmove Advanced manual (April 2021), 3.2.2."""
+    """Spring tau = k sinh(a phi) of qbmove and VSA-CubeBot; qbmove Advanced manual (April 2021), 3.2.2."""
 
     k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair of two springs of the same a."""
+        """Return the closed solution for two springs of equal a; None for other laws."""
         return SinhPair(self, other) if isinstance(other, Sinh) and same_number(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
@@ -59,7 +59,7 @@ class Sinh(SpringLaw):
 
 @dataclass(frozen=True)
 class SinhPair(Pair):
-    """Two sinh springs of the same a, from their sum and difference.
+    """Two sinh springs of equal a, solved for the sum and the difference of their deflections.
 
     With h = a(phi_1 - phi_2)/2, m = a(phi_1 + phi_2)/2 and x = sigma/a:
     x^2 - tau_e^2 = (k_1 + k_2)^2 + 4 k_1 k_2 sinh(h)^2 = R^2, and
@@ -79,7 +79,7 @@ class SinhPair(Pair):
         mean = np.arcsinh(tau_e / radius) - np.arcsinh((k_1 - k_2) / radius * sinh)
         half_spread = np.arcsinh(sinh)
         phi_1, phi_2 = (mean + half_spread) / a, (mean - half_spread) / a
-        # The weaker spring takes up what rounding leaves of the balance of the torques.
+        # The weaker spring absorbs the rounding error of the torque balance.
         if k_1 < k_2:
             phi_1 = self.first.deflection(tau_e - self.second.torque(phi_2))
         elif k_2 < k_1:

@@ -1,7 +1,7 @@
-"""Smooth curves on either side of zero: potentials that are polynomials in pieces, made from a B-spline.
+"""Smooth curves on either side of zero: piecewise polynomial potentials, integrated from a B-spline.
 
-The spline g stands for what must not change its sign: a slope over the deflection, say. Whoever makes a curve
-says how the potential follows from it by integration.
+The spline g is a function that must not change its sign, such as a slope over the deflection. The caller of
+`spline_curve` gives the integration from g to the potential.
 """
 
 from __future__ import annotations
@@ -21,18 +21,17 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 Integrate = Callable[["PPoly"], "PPoly"]
-"""The potential over the size of the deflection from the spline over that."""
+"""Function from the spline to the potential, both over the absolute value of the deflection."""
 
 
 @dataclass(frozen=True)
 class SplineCurve:
-    """A potential made of a half on either side of zero, over the size of the deflection.
+    """A potential of two halves, on either side of zero, over the absolute value of the deflection.
 
     Attributes:
         domain: Deflections at the ends.
         pieces: Number of polynomials below zero and above; in either half of equal width.
-        origins: Sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
-            nothing cancels there.
+        origins: Origins of the polynomials, (pieces,); zero next to zero, so that nothing cancels there.
         coefficients: Coefficients of the potential, from the constant on, (powers, pieces).
     """
 
@@ -49,10 +48,7 @@ class SplineCurve:
         return tuple(side * size if order % 2 else size for order, size in enumerate(sizes, first))
 
     def _piece(self, phi: FloatArray) -> IndexArray:
-        """Return the polynomial of the interval.
-
-        At an edge rounding may choose its neighbour, which is as good there.
-        """
+        """Return the index of the polynomial; at an edge, rounding may choose the neighbor, equal there."""
         (low, high), (below, above) = self.domain, self.pieces
         position = phi * (above / high)
         if below:

@@ -1,4 +1,4 @@
-"""A spring given by its measured torque-deflection curve: smooth, with the shape of a hardening spring."""
+"""A spring given by a measured torque-deflection curve, fitted by a smooth curve that hardens."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 DEGREE = 3
 MAX_PIECES = 24
-"""Knot spans of g; a spring has no finer features than a few dozen measured points can show."""
+"""Largest number of knot spans of g: a few dozen measured points show no finer features of a spring."""
 
 REST_STIFFNESS_SHARE = 1e-3
-"""Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
+"""Smallest stiffness at rest of a spring that pushes and pulls, as a share of the mean: sigma must be > 0."""
 
 LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
-"""Stands for the size of a shape that lies between two measured deflections and is zero at both."""
+"""Size of a shape that is zero at all measured deflections, to avoid 0/0."""
 
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
@@ -62,21 +62,22 @@ def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> 
 
 MIN_ROWS = 6
 GUESS_NODES = 25
-"""Points of the curve on either side that the first guess of the inverse begins with."""
+"""Number of initial nodes on either side of the first guess of the inverse."""
 
 SHAPE_TOLERANCE = 1e-3
-"""Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
+"""Violation of the shape that counts as measurement noise, as a share of the torque range; for example, of a
+point above its chord."""
 
 NO_MISFIT, POOR_MISFIT = 1e-6, 0.01
-"""Shares of the range by which a curve misses points: no bench measures the one, a smooth device keeps the
-other, of which a kink in 20 to 120 points makes 1 to 6 %."""
+"""Misfits of points, as shares of the range: below the first, no test bench could measure it; smooth devices
+stay below the second, while a kink in 20 to 120 points causes 1 to 6 %."""
 
 
 @dataclass(frozen=True)
 class MeasuredSpring(SpringLaw):
-    """Torques measured over deflections, with a smooth hardening curve fitted through them; no extrapolation.
+    """Torques measured over deflections, fitted by a smooth hardening curve, without extrapolation.
 
-    A table that begins at zero deflection is a spring that only pulls.
+    A table that begins at zero deflection describes a tendon.
     """
 
     file: Table = value(
@@ -179,7 +180,7 @@ class MeasuredSpring(SpringLaw):
 
 
 def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
-    """Return warnings of the distance of a curve from the points of a table, (rows,)."""
+    """Return warnings if the misfit of a curve at the points of a table, (rows,), is large."""
     row, share = worst_misfit(table, misfit)
     if share < NO_MISFIT:
         return ()
@@ -193,7 +194,7 @@ def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
 
 
 def worst_misfit(table: Table, misfit: FloatArray) -> tuple[int, float]:
-    """Return the row that a curve misses most, and by which share of the range."""
+    """Return the row with the largest misfit, and the misfit as a share of the range."""
     row = int(np.abs(misfit).argmax())
     return row, float(abs(misfit[row]) / np.ptp(table.values[:, 1]))
 

@@ -1,4 +1,4 @@
-"""Springs that only pull, slack at zero deflection, mirrored on side 2: quadratic and exponential tendons."""
+"""Tendons: springs that only pull, slack at zero deflection, mirrored on side 2: quadratic, exponential."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Mirrored(SpringLaw):
 
     @property
     def polynomial(self) -> tuple[float, ...] | None:
-        """Terms of odd power are the law's, those of even power their opposites."""
+        """Coefficients of the law, with those of even powers negated."""
         terms = self.law.polynomial
         return terms and tuple(term if power % 2 else -term for power, term in enumerate(terms, 1))
 
@@ -127,7 +127,7 @@ def _mirrored_interval(interval: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Quadratic(Tendon):
-    """tau = k phi^2 for phi >= 0; a pair of them behaves as an elastic joint of any chosen stiffness."""
+    """Tendon tau = k phi^2 for phi >= 0; a pair behaves as an elastic joint with a stiffness of choice."""
 
     k: float = number(units.QUADRATIC_STIFFNESS, "quadratic coefficient k", check=POSITIVE)
 
@@ -137,7 +137,7 @@ class Quadratic(Tendon):
         return (0.0, self.k)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair of twins."""
+        """Return the closed solution for two equal tendons; None for other laws."""
         return QuadraticTwins(self) if other == self.as_second() else None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
@@ -186,13 +186,13 @@ class QuadraticTwins(Pair):
 
 @dataclass(frozen=True)
 class Exponential(Tendon):
-    """tau = c (exp(a phi) - 1) for phi >= 0, so that sigma = a (tau + c)."""
+    """Tendon tau = c (exp(a phi) - 1) for phi >= 0, so that sigma = a (tau + c)."""
 
     c: float = number(units.TORQUE, "torque scale c", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair with a tendon of the same a on side 2."""
+        """Return the closed solution with a tendon of equal a on side 2; None for other laws."""
         second = other.law if isinstance(other, Mirrored) else None
         if isinstance(second, Exponential) and same_number(second.a, self.a):
             return ExponentialPair(self, second)
@@ -231,7 +231,7 @@ class Exponential(Tendon):
 
 @dataclass(frozen=True)
 class ExponentialPair(Pair):
-    """Two exponential tendons of the same a: sigma/a = tau_1 + |tau_2| + c_1 + c_2; never singular."""
+    """Two exponential tendons of equal a: sigma/a = tau_1 + |tau_2| + c_1 + c_2; never singular."""
 
     first: Exponential
     second: Exponential

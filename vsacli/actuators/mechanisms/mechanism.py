@@ -18,13 +18,13 @@ from vsacli.documents.source import Source
 
 
 class Partials(NamedTuple):
-    """The potential U(phi, s) and its partial derivatives at deflections and settings, arrays of one shape.
+    """Potential U(phi, s) and its partial derivatives at deflections and settings, arrays of one shape.
 
     Subscripts of the torque T = U_phi: p for phi, s for the setting theta_2.
 
     Attributes:
         energy: U.
-        setting_torque: U_s, what the springs exert against motor 2.
+        setting_torque: U_s, the torque of the springs against motor 2.
         setting_stiffness: U_ss.
         T, T_p, T_s, T_pp, T_ps, T_ss, T_ppp, T_pps, T_pss: Torque and its derivatives.
     """
@@ -67,7 +67,7 @@ class DecouplingRows(NamedTuple):
 
 
 class MechanismState(ElasticState):
-    """The springs of a serial actuator at coordinates, for the inverse and for the forward dynamics."""
+    """State of a serial actuator's springs at coordinates, for inverse and forward dynamics."""
 
     @property
     @abstractmethod
@@ -167,10 +167,10 @@ Range: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True)
 class Mechanism(ABC):
-    """Springs between motor 1, the link, and motor 2, which sets them; a frozen dataclass of declared fields.
+    """Springs between motor 1 and the link that motor 2 adjusts; a frozen dataclass of declared fields.
 
-    Equal mechanisms are the same for all that is computed. What depends on phi = theta_1 - q and the setting
-    s = theta_2 alone gives `partials`; else it overrides `state`. Positions in rad (m), torques in N m (N).
+    Equal mechanisms must compute the same. If the potential depends only on phi = theta_1 - q and the setting
+    s = theta_2, override `partials`, else `state`. Positions in rad (m), torques in N m (N).
 
     Attributes:
         joint_types: Types of joints that it can drive; a rotating lever drives no prismatic one.
@@ -188,13 +188,13 @@ class Mechanism(ABC):
 
     @property
     def deflection_range(self) -> tuple[float, float]:
-        """Phi for which the mechanism works."""
+        """Range of phi in which the mechanism works."""
         return (-math.inf, math.inf)
 
     @property
     @abstractmethod
     def setting_range(self) -> tuple[float, float]:
-        """theta_2 for which it works."""
+        """Range of theta_2 in which the mechanism works."""
 
     @property
     def ranges(self) -> tuple[Range, Range]:
@@ -207,12 +207,12 @@ class Mechanism(ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on the distance of the mechanism from the device it describes."""
+        """Warnings, as sentences, that the mechanism deviates from the device it describes."""
         return ()
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Files that it was read from."""
+        """Files that the mechanism was read from."""
         return ()
 
     @property
@@ -227,25 +227,25 @@ class Mechanism(ABC):
 
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Return the corridor of the stiffness at an elastic torque, and where the demanded one is reached.
+        """Return the attainable range of the stiffness at an elastic torque, and phi, s for the demanded one.
 
         Args:
             tau_e: Elastic torque, (samples,), N m (N).
             stiffness: Demanded joint stiffness, (samples,), N m/rad (N/m).
-            q: Position of the joint, (samples,); counts only if the potential depends on it beside phi.
+            q: Position of the joint, (samples,); ignored if the potential depends on phi and s alone.
 
         Returns:
-            phi_1 is phi and phi_2 is theta_2, for the stiffness clipped into the corridor. An end is critical
-            where A is singular; the torque's maximum and the ends of ranges are not.
+            A solution with phi as phi_1 and theta_2 as phi_2, for the stiffness clipped to the range. An end
+            is critical where A is singular; the maximum of the torque and the ends of ranges are not.
         """
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other word that its field `preload` may hold; None if there is none."""
+        """The other value of the field `preload`; None if there is no other branch."""
         return None
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where the other branch of the mechanism would attain the stiffness."""
+        """Return where the stiffness is attainable on the other branch of the mechanism, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 VARIABLES = ("q", "theta_1", "theta_2", "phi")
-"""Words for positions; phi is theta_1 - q."""
+"""Names of positions in an expression; phi is theta_1 - q."""
 
 MAX_LENGTH = 2000
-"""Characters of an expression; a MACCEPA takes 80."""
+"""Largest number of characters of an expression; a MACCEPA needs 80."""
 
 RESERVED = frozenset({*VARIABLES, "pi", *FUNCTIONS})
-"""Words that no constant may have."""
+"""Names that no constant may have."""
 
 
 def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
@@ -55,7 +55,7 @@ TORQUES, ROWS, ACCELERATIONS = _truncation(1, 1, 1), _truncation(2, 1, 3), _trun
 
 
 class PotentialEnergy:
-    """A potential with values of its constants."""
+    """A potential with the values of its constants."""
 
     def __init__(self, expression: Expression, constants: Mapping[str, float]) -> None:
         self._expression = expression
@@ -65,8 +65,8 @@ class PotentialEnergy:
     def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
         """Return the derivatives by q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
 
-        Numbers are computed by the program of the series: NumPy without it would take ten times as long, to
-        find its way through the orders.
+        For numbers, a program traced from the series is run: the series itself would take ten times as long,
+        for bookkeeping of the orders.
         """
         rows = [coordinates[..., number] for number in range(3)]
         if not isinstance(coordinates, np.ndarray):

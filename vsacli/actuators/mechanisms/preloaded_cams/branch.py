@@ -1,6 +1,6 @@
-"""The branch of a preloaded cam: the monotone piece of the stiffness that reaches the largest pretension.
+"""The branch of a preloaded cam: the monotone piece of the stiffness that extends to the largest pretension.
 
-A map of it over the torque, made once, says which end it has where, and gives first guesses of both.
+`map_branch` maps it over the torque once per cam: the kind of its inner end, and first guesses of both ends.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ PRETENSION, FOLD, PEAK, DOMAIN = range(4)
 class Cells(NamedTuple):
     """Both ends of the branch over the cube root of the torque, by cubics; arrays (cells,).
 
-    What is kept is the deflection from rest over that root: it is smooth, also where a cam without pretension
-    has the third power of the deflection as its torque.
+    The cubics approximate the ratio of deflection from rest to that root, which is smooth even for a cam
+    without pretension, whose torque is the third power of the deflection.
 
     Attributes:
         root: Cube root of the torque at which a cell begins.
@@ -73,19 +73,19 @@ class Branch(NamedTuple):
 
 
 SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
-"""Shares of the domain at which curves are looked at; a fitted profile has some dozen features."""
+"""Shares of the domain at which curves are sampled; a fitted profile has some dozen features."""
 
 FIRST_CELLS = 32
-"""Cells of the torque on either side of rest that the map begins with."""
+"""Number of cells of the torque on either side of rest at first."""
 
 GUESS_RTOL = 1e-5
-"""Relative error of a deflection with which a cell is content: two Newton steps leave rounding of it."""
+"""Largest relative error of a deflection in a cell, which two Newton steps reduce to rounding."""
 
 MAX_HALVINGS = 36
-"""Times that cells are halved: where the branch jumps to another end, and where a curve turns around."""
+"""Largest number of halvings, at torques where the branch has another kind of end, or a curve turns."""
 
 MAX_SLOPE_SUM = 10.0
-"""Slopes at both ends of a cell, over its height and width, beyond which no cubic follows the curve."""
+"""Sum of the slopes at both ends of a cell, over its height and width, beyond which no cubic is close."""
 
 AT_REST = 1e-4
 """Share of the largest cube root of the torque at which the limit at rest is taken."""
@@ -114,7 +114,7 @@ def map_branch(
 
 
 def _mirrored(lift: LiftOf) -> LiftOf:
-    """Return the lift of the cam turned around."""
+    """Return the lift of the mirrored cam."""
     return lambda phi: lift(-phi).mirrored()
 
 
@@ -130,14 +130,14 @@ class _Nodes(NamedTuple):
     sign: FloatArray
 
     def mirrored(self) -> _Nodes:
-        """Return the nodes of the cam turned around."""
+        """Return the nodes of the mirrored cam."""
         turned = self.take(slice(None, None, -1))
         return turned._replace(
             root=-turned.root, outer_slope=-turned.outer_slope, inner_slope=-turned.inner_slope
         )
 
     def take(self, chosen: IndexArray | slice) -> _Nodes:
-        """Return some of the nodes."""
+        """Return a selection of the nodes."""
         return _Nodes(*(values[chosen] for values in self))
 
     def merged(self, others: _Nodes) -> _Nodes:
@@ -146,7 +146,7 @@ class _Nodes(NamedTuple):
         return joined.take(np.argsort(joined.root))
 
     def misses(self, middle: _Nodes) -> BoolArray:
-        """Return where the branch ends differently within a cell, or cubics miss its ends in the middle."""
+        """Return where the kind of end changes within a cell, or a cubic is inaccurate in its middle."""
         differ: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
         width = np.diff(self.root)
         for values, slope, wanted in (
@@ -247,7 +247,7 @@ class _Side:
     def _at_rest(self, near: _Nodes) -> _Nodes:
         """Return the node without torque, from one next to it.
 
-        There the deflection grows as the torque, only to a fold as its cube root.
+        There the deflection is proportional to the torque; only that of a fold, to its cube root.
         """
         fold, zero = near.end == FOLD, np.zeros(1)
         inner, slope = (np.where(fold, values, 0.0) for values in (near.inner, near.inner_slope))
@@ -272,7 +272,7 @@ class _Side:
         )
 
     def _inner_ends(self, tau_e: FloatArray, outer: FloatArray) -> tuple[FloatArray, IndexArray]:
-        """Return the first end of the branch beyond the outer one, and which it is."""
+        """Return the first end of the branch at deflections above the outer one, and its kind."""
         inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
         beyond = self._phi > outer[:, None]
         for which, curve in self._ends.items():

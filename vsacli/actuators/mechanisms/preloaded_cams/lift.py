@@ -1,8 +1,8 @@
-"""The lift of a cam, and what it does to a spring.
+"""The lift of a cam with its derivatives, and the torque and stiffness of a spring behind it.
 
-With the lift l(phi) and the pretension p, the spring is compressed by x = l + p, and T = k l' x. Where a
-torque tau_e is kept, x = tau_e/(k l'), so that the stiffness k (l'^2 + l'' x) is a function of the deflection
-alone, G = k l'^2 + tau_e l''/l'.
+With the lift l(phi) and the pretension p, the spring is compressed by x = l + p, and T = k l' x. At a given
+torque tau_e, x = tau_e/(k l'), so that the stiffness k (l'^2 + l'' x) is a function of the deflection alone,
+G = k l'^2 + tau_e l''/l'.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ class Lift(NamedTuple):
     l4: FloatArray
 
     def mirrored(self) -> Lift:
-        """Return the lift of the cam turned around, at the opposite deflection."""
+        """Return the lift of the mirrored cam, at the opposite deflection."""
         return self._replace(l1=-self.l1, l3=-self.l3)
 
     def after(self, step: FloatArray) -> Lift:
-        """Return the lift after a short step of the deflection, by Taylor's formula."""
+        """Return the lift after a short step of the deflection, by Taylor expansion."""
         half, third, fourth = step / 2, step / 3, step / 4
         return Lift(
             self.l + step * (self.l1 + half * (self.l2 + third * (self.l3 + fourth * self.l4))),

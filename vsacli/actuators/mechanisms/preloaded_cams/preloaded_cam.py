@@ -1,4 +1,4 @@
-"""Mechanisms whose motor 2 preloads the spring of a cam, MACCEPA among them: U = k/2 (l(phi) + p)^2."""
+"""Mechanisms in which motor 2 preloads the spring of a cam, such as MACCEPA: U = k/2 (l(phi) + p)^2."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from vsacli.documents.fields import NON_ZERO, POSITIVE, check_fields, interval, 
 class PreloadedCam(Mechanism):
     """A spring behind a cam whose lift l has one minimum, at rest.
 
-    The branch is the one that reaches the largest pretension. On any other the stiffness rises while the
-    pretension falls; all of them shrink to nothing as the torque goes to zero.
+    The branch is the one that extends to the largest pretension. On others the stiffness rises while the
+    pretension falls; all of them shrink to a point as the torque goes to zero.
     """
 
     k: float = number(units.LINEAR_STIFFNESS, "stiffness of the spring", check=POSITIVE)
@@ -47,13 +47,13 @@ class PreloadedCam(Mechanism):
 
     @property
     def rest(self) -> float:
-        """The deflection at which the lift has its minimum."""
+        """Deflection at which the lift has its minimum."""
         return 0.0
 
     @property
     @abstractmethod
     def deflection_range(self) -> tuple[float, float]:
-        """The deflections for which the cam has a lift."""
+        """Range of deflections in which the cam has a lift."""
 
     @abstractmethod
     def lift(self, from_rest: FloatArray) -> Lift:

@@ -1,8 +1,8 @@
-"""A preloaded cam solved: the deflection at which a torque meets a stiffness, between the ends of the branch.
+"""Solution of (14) for a preloaded cam: the deflection with a torque and a stiffness, between two ends.
 
-Torque and stiffness without the compression of the spring leave g(phi) = sigma l' - k l'^3 - tau_e l'' = 0,
-which is l' (sigma - G). Unlike G it is regular at rest; its root is simple within the branch, double at
-a fold.
+Eliminating the compression of the spring from torque and stiffness gives
+g(phi) = sigma l' - k l'^3 - tau_e l'' = 0, which is l' (sigma - G). Unlike G it is regular at rest; its root
+is simple within the branch, double at a fold.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 
 MAX_GUESS_ERROR = 1e-3
-"""Largest relative correction of an end; next to where a curve turns around a step leads anywhere."""
+"""Largest relative correction of an end: next to a turning point of a curve a Newton step is arbitrary."""
 
 STEP_RTOL = 3e-6
-"""Relative size of a step that leaves rounding only: it leaves the third power."""
+"""Relative size of a step after which the error, its third power, is rounding."""
 
 MAX_STEPS = 12
-"""Steps of third order. Two or three do; by trial with draws on a hundred cams, nine at most."""
+"""Largest number of steps. Two or three suffice; nine were the most in random trials on a hundred cams."""
 
 LEAST_CURVATURE_SHARE = 1e-3
-"""Share of the lift's curvature at rest below which it makes no first guess."""
+"""Smallest curvature in the first guess, as a share of the lift's curvature at rest."""
 
 AT_REST_SHARE = 1e-40
-"""Share of the stiffness below which k l'^2 tells that the deflection will leave the range of numbers."""
+"""Share of the stiffness below which k l'^2 marks a deflection close to underflow, which counts as rest."""
 
 
 class End(NamedTuple):
@@ -86,7 +86,7 @@ class CamSolver:
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Return deflections from rest (phi_1) and pretensions (phi_2); arrays (samples,)."""
-        with np.errstate(all="ignore"):  # beyond what can be carried, steps lead anywhere
+        with np.errstate(all="ignore"):  # steps are arbitrary at torques that cannot be carried
             piece = self._piece(tau_e)
             lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
             upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)

@@ -1,4 +1,4 @@
-"""Levers that a spring resists by their turn, U = K(s) w(phi) in closed form: AwAS, AwAS-II, vsaUT-II."""
+"""Levers whose rotation a spring resists, U = K(s) w(phi) with a closed solution: AwAS, AwAS-II, vsaUT-II."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.documents.source import Source
 
 @dataclass(frozen=True)
 class Sine:
-    """tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2: it softens."""
+    """A softening torque tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2."""
 
     k: float = number(units.STIFFNESS, "stiffness at rest", check=POSITIVE)
     ratio: float = number(
@@ -83,7 +83,7 @@ def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Parti
     Args:
         scale: K and two derivatives.
         energy: w.
-        form: G and three derivatives.
+        form: g and three derivatives.
     """
     value, slope, curvature = scale
     return Partials(
@@ -104,7 +104,7 @@ def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Parti
 
 @dataclass(frozen=True)
 class SineRatio(Mechanism):
-    """U = K(s) sin^2(phi): a spring that a lever stretches by its turn. Singular nowhere.
+    """A spring stretched by the rotation of a lever, U = K(s) sin^2(phi); never singular.
 
     With T = K sin 2phi and sigma = 2 K cos 2phi the solution is closed: 2K is the hypotenuse over the sides
     sigma and 2 tau_e, and 2phi the angle between it and sigma.
@@ -196,7 +196,7 @@ class Awas(SineRatio):
 class Lever(SineRatio):
     """A spring at one end of a lever, the link at the other, the pivot between them at p = lead theta_2.
 
-    The lever of length L multiplies what the spring gives by p/(L - p): U = k/2 L^2 (p/(L - p))^2 sin^2(phi).
+    The lever of length L multiplies the spring force by p/(L - p): U = k/2 L^2 (p/(L - p))^2 sin^2(phi).
     Jafari, Tsagarakis & Caldwell, ICRA 2011 (AwAS-II); Groothuis, Rusticelli, Zucchelli, Stramigioli &
     Carloni, IEEE/ASME Transactions on Mechatronics 2014 (vsaUT-II).
     """
@@ -224,13 +224,13 @@ class Lever(SineRatio):
 
     @property
     def setting_range(self) -> tuple[float, float]:
-        """theta_2 at the ends of the pivot's way."""
+        """theta_2 at the ends of the pivot's travel."""
         low, high = sorted(pivot / self.lead for pivot in self.pivot)
         return low, high
 
     @property
     def scale_range(self) -> tuple[float, float]:
-        """K at the ends of the pivot's way."""
+        """K at the ends of the pivot's travel."""
         low, high = (float(self.scale(np.array(pivot / self.lead)).value) for pivot in self.pivot)
         return low, high
 
@@ -244,6 +244,6 @@ class Lever(SineRatio):
         return Scale(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
 
     def setting(self, scale: FloatArray) -> FloatArray:
-        """Return the place of the pivot, L x/(1 + x)."""
+        """Return theta_2 of the pivot position, L x/(1 + x)."""
         ratio = np.sqrt(2 * scale / self.k) / self.length
         return self.length * ratio / (1 + ratio) / self.lead

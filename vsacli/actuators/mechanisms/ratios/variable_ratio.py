@@ -23,13 +23,13 @@ from vsacli.documents.fields import OneOf, check_fields, interval, value
 from vsacli.documents.source import Source
 
 TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.ratio:Sine"})
-"""Torques by the name they have in a robot file: the laws of springs, and one that softens."""
+"""Torques by their name in a robot file: the spring laws, and one that softens."""
 
 DEFLECTIONS = np.geomspace(1e-6, 1.0, 4000)
-"""Shares of a law's domain at which the sign of g'^2 - g g'' is looked at; laws turn within tenths of it."""
+"""Shares of a law's domain at which the sign of g'^2 - g g'' is sampled; laws change over tenths of it."""
 
 ENDLESS = 1e3
-"""Deflection, rad (m), that stands for the end of a law that has none: no springs go so far."""
+"""Deflection, rad (m), at which an unbounded domain is cut off: no springs deflect so far."""
 
 
 class _Limit(NamedTuple):
@@ -37,9 +37,9 @@ class _Limit(NamedTuple):
 
     Attributes:
         phi: Last deflection, infinite if there is none.
-        torque: G there.
-        critical: Whether the stiffness turns around there, and A is singular; else the law ends.
-        stiffness: G' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
+        torque: g there.
+        critical: Whether the stiffness has an extremum there, and A is singular; else the law ends.
+        stiffness: g' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
     """
 
     phi: float
@@ -59,7 +59,7 @@ class _End(NamedTuple):
 
 @dataclass(frozen=True)
 class VariableRatio(Mechanism):
-    """T = K(theta_2) g(phi): motor 2 scales a spring whose torque at K = 1 is g.
+    """A spring with the torque g(phi) that motor 2 scales: T = K(theta_2) g(phi).
 
     At a given torque the stiffness falls with the scale while the deflection grows, up to where g'^2 = g g''.
     """
@@ -81,7 +81,7 @@ class VariableRatio(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return a spring of which half, or all, or twice as much is there."""
+        """Return a spring with a length from half to twice the nominal one."""
         stiffness = 600 if joint_type == "revolute" else 6000
         return {
             "setting": [0.5, 2],
@@ -178,7 +178,7 @@ def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
         return state.sigma * state.sigma - state.tau * state.zeta
 
     phi = DEFLECTIONS * (end if np.isfinite(end) else np.copysign(ENDLESS, end))
-    with np.errstate(all="ignore"):  # laws that grow beyond all numbers
+    with np.errstate(all="ignore"):  # overflow of laws that grow fast
         turned = np.flatnonzero(falling(phi) < 0)
     if not turned.size:
         with np.errstate(all="ignore"):
