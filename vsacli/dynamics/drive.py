@@ -77,7 +77,7 @@ def driven_by(
     """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
     if internal is None:
-        found = dict(actuator.transmit(command, near_singular, integrated))
+        found = dict(actuator.transmit(command, near_singular, integrated))  # (61)-(68), (70)-(72)
     else:
         from vsacli.actuators.damped_springs import DampedSprings
 

@@ -220,8 +220,8 @@ def compute_block(
             have their own, or none.
         near_singular: Margin below which a sample is near-singular.
         engine: Backend.
-        internal: Internal motion of the damped transmissions, by index of the joint; if None, each is in
-            equilibrium: its springs carry the joint alone, or it is where its damper is declared to start.
+        internal: Internal motion of the damped transmissions, by index of the joint; if None, each is at the
+            declared start of its damper, or else where its springs carry the joint alone.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal

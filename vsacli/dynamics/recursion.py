@@ -165,12 +165,14 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
         frame=frame,
         p=(p, v_p.first + slide.dp, v_p.second + slide.a),
         c=(link.com, v_c.first, v_c.second),
+        # (46)-(51) belong to the paper's backward pass, but do not depend on other links.
         force=(a_c * link.mass, j_c * link.mass, s_c * link.mass),  # (46)-(48)
         moment=_euler(link.inertia, angular),
     )
 
 
 def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _Angular) -> _Angular:
+    # omega to varsigma of frame k-1, theta' z0 to theta'''' z0. `undo` is R^T, from frame k-1 to k.
     w, g, i, s = previous
     t1z, t2z, t3z, t4z = (Z0 * rate for rate in turning)
     w_t1z, g_t1z = cross(w, t1z), cross(g, t1z)
@@ -187,6 +189,7 @@ def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _An
 
 
 def _fixed_point(angular: _Angular, r: Vector) -> _PointRates:
+    # Derivatives of r' = omega x r, each from those before; expanded, the terms of (41), (43), (45).
     w, g, i, s = angular
     first = cross(w, r)
     second = cross(g, r) + cross(w, first)

@@ -103,7 +103,7 @@ class Cache:
             self._remove(entry.key)
 
     def _make_room(self, new: str) -> None:
-        """Remove the least recently used libraries until the rest is within `MOST_BYTES`; keep the new one."""
+        """Remove the least recently used libraries until all are within `MOST_BYTES`; keep the new one."""
         entries = self.entries()
         excess = sum(entry.size for entry in entries) - MOST_BYTES
         for entry in entries:
