@@ -80,7 +80,7 @@ class InverseDynamics(RowKernel):
         integrated: Whether deflections are inputs; otherwise (14) is solved for them.
         internal: Joints with damped transmissions, by index; their internal motion is an input.
         driven: Whether only the internal deflections are inputs; their rates then follow from the damping.
-        limits: Limits of each joint; a field, since actuators compare equal whatever their limits.
+        limits: Limits of each joint; a field, since springs compare equal whatever their limits.
         block: Class of the blocks that hold the results.
     """
 
@@ -252,7 +252,7 @@ def block_of(
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if integrated is not None:
         rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
-    # All deflections first, then all rates: one row of `INTERNAL` holds every damped joint.
+    # All joints' deflections, then all velocities, then all accelerations, as in `arguments`.
     for name, values in zip(INTERNAL, zip(*internal.values(), strict=True), strict=False):
         of_joints = np.concatenate(values) if name == INTERNAL[0] else np.stack(values)
         rows[name] = np.ascontiguousarray(of_joints)
