@@ -1,4 +1,4 @@
-"""Drives of the joints of a robot: springs, and the kinds of actuator, one file each."""
+"""Actuators of the joints: motors, friction and dampers, spring laws, and the kinds of actuator."""
 
 from typing import TYPE_CHECKING
 

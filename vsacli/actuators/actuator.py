@@ -1,4 +1,8 @@
-"""The interface of an actuator, common to all kinds."""
+"""The interface of an actuator, common to all kinds.
+
+`Actuator.transmit` is its part of the inverse dynamics, (61)-(72). The other methods describe motors, springs
+and limits to the forward dynamics, the self-check, exports and reports.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +27,14 @@ from vsacli.documents.source import Source
 
 
 class PlaceholderConstants(NamedTuple):
-    """Constants of an actuator of which nothing is known, in SI units; at a prismatic joint kg, N/m, N/m^3.
+    """Default constants of an unknown actuator, in SI units; at a prismatic joint kg, N/m, N/m^3.
 
     Attributes:
-        motor_inertia: of each motor, joint side of the gear.
-        stiffness: of an elastic transmission.
-        spring: k and k_c of cubic springs, alike on both sides.
-        max_torque: of a motor that drives the joint alone, joint side of the gear.
-        gear_ratio: of such a motor, None if it is not known.
+        motor_inertia: Inertia of each motor, joint side of the gear.
+        stiffness: Stiffness of an elastic transmission.
+        spring: Coefficients k and k_c of cubic springs, equal on both sides.
+        max_torque: Largest torque of a motor that drives the joint alone, joint side of the gear.
+        gear_ratio: Gear ratio of such a motor; None if unknown.
     """
 
     motor_inertia: float
@@ -41,7 +45,7 @@ class PlaceholderConstants(NamedTuple):
 
     @property
     def only_motor(self) -> Motor:
-        """A motor that drives the joint alone; its inertia has fewer digits than a division leaves."""
+        """Motor that drives the joint alone; its inertia is rounded to hide the digits of the division."""
         ratio = abs(self.gear_ratio or 1.0)
         return Motor(
             inertia=float(f"{self.motor_inertia / (ratio * ratio):.12g}"),
@@ -53,13 +57,15 @@ class PlaceholderConstants(NamedTuple):
 class Carried(NamedTuple):
     """Torque and stiffness of springs at given deflections, by their laws; arrays (samples,).
 
+    The self-check compares them with the demand; the sizes are what its errors are relative to.
+
     Attributes:
-        tau_e: torque on the link.
-        size: sum of the absolute torques of which tau_e is the sum.
-        stiffness: of the joint.
-        stiffness_size: the same for the terms of the stiffness, which rounding of the deflections changes by
-            eps times this.
-        tau_spring: torque against each motor, (motors, samples).
+        tau_e: Torque on the link.
+        size: Sum of the absolute values of the terms of tau_e.
+        stiffness: Stiffness of the joint.
+        stiffness_size: Size of the terms of the stiffness; rounding of the deflections changes the stiffness
+            by eps times this.
+        tau_spring: Torque against each motor, (motors, samples).
     """
 
     tau_e: FloatArray
@@ -70,14 +76,14 @@ class Carried(NamedTuple):
 
 
 class SpringLoad(NamedTuple):
-    """The load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
+    """Load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
 
     Attributes:
-        name: of the spring.
-        deflection: of the spring; of a mechanism, between motor 1 and link.
-        torque: of the spring at that deflection.
-        energy: in it, J.
-        max_deflection: largest admissible |deflection|.
+        name: Name of the spring.
+        deflection: Deflection of the spring, or of a mechanism between motor 1 and link.
+        torque: Torque at that deflection.
+        energy: Stored energy, J.
+        max_deflection: Largest admissible |deflection|.
     """
 
     name: str
@@ -91,14 +97,14 @@ class Actuator(ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
-    Below, phi (2, samples) is what describes the springs: the deflection of each of them, or whatever the
-    kind solves for, one number for each motor.
+    In all methods phi, (2, samples), is the state of the springs, one coordinate per motor: their
+    deflections, or other unknowns of (14) that the kind chooses.
 
     Attributes:
-        motor_count: motors of the joint, 1 or 2.
-        commanded: keys of the signals that a trajectory commands besides the motion of the joint.
-        uncommanded: why a trajectory does not command others, by key of the signal, clauses.
-        sprung: whether springs lie between its motors and the link; else its motor moves with the joint.
+        motor_count: Number of motors of the joint, 1 or 2.
+        commanded: Keys of the signals that a trajectory commands in addition to the motion of the joint.
+        uncommanded: Reasons why a trajectory does not command other signals, by key; clauses.
+        sprung: Whether springs lie between motors and link; otherwise the motor moves with the joint.
     """
 
     motor_count: ClassVar[int] = 1
@@ -108,7 +114,7 @@ class Actuator(ABC):
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
-        """Return which columns of a result variable its joints have: of motors 1 and 2, or of the joint."""
+        """Return whether joints of this kind have each column of a result variable: one, or one per motor."""
         of_kind = {None: True, SPRINGS: cls.sprung}
         there = of_kind.get(variable.requires, variable.requires in cls.commanded)
         if "motor" not in variable.dims:
@@ -118,19 +124,19 @@ class Actuator(ABC):
     @classmethod
     @abstractmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
 
     @classmethod
     @abstractmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """Return an actuator of which nothing else is known.
+        """Return an actuator with default constants.
 
         Raises:
-            InvalidRecordError: a constant is not positive.
+            InvalidRecordError: A constant is not positive.
         """
 
     def unfit_for(self, joint_type: str) -> FieldProblem | None:  # noqa: ARG002
-        """Why it cannot drive joints of a type, which of its fields says so; None if it can."""
+        """Return the field that excludes joints of this type, with the reason; None if it can drive them."""
         return None
 
     @property
@@ -140,51 +146,51 @@ class Actuator(ABC):
 
     @property
     def coupled_rotors(self) -> float:
-        """B_12, by which either motor feels the acceleration of the other, joint side of the gears."""
+        """Inertia B_12 that couples the accelerations of the two motors, joint side of the gears."""
         return 0.0
 
     @property
     def co_contracts(self) -> bool:
-        """Whether both motors exert nothing but shares of the load, and so can work against each other."""
+        """Whether the motors bear shares of tau_e and nothing else, so that they can oppose each other."""
         return False
 
     @property
     def sides(self) -> tuple[JointMotor | None, ...]:
-        """Motors 1 and 2, None where there is none."""
+        """Motors 1 and 2; None for a missing one."""
         return (*self.motors, None)[: len(MOTORS)]
 
     @property
     def max_deflections(self) -> tuple[float, ...]:
-        """Largest admissible |phi| at each motor; a limit that is flagged."""
+        """Largest admissible |phi| at each motor; a violation is flagged."""
         return (math.inf,) * self.motor_count
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest phi, or values of `Elasticity.ranged`, for which the springs' laws hold."""
+        """Range of phi, or of the coordinates `Elasticity.ranged`, in which the springs' laws hold."""
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences for the user on its springs."""
+        """Warnings to the user about the springs, as sentences."""
         return ()
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Files that its springs were read from."""
+        """Files that the springs were read from."""
         return ()
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
-        """Springs that are each stretched by a weighted sum of positions; None for other springs."""
+        """Springs whose deflections are weighted sums of positions; None if there are others."""
         return None if self.sprung else ()
 
     @property
     def lever_spring(self) -> LeverSpring | None:
-        """The only spring, if it lies between a lever and a point of the link; else None."""
+        """Spring between a lever and a point of the link, if it is the only spring; else None."""
         return None
 
     def limits(self) -> Iterator[LimitCheck]:
-        """Yield the limits, finite or not."""
+        """Yield all limits of motors and springs, finite or not."""
         for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
             yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
             yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
@@ -197,27 +203,27 @@ class Actuator(ABC):
         """Compute the springs and the motion of the motors for a command.
 
         Args:
-            command: motion and elastic torque of the joint; arrays (samples,).
-            near_singular: margin below which a step is near-singular.
-            integrated: deflections phi to use instead of those that `solve` finds, NaN where there are none;
-                given only if the kind has `deflection_rates`.
+            command: Motion and elastic torque of the joint; arrays (samples,).
+            near_singular: Margin below which a sample is near-singular.
+            integrated: Deflections phi to use instead of those that `solve` finds, NaN where there are none;
+                only for kinds that are `integrable`.
 
         Returns:
             The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `ddtheta`,
             `tau_spring`, `elastic_energy`, `det_A`, `stiffness_lower`, `stiffness_upper` and `flags`; NaN
-            where the actuator has none, such as a second motor.
+            for those that the actuator lacks, such as a second motor's.
         """
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """theta, (2, samples), from phi and the position of the joint; velocities from their rates (69)."""
+        """Return theta, (2, samples), from phi and joint position, or velocities from their rates (69)."""
         return phi + q
 
     @abstractmethod
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
+        """Return the rate of tau_spring at each motor, (motors, samples), from variables of the joint."""
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
-        """Return the loads of its springs from the other variables; those behind motor 1 as one."""
+        """Return the loads of the springs from variables of the joint; those behind motor 1 as one."""
         if not self.sprung:
             return ()
         loaded = of_joint["phi"][0], of_joint["tau_spring"][0], of_joint["elastic_energy"]
@@ -229,45 +235,45 @@ class Actuator(ABC):
 
     @property
     def spring_group(self) -> Hashable:
-        """Actuators of which this is equal have their springs computed together: those of one kind."""
+        """Key of actuators whose springs are computed together: by default, all of one kind."""
         return type(self)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """Return the springs of actuators of one `spring_group`, at any state of their joints and motors."""
+        """Return the springs of actuators of one `spring_group`, as one object."""
         raise NotImplementedError(f"{cls.__name__} has no springs")
 
-    # Of kinds that take a stiffness
+    # Methods of kinds with a commanded stiffness
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Phi at which the springs carry the torque with the stiffness (14), on the actuator's branch.
+        """Solve (14): return phi for a torque and a stiffness, on the actuator's branch.
 
         Args:
-            tau_e: elastic torque, (samples,).
-            stiffness: demanded joint stiffness, (samples,).
-            q: position of the joint, (samples,), of which the springs of most kinds know nothing.
+            tau_e: Elastic torque, (samples,).
+            stiffness: Demanded joint stiffness, (samples,).
+            q: Position of the joint, (samples,); the springs of most kinds do not depend on it.
         """
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other word that its field for the preload may hold; None if there is none."""
+        """The other value of the preload field; None if there is no other branch."""
         return None
 
     preload_field: ClassVar[str] = "preload"
-    """Path to that field."""
+    """Path to the preload field."""
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where another branch would attain the stiffness, (samples,)."""
+        """Return where the stiffness is attainable on another branch, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     integrable: ClassVar[bool] = False
-    """Whether phi can be integrated along a trajectory, by the two methods below."""
+    """Whether phi can be integrated along a trajectory; if so, the kind has the two methods below."""
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """Rates of phi, (2, samples), that give tau_e and the stiffness those of the command, (19)-(20)."""
+        """Return the rates of phi, (2, samples), for commanded rates of tau_e and stiffness, (19)-(20)."""
         raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")
 
     def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Determinant of the decoupling matrix A at phi and positions of the joint, (67)."""
+        """Return the determinant of the decoupling matrix A at phi and joint positions, (67)."""
         raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")

@@ -1,4 +1,7 @@
-"""Two motors behind nonlinear springs: (14), and (61)-(72) with the decoupling matrix."""
+"""Two motors, each behind a nonlinear spring: (14) solved, then (61)-(72) with the decoupling matrix A.
+
+`transmit` is the path of a run: `solve` (14), `deflections_within_reach` (61), then `_moved` (62)-(72).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs.joints import beta, determinant, solve
+from vsacli.actuators.pairs.joints import beta, determinant, solve  # here `solve` applies A^-1
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
 from vsacli.actuators.spring_elements import SpringElement
@@ -56,10 +59,10 @@ class Antagonistic(Actuator):
         check_fields(self, *self.pair.problems(), *self._coupling_problems())
 
     def _coupling_problems(self) -> Iterator[FieldProblem]:
-        """Yield the problem of a coupling with a domain: the distance of the motors has no flag."""
+        """Yield a problem if the law or the limit of the coupling bounds its deflection."""
         if self.coupling is None:
             return
-        # The distance of the motors is no result variable that a limit could bound: a coupling has no end.
+        # theta_1 - theta_2 is no result variable, so a limit on it could not be flagged.
         if self.coupling.domain != (-math.inf, math.inf):
             low, high = self.coupling.domain
             ends = f"holds from {low:.4g} to {high:.4g} only, but the motors may be any distance apart"
@@ -70,7 +73,7 @@ class Antagonistic(Actuator):
 
     @cached_property
     def pair(self) -> PreloadedPair:
-        """Both springs on the branch of the preload."""
+        """Both springs, on the solution branch that the preload selects."""
         return PreloadedPair(self.spring, self.preload)
 
     @property
@@ -85,7 +88,7 @@ class Antagonistic(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """Return two cubic springs; constants of a single motor hold for neither of two."""
+        """Return two equal motors and cubic springs; the constants of a single motor do not apply."""
         from vsacli.actuators.laws.cubic import Cubic
 
         k, k_c = constants.spring
@@ -109,17 +112,17 @@ class Antagonistic(Actuator):
 
     @property
     def co_contracts(self) -> bool:
-        """False with a spring between the motors, which takes a part of their torques."""
+        """See `Actuator.co_contracts`; False with a spring between the motors, which loads both of them."""
         return self.coupling is None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of the springs, once if both are equal."""
+        """Warnings of the springs, without repetition if one law serves both sides."""
         return tuple(warning for law in self._distinct_springs for warning in law.warnings)
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Files of the springs."""
+        """Files that the springs were read from."""
         return tuple(source for law in self._distinct_springs for source in law.sources)
 
     @property
@@ -134,7 +137,10 @@ class Antagonistic(Actuator):
         return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
-        """Compute deflections on the actuator's branch, their rates, and motor accelerations."""
+        """Compute deflections on the actuator's branch, their rates, and motor accelerations.
+
+        See `Actuator.transmit`.
+        """
         solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
         stiffness = command.commanded["stiffness"]
         phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
@@ -148,9 +154,9 @@ class Antagonistic(Actuator):
         }
 
     def _moved(self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray) -> OfJoint:
-        """Compute motion of both motors and torques of both springs at given deflections, (62)-(72).
+        """Compute the motion of both motors and the torques of both springs at given deflections, (62)-(72).
 
-        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
+        NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
         """
         (energy_1, one), (energy_2, two) = (
             law.energy_and_state(side) for law, side in zip(self.laws, phi, strict=True)
@@ -158,6 +164,7 @@ class Antagonistic(Actuator):
         det_a = determinant(one, two)  # (67)
         divisor = np.where(reached.singular, np.nan, det_a)
         dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
+        # dphi and ddtheta solve the same system A x = b, (19) and (23).
         right = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
         ddtheta = solve(one, two, divisor, *right)  # (72)
         return {
@@ -176,7 +183,7 @@ class Antagonistic(Actuator):
         }
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """sigma_k phi_k', and of a coupling U_3'' (phi_1' - phi_2')."""
+        """Return sigma_k phi_k' of each side, with the rate +-U_3'' (phi_1' - phi_2') of a coupling."""
         sides = zip(self.laws, of_joint["phi"], of_joint["dphi"], strict=True)
         rates = np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
         if self.coupling is None:
@@ -186,7 +193,7 @@ class Antagonistic(Actuator):
         return rates + np.stack((rate, -rate))
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
-        """Return each spring on its own, and one between the motors."""
+        """Return the load of each spring, including a coupling."""
         phi = of_joint["phi"]
         sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
         springs = [(f"spring {side}", *spring) for side, spring in sides]
@@ -198,7 +205,7 @@ class Antagonistic(Actuator):
         )
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """Sums over both springs, (14)."""
+        """Return the sums over both springs, the right-hand sides of (14)."""
         sides = list(zip(self.laws, of_joint["phi"], strict=True))
         tau = np.stack([law.torque(deflection) for law, deflection in sides])
         sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
@@ -208,24 +215,24 @@ class Antagonistic(Actuator):
 
     @property
     def spring_group(self) -> Hashable:
-        """Pairs with equal couplings are computed together."""
+        """Key of joints that are computed together: those with equal couplings."""
         return type(self), self.coupling
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """Return the springs of joints whose couplings are equal."""
+        """Return the springs of several joints with equal couplings, as one object."""
         from vsacli.actuators.pairs.joints import CoupledPairs, PairElasticity
 
         pairs, coupling = [actuator.laws for actuator in actuators], actuators[0].coupling
         return PairElasticity(pairs) if coupling is None else CoupledPairs(pairs, coupling)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """Solve (14) on the branch that the actuator's preload names."""
+        """Solve (14) on the branch that the actuator's preload selects."""
         return self.pair.solve(tau_e, stiffness)
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other branch, unless the springs only pull."""
+        """Preload of the other branch; None if the springs are tendons, which only pull."""
         return self.pair.opposite
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
@@ -233,17 +240,17 @@ class Antagonistic(Actuator):
         return self.pair.opposite_reaches(tau_e, stiffness)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """A^-1 (tau_e', sigma'), (19)-(20)."""
+        """Return A^-1 (tau_e', sigma'), (19)-(20)."""
         one, two = self.pair.states(*phi)
         right = command.dtau_e, command.commanded["dstiffness"]
         return np.stack(solve(one, two, determinant(one, two), *right))
 
     def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
-        """Det A (67)."""
+        """Return det A (67)."""
         return determinant(*self.pair.states(*phi))
 
 
 def _between(coupling: SpringLaw, phi: FloatArray) -> FloatArray:
-    """Return the torque of a spring between the motors against each of them, (2, samples)."""
+    """Return the torque of a spring between the motors on each of them, (2, samples)."""
     torque = coupling.torque(phi[0] - phi[1])
     return np.stack((torque, -torque))

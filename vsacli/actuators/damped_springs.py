@@ -1,16 +1,16 @@
-"""Springs with a parallel damper, as in CompAct: the link feels tau_l = T(phi) + d w.
+"""Springs with a parallel damper, as in CompAct: the torque on the link is tau_l = T(phi) + d w.
 
-Here w is the velocity of the damper, the sum of theta_k' - q' over the motors that a spring lies behind, and
-T the torque of the springs. The motors' velocities follow from w and from the rate of the stiffness,
+Here w is the velocity of the damper, the sum of theta_k' - q' over the motors with springs, and T the torque
+of the springs. The motors' velocities follow from w and from the rate of the stiffness,
 
     [[b_1, b_2], [g_1, g_2]] (theta_1', theta_2') = (w + (b_1 + b_2) q', sigma' - sigma_q q')
 
-with b_k = 1 where a spring lies behind motor k, else 0, and g_k the derivative of sigma over theta_k, and
-the same for their accelerations. The matrix is singular where its determinant, the pivot b_1 g_2 - b_2 g_1,
-is zero, and not where det A is. With one motor the first row is all there is.
+with b_k = 1 if motor k has a spring, else 0, and g_k the derivative of sigma over theta_k; the accelerations
+follow from the same matrix. It is singular where its determinant, the pivot b_1 g_2 - b_2 g_1, is zero, and
+not where det A is. With one motor there is only the first row.
 
-The spread, the sum of the deflections that w is the rate of, is a state of its own: spread' = (tau_l - T)/d.
-The slope of that over the spread, at a stiffness, is -(det A/pivot)/d.
+The spread is the sum of the deflections whose rate is w, and a state of the motion: spread' = (tau_l - T)/d.
+At constant stiffness the derivative of that over the spread is -(det A/pivot)/d.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vsacli.base.signals import DAMPING, STIFFNESS
 from vsacli.base.variables import VARIABLES
 
 NEWTON_STEPS = 4
-"""Newton steps: from a guess that is 1e-4 off, three reach rounding; one more does no harm."""
+"""Newton steps: from a guess with an error of 1e-4, three converge to rounding; one more is for safety."""
 
 
 CONTINUATION_STEPS = 200
@@ -40,13 +40,13 @@ CONTINUATION_STEPS = 200
 
 
 class InternalMotion(NamedTuple):
-    """The motion inside a transmission with a damper.
+    """Internal motion of a transmission with a damper.
 
     Attributes:
-        phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
-            a guess from which the stiffness is found.
-        velocity: w, the rate of the spread, (samples,); None: it follows from the damping.
-        acceleration: its derivative, (samples,), as above.
+        phi: State of the springs, (2, samples): its spread is used, the rest is a guess from which (14) is
+            solved for the stiffness.
+        velocity: w, the rate of the spread, (samples,); None if it follows from the damping.
+        acceleration: Derivative of w, (samples,); None with `velocity`.
     """
 
     phi: FloatArray
@@ -55,13 +55,13 @@ class InternalMotion(NamedTuple):
 
 
 class _Springs(NamedTuple):
-    """The springs at deflections.
+    """State of the springs at deflections.
 
     Attributes:
-        state: arrays (samples, 1 joint[, motors]).
-        torque: derivatives of T over each theta, (motors, samples).
-        stiffness: those of sigma, as above.
-        pivot: determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
+        state: Arrays (samples, 1 joint[, motors]).
+        torque: Derivatives of T over each theta, (motors, samples).
+        stiffness: Derivatives of sigma over each theta, (motors, samples).
+        pivot: Determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
     """
 
     state: ElasticState
@@ -71,7 +71,7 @@ class _Springs(NamedTuple):
 
     @property
     def slope(self) -> FloatArray:
-        """dT/d(spread) at a stiffness, det A/pivot: positive where the motion inside is stable."""
+        """dT/d(spread) at constant stiffness, det A/pivot: positive where the internal motion is stable."""
         slope: FloatArray = self.torque[0]
         if len(self.torque) > 1:
             determinant = self.torque[0] * self.stiffness[1] - self.torque[1] * self.stiffness[0]
@@ -80,12 +80,12 @@ class _Springs(NamedTuple):
 
     @property
     def divisor(self) -> FloatArray:
-        """The pivot, NaN instead of zero."""
+        """Pivot, NaN instead of zero."""
         return np.where(self.pivot == 0, np.nan, self.pivot)
 
 
 class DampedSprings:
-    """The springs of an actuator beside which a damper lies.
+    """Springs of an actuator with a parallel damper.
 
     Deflections phi are (2, samples), values of motors (motors, samples), others (samples,).
     """
@@ -98,31 +98,31 @@ class DampedSprings:
         self._behind = [float(there) for there in actuator.has(VARIABLES["phi"])[: self._motors]]
 
     def spread(self, phi: FloatArray) -> FloatArray:
-        """Sum of the deflections beside the damper."""
+        """Return the spread: the sum of the deflections parallel to the damper."""
         parts = [factor * row for factor, row in zip(self._behind, phi, strict=False)]
         return reduce(operator.add, parts)
 
     def torque(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """T."""
+        """Return T."""
         return self._state(phi, q).tau_e[..., 0]
 
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """dT/d(spread) at a stiffness: positive where the motion inside is stable."""
+        """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
         slope: FloatArray = self._springs(phi, q).slope
         return slope
 
     def pivot(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Zero where the rates do not follow from that of the stiffness."""
+        """Return the pivot; zero where the motor velocities do not follow from the rate of the stiffness."""
         return self._springs(phi, q).pivot
 
     def within(self, phi: FloatArray) -> BoolArray:
-        """Return where the laws of the springs hold."""
+        """Return where the springs' laws hold."""
         lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
         inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
         return np.asarray(np.all(inside, axis=0))
 
     def settled(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
-        """Deflections of a spread with the commanded stiffness, from a guess; NaN where none are near."""
+        """Return the deflections with a spread and the commanded stiffness near a guess; NaN if none."""
         missing = (spread - self.spread(phi)) / sum(self._behind)
         shares = zip_longest(phi, self._behind, fillvalue=0.0)
         phi = np.stack([row + missing * share for row, share in shares])
@@ -137,7 +137,7 @@ class DampedSprings:
         return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
 
     def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
-        """Deflections at which the springs carry the torque alone; those of a spread, if one is given."""
+        """Return the deflections at which the springs carry the torque alone; or with a spread, if given."""
         if self._settable:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
@@ -159,10 +159,10 @@ class DampedSprings:
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
     def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> OfJoint:
-        """Stiffness, motor motion and spring torques of a motion inside; as `Actuator.transmit`.
+        """Compute stiffness, motor motion and spring torques of an internal motion; see `Actuator.transmit`.
 
-        The corridor is that of the springs' torque. A step is singular where the pivot is zero, not where
-        det A is; INTERNAL_INSTABILITY says that the slope is not positive.
+        The attainable range is that at the springs' torque. A sample is singular where the pivot is zero, not
+        where det A is; INTERNAL_INSTABILITY is set where the slope is not positive.
         """
         phi = self.settled(self.spread(motion.phi), motion.phi, command)
         _, rate, acceleration = motion
@@ -198,7 +198,7 @@ class DampedSprings:
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
-        """Return the corridor at the torque of the springs, and what is wrong with the step."""
+        """Return minimum and maximum stiffness at the torque of the springs, and the reach of the samples."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
         never = np.zeros_like(lost)
         if not self._settable:
@@ -219,14 +219,14 @@ class DampedSprings:
         )
 
     def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
-        """Return the distance of the stiffness from its extremum at the same spread, relative to it."""
+        """Return the distance of the stiffness from its extremum at the same spread, relative to itself."""
         bent = springs.state.stiffness_curvature(self._coordinates(0 * stiffness, self._along(stiffness)))
         divisor = 2 * stiffness * np.abs(bent[..., 0])
         margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
         return margin
 
     def _along(self, like: FloatArray) -> FloatArray:
-        """Velocities of the motors that leave the spread as it is, (motors, samples)."""
+        """Return motor velocities that leave the spread unchanged, (motors, samples)."""
         return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
 
     def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
@@ -289,5 +289,5 @@ class DampedSprings:
 
 
 def _columns(of_motors: FloatArray) -> FloatArray:
-    """(samples, 1 joint, motors) from (motors, samples)."""
+    """Return (samples, 1 joint, motors) from (motors, samples)."""
     return of_motors.T[:, None]

@@ -31,7 +31,7 @@ class Damper:
 
     @staticmethod
     def example(joint_type: str) -> dict[str, Any]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
         return {"location": "link", "range": [0, 5] if joint_type == "revolute" else [0, 50]}
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Motors and springs of all joints in a row, with the inertia B of rotors, for the equations of motion."""
+"""Motors and springs of all joints, with the inertia B of rotors, for the equations of motion (5)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from vsacli.base.variables import VARIABLES
 
 
 def largest_coupling(first: float, second: float) -> float:
-    """Return what the size of a coupled inertia must be below, or B is not positive definite.
+    """Return the bound below which a coupled inertia leaves B positive definite.
 
     Args:
-        first: inertia of one rotor, on the same side of its gear as the coupled one.
-        second: that of the other.
+        first: Inertia of one rotor, on the same side of its gear as the coupled inertia.
+        second: Inertia of the other rotor.
     """
     return math.sqrt(first * second)
 
 
 class Rotors:
-    """Rotors of all motors with springs in a row, joint by joint; arrays (..., motors).
+    """Rotors of all motors with springs, joint by joint; arrays (..., motors).
 
-    Where motor 2 is carried around by motor 1, both feel either acceleration: B is a symmetric 2x2 matrix.
+    Where motor 1 carries motor 2, the acceleration of each acts on the other: B is a symmetric 2x2 matrix.
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -43,14 +43,14 @@ class Rotors:
         self._other = self._coupled + to_other[self._coupled].astype(np.intp)
 
     def torques(self, ddtheta: FloatArray) -> FloatArray:
-        """B theta''."""
+        """Return B theta''."""
         torques: FloatArray = self._inertia * ddtheta
         if self._coupled.size:
             torques[..., self._coupled] += self._coupling[self._coupled] * ddtheta[..., self._other]
         return torques
 
     def accelerations(self, torques: FloatArray) -> FloatArray:
-        """Theta'' = B^-1 of what is left of the motors' torques."""
+        """Return theta'' = B^-1 of the torques that accelerate the rotors."""
         accelerations: FloatArray = torques / self._inertia
         if self._coupled.size:
             here, other = self._coupled, self._other
@@ -60,7 +60,7 @@ class Rotors:
         return accelerations
 
     def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """Theta'' where some motors are held, and the torques that hold these, 0 of others; (..., motors)."""
+        """Return theta'' with some motors held, and the holding torques, 0 for others; (..., motors)."""
         apart = held.copy()
         apart[..., self._coupled] |= held[..., self._other]
         moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
@@ -69,7 +69,7 @@ class Rotors:
 
 
 SIDES = 2
-"""Motors that a joint has at most."""
+"""Largest number of motors of a joint."""
 
 
 class _Group(NamedTuple):
@@ -81,21 +81,23 @@ class _Group(NamedTuple):
 
 
 class Drivetrain:
-    """The motors of all joints, those with a spring apart from those that move their link directly.
+    """Motors of all joints, separated into those with springs and those that move their link directly.
+
+    "Sprung" motors have springs; a rigid joint has one motor without. In shapes, `springs` are sprung motors.
 
     Attributes:
-        present: (joints, 2), where there is a motor.
-        sprung: (motors,), whether the motor acts through a spring; of motors without one, one a joint.
-        joint: (motors,), index of the joint of each motor.
-        inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
-        rotors: of the motors with springs.
-        friction: dry friction of the motors, joint side; None if none has any.
-        windings: constants of the motors that give current and voltage; None if none is given.
-        rigid: (joints,), whether the joint has no spring.
-        deflected: (joints, 2), where there is a motor whose phi is a deflection.
-        chosen: indices of the joints whose stiffness is commanded.
-        spring_joint: (springs,), index of the joint of each spring.
-        domain: (2, springs), lowest and highest `ranged` for which each law holds.
+        present: Whether there is a motor, (joints, 2).
+        sprung: Whether the motor acts through a spring, (motors,).
+        joint: Index of the joint of each motor, (motors,).
+        inertia, damping, max_torque: Constants of the motors, joint side of the gear, (motors,).
+        rotors: Rotors of the motors with springs.
+        friction: Dry friction of the motors, joint side; None without friction.
+        windings: Constants of the windings; None if no torque constant is given.
+        rigid: Whether the joint has no spring, (joints,).
+        deflected: Whether there is a motor whose phi is a deflection, (joints, 2).
+        chosen: Indices of the joints whose stiffness is commanded.
+        spring_joint: Index of the joint of each sprung motor, (springs,).
+        domain: Lowest and highest `ranged` for which each law holds, (2, springs).
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -131,19 +133,19 @@ class Drivetrain:
         return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
-        """(..., motors) from (..., joints, 2), whose entries without a motor do not matter."""
+        """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
         return values[..., self.present]
 
     def of_joints(self, values: FloatArray) -> FloatArray:
-        """(..., joints, 2) from (..., motors), NaN where there is no motor."""
+        """Return (..., joints, 2) from (..., motors), NaN where there is no motor."""
         result = np.full((*values.shape[:-1], *self.present.shape), np.nan)
         result[..., self.present] = values
         return result
 
     def merged(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
-        """(..., joints, 2) from values of the springs (..., springs), and of the joints (..., joints).
+        """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
 
-        The latter are taken at motors without a spring.
+        Values of joints are used for motors without a spring.
         """
         return self.of_joints(self.of_all(rigid, sprung))
 
@@ -155,18 +157,18 @@ class Drivetrain:
         return result
 
     def of_all(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
-        """(..., motors) from values of motors with springs, and of joints, taken at other motors."""
+        """Return (..., motors) from values of motors with springs, and of joints for the other motors."""
         values = rigid[..., self.joint]
         values[..., self.sprung] = sprung
         return values
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""
+        """Return phi or rates, (..., springs), from those of joints, (..., joints), and sprung motors."""
         parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates that `domain` bounds, (..., springs), at positions as above."""
+        """Return the coordinates that `domain` bounds, (..., springs), at positions as for `deflections`."""
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
@@ -179,7 +181,7 @@ class Drivetrain:
         )
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Elastic energy of each joint, (..., joints)."""
+        """Return the elastic energy of each joint, (..., joints)."""
         return self.by_joint([elasticity.energy(at) for elasticity, at in self.at(q, theta)], q)
 
     def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -187,7 +189,7 @@ class Drivetrain:
         return self.by_joint([each.state(at).stiffness for each, at in self.at(q, theta)], q)
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Det A (67), (..., joints), NaN where no stiffness is commanded."""
+        """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
         found = self.by_joint([each.state(at).determinant() for each, at in self.at(q, theta)], q)
         return np.where(self.rigid, np.nan, found)
 
@@ -202,7 +204,7 @@ class Drivetrain:
         return [values if self._alone else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., joints) from the part of each group; 0 where there are no springs."""
+        """Return (..., joints) from the parts of the groups; 0 for joints without springs."""
         if self._alone:
             return parts[0]
         result = np.zeros_like(like)
@@ -211,7 +213,7 @@ class Drivetrain:
         return result
 
     def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., springs) from the part of each group, (..., joints, motors)."""
+        """Return (..., springs) from the parts of the groups, (..., joints, motors)."""
         if self._alone:
             return parts[0].reshape(*like.shape)
         result = np.empty_like(like)
@@ -278,12 +280,12 @@ class DrivetrainState:
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+        """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         Args:
-            ddq: acceleration of the joints.
-            ddtau_e: second derivative of the elastic torque.
-            ddstiffness: that of the stiffness, which counts where it is commanded.
+            ddq: Acceleration of the joints.
+            ddtau_e: Second derivative of the elastic torque.
+            ddstiffness: Second derivative of the stiffness; ignored where it is not commanded.
         """
         wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
         parts = [

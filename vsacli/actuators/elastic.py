@@ -1,4 +1,4 @@
-"""One motor behind a spring: EJ-NEA, Buondonno & De Luca (2015), there with linear ones."""
+"""One motor behind a spring of any law; with a linear one, EJ-NEA of Buondonno & De Luca (2015)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 
 @dataclass(frozen=True)
 class Elastic(Actuator):
-    """One motor that moves the link through a spring: a linear one of some stiffness, or one of any law."""
+    """One motor that moves the link through a spring: a linear one, or one of any law."""
 
     motor: Motor = value(Record(Motor), "the motor")
     stiffness: float | None = number(
@@ -55,7 +55,7 @@ class Elastic(Actuator):
 
     @cached_property
     def law(self) -> SpringLaw:
-        """The law of its spring."""
+        """Law of the spring."""
         if self.stiffness is None:
             assert self.spring is not None, "see __post_init__"
             return self.spring
@@ -70,7 +70,7 @@ class Elastic(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """One motor, which drives the joint alone."""
+        """Return one motor, which drives the joint alone, behind a linear spring."""
         return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
     @property
@@ -119,7 +119,7 @@ class Elastic(Actuator):
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> OfJoint:
-        """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
+        """Compute a linear spring: phi = tau_e/K, with constant stiffness."""
         phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
         return single_motor(
             stiffness=constant + stiffness,
@@ -136,7 +136,7 @@ class Elastic(Actuator):
     def _nonlinear(self, command: Command) -> OfJoint:
         """Solve tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
 
-        NaN where tau_e cannot be carried; derivatives, which need 1/sigma, also where sigma is zero.
+        NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
         """
         law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
@@ -165,21 +165,18 @@ class Elastic(Actuator):
         )
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """Return the deflection at which the spring carries the torque.
-
-        It leaves no choice of the stiffness.
-        """
+        """Return the deflection at which the spring carries the torque; the stiffness cannot be chosen."""
         never = np.zeros_like(tau_e, dtype=bool)
         deflection = self.law.deflection(tau_e)
         return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Sigma phi'."""
+        """Return sigma phi'."""
         rates: FloatArray = self.law.stiffness(of_joint["phi"][:1]) * of_joint["dphi"][:1]
         return rates
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """Torque and stiffness by the law."""
+        """Return torque and stiffness by the law."""
         phi = of_joint["phi"][0]
         tau_e, stiffness = self.law.torque(phi), self.law.stiffness(phi)
         return Carried(tau_e, np.abs(tau_e), stiffness, stiffness, tau_e[None])

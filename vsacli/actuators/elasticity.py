@@ -1,7 +1,7 @@
-"""Springs of joints as the equations of motion meet them: at any state of the joints and their motors.
+"""Interface of the springs of joints for the equations of motion: at any state of joints and motors.
 
-Arrays of joints are (..., joints), those of motors (..., joints, motors), whatever stands before: one
-instant, or samples.
+Arrays of joints are (..., joints), those of motors (..., joints, motors); the leading axes are free: none for
+one instant, or samples.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ class Torques(NamedTuple):
 
 
 class Elasticity(ABC):
-    """The springs of joints whose actuators are of one kind: a potential of q and theta, and its derivatives.
+    """Springs of joints with one kind of actuator: a potential of q and theta, and its derivatives.
 
-    Springs are described by phi, one number for each motor, which depends linearly on q and theta. What else
-    they depend on belongs to the coordinates that the methods below take.
+    The state of the springs is phi, one coordinate per motor, linear in q and theta. The methods below take
+    `coordinates`: phi, and further variables that the springs depend on.
     """
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""
+        """Return phi from positions, or its rates from velocities; theta - q unless the kind overrides it."""
         return theta - q[..., None]
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ class Elasticity(ABC):
 
     @abstractmethod
     def energy(self, coordinates: FloatArray) -> FloatArray:
-        """Elastic energy of each joint, J."""
+        """Return the elastic energy of each joint, J."""
 
     @abstractmethod
     def state(self, coordinates: FloatArray) -> ElasticState:
@@ -54,7 +54,7 @@ class Elasticity(ABC):
 
 
 class ElasticState(ABC):
-    """The springs of joints at given coordinates: torque and stiffness, and how motions change them."""
+    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions."""
 
     @property
     @abstractmethod
@@ -73,11 +73,11 @@ class ElasticState(ABC):
 
     @abstractmethod
     def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """Rate of the elastic torque (17), (..., joints)."""
+        """Return the rate of the elastic torque (17), (..., joints)."""
 
     @abstractmethod
     def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """Rate of the stiffness (18), (..., joints)."""
+        """Return the rate of the stiffness (18), (..., joints)."""
 
     @abstractmethod
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
@@ -87,11 +87,11 @@ class ElasticState(ABC):
     def motor_accelerations(
         self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+        """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         NaN where there are none, because the decoupling matrix is singular.
         """
 
     def determinant(self) -> FloatArray:
-        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if no stiffness is commanded."""
+        """Return det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
         return np.full_like(self.tau_e, np.nan)

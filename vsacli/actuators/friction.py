@@ -17,13 +17,13 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, check_fields, number, value
 
 REST = 1e-10
-"""Speed, rad/s (m/s), up to which something rests: at the ends of motions from rest to rest, rounding left
-1e-13 of the shipped robots' motors. At this speed a turn takes two thousand years."""
+"""Largest speed, rad/s (m/s), that counts as rest. At the ends of rest-to-rest motions of the bundled robots,
+rounding leaves 1e-13. At 1e-10 a turn takes two thousand years."""
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction: a torque against the motion that hardly depends on its speed."""
+    """Dry friction: a torque against the motion that hardly depends on its velocity."""
 
     coulomb: tuple[float, float] = value(
         Pair(Number(units.TORQUE), dim="direction"),
@@ -43,7 +43,7 @@ class Friction:
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
         return {"coulomb": 0.5 if joint_type == "revolute" else 5, "width": 0.01}
 
     @property
@@ -62,7 +62,7 @@ class Friction:
 
 
 class _Geared(Friction):
-    """Friction on the joint side of a gear; its numbers were checked on the shaft, or carry derivatives."""
+    """Friction on the joint side of a gear, unchecked: its values were checked on the shaft, or are duals."""
 
     def __post_init__(self) -> None:
         pass
@@ -72,12 +72,12 @@ NO_FRICTION = Friction(coulomb=(0.0, 0.0))
 
 
 class FrictionLaws(NamedTuple):
-    """Friction of several motors or joints; arrays that spread with those of their velocities.
+    """Friction of several motors or joints; arrays that broadcast with their velocities.
 
     Attributes:
-        backward, forward: sizes of Coulomb friction while the velocity is negative, and positive.
-        offset: torque that is added.
-        width: of the change of sign, 0 for the sign function.
+        backward, forward: Sizes of Coulomb friction while the velocity is negative, and positive.
+        offset: Torque that is added.
+        width: Width of the change of sign, 0 for the sign function.
     """
 
     backward: FloatArray
@@ -87,7 +87,7 @@ class FrictionLaws(NamedTuple):
 
     @classmethod
     def of(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
-        """One entry each, on the last axis; None if none has friction."""
+        """Return the laws, one per entry on the last axis; None if no entry has friction."""
         if not any(frictions):
             return None
         laws = [friction or NO_FRICTION for friction in frictions]
@@ -95,22 +95,22 @@ class FrictionLaws(NamedTuple):
         return cls(*map(np.stack, zip(*rows, strict=True)))
 
     def with_axis_behind(self) -> FrictionLaws:
-        """Return the same with a further axis, for samples, behind those there are."""
+        """Return the laws with a further last axis, for samples."""
         return FrictionLaws(*(values[..., None] for values in self))
 
     @property
     def sharp(self) -> BoolArray:
-        """Joints at which the torque at rest is not known."""
+        """Whether the torque at rest is undetermined."""
         sharp: BoolArray = (self.width == 0) & (self.backward + self.forward > 0)
         return sharp
 
     def torque(self, velocity: FloatArray, direction: FloatArray | None = None) -> FloatArray:
-        """Friction at velocities; at rest the offset alone, where the shape is the sign.
+        """Return the friction at velocities; sharp friction at rest is the offset alone.
 
         Args:
-            velocity: rad/s (m/s), any shape that spreads with the laws.
-            direction: of the motion, -1, 0 or 1, where the shape is the sign; that of the velocity if None,
-                and where it is NaN.
+            velocity: Velocity, rad/s (m/s), any shape that broadcasts with the laws.
+            direction: Direction of motion for sharp friction, -1, 0 or 1; that of the velocity if None, and
+                where it is NaN.
         """
         sign = direction_of(velocity)
         if direction is not None:
@@ -133,10 +133,10 @@ class FrictionLaws(NamedTuple):
         return torque * velocity, (torque + size * (1 - smooth * smooth) / width * velocity) * acceleration
 
     def _size(self, velocity: FloatArray, sign: FloatArray) -> FloatArray:
-        """Return the size that counts: by the direction where the shape is the sign, else by the velocity."""
+        """Return the Coulomb friction: by the direction if sharp, else by the velocity."""
         return np.where(np.where(self.width > 0, velocity, sign) < 0, self.backward, self.forward)
 
 
 def direction_of(velocity: FloatArray) -> FloatArray:
-    """-1, 0 or 1; 0 at rest, and where the velocity does not exist."""
+    """Return -1, 0 or 1; 0 at rest, and where the velocity is NaN."""
     return np.where(np.abs(velocity) > REST, np.where(velocity < 0, -1.0, 1.0), 0.0)

@@ -1,7 +1,6 @@
 """The kinds of actuator by name.
 
-Adding a kind of actuator is adding a class derived from `vsacli.actuators.actuator.Actuator` and its line in
-`ACTUATORS`.
+To add a kind, derive a class from `vsacli.actuators.actuator.Actuator` and add a line to `ACTUATORS`.
 """
 
 from __future__ import annotations
@@ -20,18 +19,18 @@ ACTUATORS = LazyRegistry(
         "serial": "vsacli.actuators.serial:Serial",
     }
 )
-"""Kinds of actuator by the name they have in a robot file."""
+"""Kinds of actuator by their name in a robot file."""
 
 
 def example(name: str, joint_type: str) -> dict[str, Any]:
-    """Plausible values of a joint's key `actuator`.
+    """Return plausible values of a joint's key `actuator`.
 
     Args:
-        name: a kind, or a mechanism of serial ones.
-        joint_type: of the joint.
+        name: Kind of actuator, or mechanism of a serial one.
+        joint_type: Type of the joint.
 
     Raises:
-        InputError: the mechanism does not drive such joints.
+        InputError: The mechanism does not drive such joints.
     """
     if name in ACTUATORS:
         return {"type": name, **ACTUATORS[name].example(joint_type)}

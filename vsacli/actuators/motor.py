@@ -1,4 +1,4 @@
-"""A motor and its gear, as a file gives them and as they act on the joint, and what flows in its windings."""
+"""A motor and its gear: as declared in a robot file, on the joint side, and the current in the windings."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNKNOWN = {
 
 @dataclass(frozen=True)
 class JointMotor:
-    """A motor as its joint has it: at a prismatic joint it moves in m and pushes in N."""
+    """A motor on the joint side of its gear; at a prismatic joint in m and N."""
 
     inertia: float = number(units.MOTOR_INERTIA, "inertia of the drive, joint side of the gear")
     damping: float = number(units.DAMPING, "viscous damping, joint side of the gear")
@@ -66,7 +66,7 @@ class JointMotor:
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor as written down: on the joint side of its gear, or with a gear ratio on its own shaft."""
+    """A motor as declared: on the joint side of its gear, or, with a gear ratio, on its own shaft."""
 
     inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_SIDE}", check=POSITIVE)
     damping: float = number(units.DAMPING, f"viscous damping, {_SIDE}", check=NON_NEGATIVE, default=0.0)
@@ -137,7 +137,7 @@ class Motor:
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
         revolute = joint_type == "revolute"
         return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
 
@@ -161,16 +161,16 @@ class Motor:
 
 
 ELECTRICAL = ("current", "voltage", "copper_loss")
-"""The variables of it."""
+"""Result variables of the windings."""
 
 
 class Windings(NamedTuple):
-    """Constants of several motors; arrays that spread with those of their torques.
+    """Constants of several motors' windings; arrays that broadcast with their torques.
 
     Attributes:
-        torque_constant: torque on the joint's side of the gear over current, and so voltage over velocity
-            there; negative if the gear turns the motor against the joint. NaN where it is not known.
-        resistance: of the windings, NaN where it is not known.
+        torque_constant: Torque on the joint side of the gear over current, and so voltage over velocity
+            there; negative if the gear reverses the motion. NaN where unknown.
+        resistance: Resistance of the windings, NaN where unknown.
     """
 
     torque_constant: FloatArray
@@ -178,7 +178,7 @@ class Windings(NamedTuple):
 
     @classmethod
     def of(cls, motors: Sequence[JointMotor | None]) -> Windings | None:
-        """One entry each, on the last axis; None if there is no torque constant."""
+        """Return the constants, one entry per motor on the last axis; None if no torque constant is given."""
         rows = [[getattr(motor, name, None) for name in cls._fields] for motor in motors]
         if all(constant is None for constant, _ in rows):
             return None
@@ -186,15 +186,15 @@ class Windings(NamedTuple):
         return cls(*map(np.stack, zip(*known, strict=True)))
 
     def with_axis_behind(self) -> Windings:
-        """Return the same with a further axis, for samples, behind those there are."""
+        """Return the constants with a further last axis, for samples."""
         return Windings(*(values[..., None] for values in self))
 
     def variables(self, torque: FloatArray, velocity: FloatArray) -> dict[str, FloatArray]:
         """Return the variables `ELECTRICAL` by name, A, V, W.
 
         Args:
-            torque: of the motors, N m (N), joint side of the gear.
-            velocity: of the motors, rad/s (m/s), joint side of the gear.
+            torque: Torques of the motors, N m (N), joint side of the gear.
+            velocity: Velocities of the motors, rad/s (m/s), joint side of the gear.
         """
         current = torque / self.torque_constant
         return {

@@ -1,4 +1,8 @@
-"""Margins and flags of the samples of one joint: attainable, regular, and within limits."""
+"""Flags of the samples of one joint: stiffness attainable, A regular, and limits kept; with their margins.
+
+`reach` compares the stiffness with its attainable range, which `PairSolution` holds; a `LimitCheck` compares
+a result variable with a limit.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +20,24 @@ from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Fla
 from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
-"""Relative excess over a limit that does not count, so that a motion may run along its limit."""
+"""Relative excess over a limit that is ignored as rounding, so that a motion may run along its limit."""
 
 ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
-"""Standard deviations, and share of a limit's range, by which an uncertain value may seem to exceed it."""
+"""Allowed excess of an uncertain value: standard deviations, and at most this share of the limit's range."""
 
 OfJoint = Mapping[str, AnyArray]
-"""Variables of one joint by name, (samples,), those of its motors (2, samples)."""
+"""Variables of one joint by name: (samples,), or (2, samples) for those of its motors."""
 
 
 class Excess(NamedTuple):
     """The worst excess over a limit.
 
     Attributes:
-        first: index of the first step beyond the limit.
-        step: index of the worst one.
-        value: of the variable there.
-        bound: the end of the range that it is beyond.
-        size: how far.
+        first: Index of the first sample beyond the limit.
+        step: Index of the worst sample.
+        value: Value of the variable there.
+        bound: Bound that it exceeds.
+        size: Size of the excess.
     """
 
     first: int
@@ -44,13 +48,13 @@ class Excess(NamedTuple):
 
 
 class LimitCheck(NamedTuple):
-    """A finite limit of a joint: which result variable must stay in which range.
+    """A limit of a joint: the range in which a result variable must stay.
 
     Attributes:
-        flag: the bit that says it does not.
-        variable: name of the variable.
-        motor: 1 or 2 if the variable is one of a motor, else None.
-        range: lower and upper bound.
+        flag: Bit that is set outside the range.
+        variable: Name of the variable.
+        motor: Motor 1 or 2 for a motor variable, else None.
+        range: Lower and upper bound; either may be infinite.
     """
 
     flag: Flag
@@ -59,7 +63,7 @@ class LimitCheck(NamedTuple):
     range: tuple[float, float]
 
     def unit(self, joint_type: str) -> str:
-        """Unit of the variable at a joint of this type."""
+        """Return the unit of the variable at a joint of this type."""
         return VARIABLES[self.variable].quantity.unit(joint_type)
 
     def values(self, of_joint: OfJoint) -> FloatArray:
@@ -68,18 +72,15 @@ class LimitCheck(NamedTuple):
         return rows if self.motor is None else rows[self.motor - 1]
 
     def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
-        """Return the bit where the range is left by more than rounding and an allowance.
-
-        NaN does not leave it.
-        """
+        """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
         allowed = LIMIT_ROUNDING * self._largest + allowance
         return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
 
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
-        """Return by how much uncertain values may seem to exceed the range, (samples,); 0 for certain ones.
+        """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
 
-        Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one; none
-        where the bit is no limit, but says that there is no way.
+        It is twice the standard deviation, but at most 1 % of the range, or of the bound if there is only
+        one; zero for a bit that marks infeasible samples instead of an exceeded limit.
         """
         deviations = of_joint.get(deviation(self.variable))
         if deviations is None:
@@ -89,19 +90,19 @@ class LimitCheck(NamedTuple):
 
     @property
     def largest_allowance(self) -> float:
-        """Largest seeming excess, however uncertain the values are."""
+        """Largest excess that is allowed, however uncertain the values are."""
         if self.flag not in LIMITS:
             return 0.0
         width = self.range[1] - self.range[0]
         return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
-        """Return the distance inside the range relative to its larger end; negative outside, NaN for NaN."""
+        """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
         clearance: FloatArray = self._outside(self.values(of_joint)) / -(self._largest or 1.0)
         return clearance
 
     def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
-        """Return the worst of the steps with the bit among these flags, (samples,); None without any."""
+        """Return the worst excess among samples whose flags, (samples,), have the bit; None without any."""
         values = self.values(of_joint)
         outside = np.nan_to_num(self._outside(values), nan=-np.inf)
         hit = has(flags, self.flag) & (outside > 0)
@@ -113,7 +114,7 @@ class LimitCheck(NamedTuple):
 
     @property
     def _largest(self) -> float:
-        """The larger finite bound in size; 0 if there is none."""
+        """Largest absolute value of the finite bounds; 0 if there is none."""
         return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
 
     def _outside(self, values: FloatArray) -> FloatArray:
@@ -122,24 +123,27 @@ class LimitCheck(NamedTuple):
 
 
 def within(bound: float) -> tuple[float, float]:
-    """Return the range of a quantity whose size is bounded."""
+    """Return the range of a quantity whose absolute value is bounded."""
     return -bound, bound
 
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """Relative distance of the stiffness to the nearer end of its corridor; negative outside, NaN if none."""
-    with np.errstate(divide="ignore", invalid="ignore"):  # a stiffness of zero has none
+    """Return the margin: distance of the stiffness to the nearer end of its attainable range, relative to it.
+
+    Negative outside the range, NaN where no stiffness is attainable.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):  # a stiffness of zero has no margin
         relative: FloatArray = np.minimum(stiffness - lower, upper - stiffness) / stiffness
     return relative
 
 
 def nearer_end(stiffness: float, lower: float, upper: float) -> float:
-    """Return the end of the corridor that a stiffness is nearer to; NaN if there is none."""
+    """Return the nearer end of the attainable range; NaN where no stiffness is attainable."""
     return lower if stiffness - lower <= upper - stiffness or math.isnan(lower) else upper
 
 
 class Reach(NamedTuple):
-    """Whether a stiffness is within reach, and how near to a singular matrix A; arrays (samples,)."""
+    """Feasibility of a stiffness, and distance to a singular matrix A; arrays (samples,)."""
 
     infeasible: BoolArray
     slack: BoolArray
@@ -157,11 +161,12 @@ class Reach(NamedTuple):
 def reach(
     stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
 ) -> Reach:
-    """Reach of the steps of a joint; near-singular is what has a smaller margin than that."""
+    """Compare a stiffness with its attainable range; margins below `near_singular` count as near-singular."""
+    # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular.
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
-    infeasible = ~((gap >= -SINGULAR_MARGIN) & (stiffness > 0))
+    infeasible = ~((gap >= -SINGULAR_MARGIN) & (stiffness > 0))  # negated, so that NaN is infeasible
     return Reach(
         infeasible=infeasible,
         slack=infeasible & at_lower & solution.slack_below,
@@ -173,9 +178,9 @@ def reach(
 def deflections_within_reach(
     stiffness: FloatArray, solution: PairSolution, near_singular: float, integrated: FloatArray | None
 ) -> tuple[FloatArray, Reach]:
-    """Deflections (61), (2, samples), NaN where the step is infeasible, and the reach of the steps.
+    """Return the deflections (61), (2, samples), NaN at infeasible samples, and the reach.
 
-    Integrated deflections take the place of those of the solution; a step where they are NaN is infeasible.
+    Integrated deflections replace those of the solution; samples where they are NaN are infeasible.
     """
     reached = reach(stiffness, solution, near_singular)
     if integrated is not None:
@@ -187,5 +192,5 @@ def deflections_within_reach(
 def reach_flags(
     stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
 ) -> FlagArray:
-    """Bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
+    """Return the bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the samples of a joint, (samples,)."""
     return reach(stiffness, solution, near_singular).flags

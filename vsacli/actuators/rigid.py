@@ -1,4 +1,4 @@
-"""One motor that moves with its joint: NEA (2), with the inertia of the motor."""
+"""One motor that moves with its joint: the rigid case (1)-(2), with the inertia of the motor."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Rigid(Actuator):
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """One motor, which drives the joint alone."""
+        """Return one motor, which drives the joint alone."""
         return cls(motor=constants.only_motor)
 
     @property
@@ -59,5 +59,5 @@ class Rigid(Actuator):
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return the rates of the torque in place of a spring, tau_e."""
+        """Return the rate of tau_e, which takes the place of a spring torque."""
         return of_joint["dtau_e"][None]

@@ -1,6 +1,6 @@
-"""One motor that carries the load, and one that sets the springs behind it: MACCEPA, AwAS, levers, cams.
+"""Serial actuators: motor 1 carries the load, motor 2 adjusts the springs: MACCEPA, AwAS, levers, cams.
 
-The springs' potential, which the mechanism defines, takes the place of (14) and (61)-(72).
+The mechanism defines the potential of the springs, from which the counterparts of (14) and (61)-(72) follow.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, v
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
-"""Deflection, rad (m), whose torque is large compared with rounding. A motor that carries the load alone
-passes through zero, where its own torque is no measure."""
+"""Deflection, rad (m), whose torque is large compared with rounding. The load of motor 1 passes through zero,
+where the torque itself is no scale for its error."""
 
 
 @dataclass(frozen=True)
 class Serial(Actuator):
-    """Motor 1 moves the link through springs that motor 2 sets."""
+    """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
         Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which sets the springs"
@@ -67,7 +67,7 @@ class Serial(Actuator):
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
-        """Motor 2 has no deflection."""
+        """See `Actuator.has`; motor 2 has no deflection."""
         return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
 
     @classmethod
@@ -89,7 +89,7 @@ class Serial(Actuator):
         return cls(motor=(motor, motor), mechanism=spring)
 
     def unfit_for(self, joint_type: str) -> FieldProblem | None:
-        """Return a mechanism that turns."""
+        """Return the mechanism as the problem, if it rotates and the joint does not."""
         if joint_type in self.mechanism.joint_types:
             return None
         others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
@@ -103,7 +103,7 @@ class Serial(Actuator):
 
     @property
     def coupled_rotors(self) -> float:
-        """The coupled inertia times both gear ratios, with their signs."""
+        """Coupled inertia times both gear ratios, with their signs."""
         first, second = (motor.gear_ratio or 1.0 for motor in self.motor)
         return self.coupled_inertia * first * second
 
@@ -138,13 +138,13 @@ class Serial(Actuator):
         return self.mechanism
 
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Theta_1 = phi + q; theta_2 is the setting."""
+        """Return theta_1 = phi + q, and theta_2, which is the setting."""
         return np.stack((phi[0] + q, phi[1]))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
         """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
-        NaN where the step is infeasible; rates and accelerations, which need A^-1, also where it is singular.
+        NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
         """
         stiffness, dstiffness, ddstiffness = (
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
@@ -171,15 +171,15 @@ class Serial(Actuator):
         }
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Rates of the derivatives of the potential over theta_1 and theta_2."""
+        """Return the rates of the derivatives of the potential over theta_1 and theta_2."""
         rates = of_joint["dphi"][0], of_joint["dtheta"][1], of_joint["dq"]
         return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
 
     def carried(self, of_joint: OfJoint) -> Carried:
         """Return torque and stiffness of the mechanism.
 
-        Its stiffness may be a difference of two large terms, next to zero. The last digits of phi and of the
-        setting then decide on it.
+        The stiffness may be a small difference of two large terms, which the last digits of phi and of the
+        setting determine.
         """
         state = self._state_of(of_joint)
         rows, size = state.rows, np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
@@ -194,12 +194,12 @@ class Serial(Actuator):
         return _Springs(actuators[0].mechanism)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Phi and theta_2, on the mechanism's branch."""
+        """Return phi and theta_2 on the mechanism's branch."""
         return self.mechanism.solve(tau_e, stiffness, q)
 
     @property
     def opposite_preload(self) -> str | None:
-        """Other branch of the mechanism."""
+        """Preload of the other branch of the mechanism."""
         return self.mechanism.opposite_preload
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
@@ -207,12 +207,12 @@ class Serial(Actuator):
         return self.mechanism.other_preload(tau_e, stiffness, q)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """A^-1 (tau_e', sigma')."""
+        """Return A^-1 (tau_e', sigma')."""
         state = self._state(phi, command.q)
         return state.rates(command.dtau_e, command.commanded["dstiffness"], command.dq)[..., :2].T
 
     def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Det A over (theta_1, theta_2)."""
+        """Return det A over (theta_1, theta_2)."""
         return self._state(phi, q).determinant()
 
     def _state(self, phi: FloatArray, q: FloatArray) -> MechanismState:
@@ -230,7 +230,7 @@ class _Springs(Elasticity):
         self._mechanism = mechanism
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi and theta_2."""
+        """Return phi and theta_2."""
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -238,11 +238,11 @@ class _Springs(Elasticity):
         return np.stack(self._mechanism.ranged(theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Phi, theta_2 and q."""
+        """Return phi, theta_2 and q."""
         return np.stack((theta[..., 0] - q, theta[..., 1], q), axis=-1)
 
     def torques(self, coordinates: FloatArray) -> Torques:
-        """Derivatives of the potential."""
+        """Return the derivatives of the potential."""
         state = self._mechanism.state(coordinates)
         return Torques(state.tau_e, state.tau_spring)
 

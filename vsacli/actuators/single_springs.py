@@ -1,4 +1,4 @@
-"""One spring at each of several joints, at any state of these."""
+"""One spring at each of several joints, for the equations of motion."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vsacli.base.arrays import FloatArray
 
 
 class LinearRows:
-    """Linear springs, one at each joint, all evaluated at a time; else as `SpringRows`."""
+    """Linear springs, one at each joint, evaluated together; otherwise as `SpringRows`."""
 
     def __init__(self, stiffness: Sequence[float]) -> None:
         self._stiffness = np.array(stiffness)[:, None]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """K phi."""
+        """Return K phi."""
         torque: FloatArray = phi * self._stiffness
         return torque
 
@@ -28,7 +28,7 @@ class LinearRows:
         return energy
 
     def state(self, phi: FloatArray) -> SpringState:
-        """K phi, whose derivatives are constants."""
+        """Return the state of a spring of torque K phi."""
         torque, none = self.torque(phi), np.zeros_like(phi)
         return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), none, none)
 
@@ -40,7 +40,7 @@ class SingleSprings(Elasticity):
         self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return the torques: the spring pulls link and motor equally."""
+        """Return the torques; the spring exerts the same torque on the link as against its motor."""
         tau = self._rows.torque(phi)
         return Torques(tau[..., 0], tau)
 
@@ -76,21 +76,21 @@ class _State(ElasticState):
         return self._springs.tau
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """Sigma phi'."""
+        """Return sigma phi'."""
         return self._one.sigma * dphi[..., 0]
 
     def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """Zeta phi'; of a linear spring zero, not -0."""
+        """Return zeta phi'; for a linear spring zero, not -0."""
         return self._one.zeta * dphi[..., 0] + 0.0
 
     def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
-        """Eta phi'^2."""
+        """Return eta phi'^2."""
         return self._one.eta * dphi[..., 0] * dphi[..., 0]
 
     def motor_accelerations(
         self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
     ) -> FloatArray:
-        """(tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
+        """Return (tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
         squared = dphi[..., 0] * dphi[..., 0]
         divisor = np.where(self.stiffness == 0, np.nan, self.stiffness)
         return ((ddtau_e - self._one.zeta * squared) / divisor + ddq)[..., None]

@@ -1,4 +1,4 @@
-"""Springs as single elements, as simulators of bodies know them: what stretches each, and how it pulls."""
+"""Springs as elements of multibody simulators: deflection and torque of each spring."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from vsacli.actuators.laws.law import SpringLaw
 
 
 class SpringElement(NamedTuple):
-    """A spring whose deflection is a weighted sum of positions, on which it pulls by the same weights.
+    """A spring whose deflection is a weighted sum of positions; its torques have the same weights.
 
     Attributes:
-        law: its law.
-        joint: weight of the position of the joint.
-        motors: weight of the position of each motor.
+        law: Law of the spring.
+        joint: Weight of the position of the joint.
+        motors: Weight of the position of each motor.
     """
 
     law: SpringLaw
@@ -22,15 +22,15 @@ class SpringElement(NamedTuple):
 
 
 class LeverSpring(NamedTuple):
-    """A linear spring from a lever that motor 1 turns to a point of the link, tightened by motor 2.
+    """A linear spring from a lever that motor 1 rotates to a point of the link, tightened by motor 2.
 
-    It is stretched by the distance of both ends beyond the least one, and by the pretension.
+    Its elongation is the distance of both ends minus its minimum, plus the pretension.
 
     Attributes:
-        lever: length of the lever, m.
-        arm: distance from the axis to the point of the link, m.
+        lever: Length of the lever, m.
+        arm: Distance from the axis to the point of the link, m.
         stiffness: N/m.
-        lead: pretension per position of motor 2, m/rad.
+        lead: Pretension per position of motor 2, m/rad.
     """
 
     lever: float

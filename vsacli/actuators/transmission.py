@@ -1,4 +1,4 @@
-"""The command of a joint, from which `Actuator.transmit` computes, and the variables of a single motor."""
+"""Input and output of `Actuator.transmit`: the command of a joint, and the result variables of one motor."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from vsacli.base.variables import VARIABLES
 
 
 class Command(NamedTuple):
-    """The commanded motion and signals of a joint, and the elastic torque of its link; (samples,), SI units.
+    """The demand on a joint: motion, commanded signals, and elastic torque; arrays (samples,), SI units.
 
     Attributes:
-        q, dq, ddq: motion of the joint.
-        tau_e, dtau_e, ddtau_e: elastic torque and its derivatives.
-        commanded: the signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`; those that the
-            actuator does not take are ignored.
+        q, dq, ddq: Motion of the joint.
+        tau_e, dtau_e, ddtau_e: Elastic torque and its derivatives.
+        commanded: Signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`; the actuator
+            ignores those that it does not need.
     """
 
     q: FloatArray
@@ -33,19 +33,19 @@ class Command(NamedTuple):
 
     @classmethod
     def names(cls, signals: Iterable[str]) -> tuple[str, ...]:
-        """Return the names of all its arrays, given the keys of the commanded signals."""
+        """Return the names of all arrays of a command with commanded signals of these keys."""
         return (*cls._fields[:-1], *(name for key in signals for name in COMMANDED[key].names))
 
     @classmethod
     def of(cls, arrays: Mapping[str, FloatArray]) -> Command:
-        """Return the command of arrays by name; other names are ignored."""
+        """Return the command from arrays by name; other names are ignored."""
         commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         own = {name: arrays[name] for name in cls._fields[:-1]}
         return cls(**own, commanded=commanded)
 
     @classmethod
     def at_rest(cls, tau_e: FloatArray, q: FloatArray) -> Command:
-        """Return the command of a joint at rest under torques, (samples,); no signal is commanded."""
+        """Return the command of a joint at rest under torques, (samples,), without commanded signals."""
         still = np.zeros_like(tau_e)
         return cls(q, still, still, tau_e, still, still, {})
 
@@ -55,11 +55,11 @@ class Command(NamedTuple):
 
 
 def single_motor(**variables: AnyArray) -> OfJoint:
-    """Return `Actuator.transmit` of an actuator with one motor, whose stiffness is not commanded.
+    """Return the result of `Actuator.transmit` for one motor without a commanded stiffness.
 
     Args:
-        variables: `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_spring`, `elastic_energy`
-            and `flags`, each (samples,).
+        variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_spring`,
+            `elastic_energy` and `flags`, each (samples,).
     """
     none = np.full_like(variables["phi"], np.nan)
     transmitted = {

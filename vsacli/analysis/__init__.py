@@ -1,4 +1,4 @@
-"""One run over a trajectory: its report, and its self-check."""
+"""One run of the inverse dynamics along a trajectory: its report, its self-check, and its result."""
 
 from typing import TYPE_CHECKING
 

@@ -1,8 +1,8 @@
 """Minima of margins and of distances to limits between the samples of a run.
 
-A run computes a trajectory at its steps, but that is a function of time. Around each local minimum of a
-clearance that may come near its bound, the run is computed at further times, until the minimum is known. The
-step that is nearest to it gets the flags that hold there.
+A run computes samples of a trajectory that is a function of time. Around each local minimum of a clearance
+that may come near its bound, the inverse dynamics is computed at further times until the minimum is known.
+The nearest sample receives the flags that hold there.
 """
 
 from __future__ import annotations
@@ -32,28 +32,28 @@ from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 NEAR = 0.1
-"""Relative clearance up to which a minimum is looked for."""
+"""Relative clearance below which a minimum is searched for."""
 
 MOST = 1000
-"""Minima of one quantity that are looked for, the worst of a run at least."""
+"""Largest number of minima of one quantity that are refined; the lowest ones are always included."""
 
 SCANNED = 500
-"""Times at which a run of fewer steps is looked at, a third of those of its self-check: its steps may be so
-coarse that a minimum shows at none of them."""
+"""Number of times at which a run with fewer samples is scanned, a third of those of its self-check: such
+samples may be so coarse that none of them shows a minimum."""
 
 SAMPLES_ONLY = "derivatives are given at the samples, so that what lies between the samples is not known"
 
 
 class Minima(NamedTuple):
-    """Minima between the steps of a block.
+    """Minima between the samples of a block.
 
     Attributes:
-        block: of each minimum everything of its own joint, as of the only joint there is; a row each.
-        quantity: what is least there, by number of `Between.quantities`.
-        joint: whose it is, by index.
-        clearance: how little.
-        step: the nearest step, by its place in the block.
-        crossed: whether more is flagged there than at the steps around.
+        block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
+        quantity: Quantity that has the minimum, by index in `Between.quantities`.
+        joint: Joint of the quantity, by index.
+        clearance: Clearance at the minimum.
+        step: Nearest sample, by index in the block.
+        crossed: Whether the minimum has more flags than the samples around it.
     """
 
     block: Block
@@ -64,7 +64,7 @@ class Minima(NamedTuple):
     crossed: BoolArray
 
     def where(self, chosen: BoolArray) -> Minima:
-        """Return some of them."""
+        """Return a selection of the minima."""
         return Minima(
             self.block.taken(chosen),
             self.quantity[chosen],
@@ -75,7 +75,7 @@ class Minima(NamedTuple):
         )
 
     def of_joint(self, index: int) -> Block:
-        """Everything of one joint at its minima, in its place; joints before it are views of the same."""
+        """Return a joint's variables at its minima, in its column; the columns before are views of it."""
         own = self.block.taken(self.joint == index)
         return own.replaced(
             **{
@@ -89,15 +89,15 @@ class Between:
     """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
-        robot: the robot.
-        trajectory: along which it is computed.
-        near_singular: margin that is flagged.
-        compute: what computes its blocks.
-        judged: what corrects their flags, if anything does.
+        robot: Robot.
+        trajectory: Trajectory of the run.
+        near_singular: Margin that is flagged.
+        compute: Function that computes the block of a motion.
+        judged: Function that corrects the flags of a block for uncertainty.
 
     Attributes:
-        quantities: everything that has bounds.
-        notes: what keeps it from looking, if anything does: a sentence.
+        quantities: Quantities with bounds.
+        notes: Reason why the search is impossible, if it is: a sentence.
     """
 
     def __init__(
@@ -140,14 +140,15 @@ class Between:
             self._seen = math.inf if ended else self._known.stop - 1
 
     def knows(self, samples: int) -> bool:
-        """Return whether the surroundings of this many samples after those that passed are known.
+        """Return whether minima around this many further samples are known.
 
-        Two samples after them must be, since a minimum around the first of these may be nearest to the last.
+        The two samples after them must have been seen, since a minimum around the first of these two may be
+        nearest to the last of the block.
         """
         return self._passed + samples < self._seen
 
     def mark(self, block: Block) -> list[Minima]:
-        """Give the next block flags that hold between its samples; return the minima that are nearest."""
+        """Set flags of minima between samples in the next block; return the minima nearest to its samples."""
         stop, own, later = self._passed + len(block.time), [], []
         for found in self._found:
             inside = found.step < stop
@@ -162,7 +163,7 @@ class Between:
         return own
 
     def add(self, minima: Minima) -> None:
-        """Take minima into the report, which have passed and are part of the run."""
+        """Merge minima of samples that are part of the run into the report."""
         for number in set(minima.quantity.tolist()):
             own, quantity = minima.where(minima.quantity == number), self.quantities[number]
             least = int(own.clearance.argmin())
@@ -174,13 +175,13 @@ class Between:
         """Return for each joint the clearances that are lower between the samples than at any of them."""
         reports: list[dict[str, Worst]] = [{} for _ in range(self._joints)]
         nearest_last = sorted(self._least_between.items(), reverse=True, key=lambda entry: entry[1][0])
-        for number, (clearance, worst) in nearest_last:  # of two motors the last one stays
+        for number, (clearance, worst) in nearest_last:  # both motors have one kind: the lower one overwrites
             if clearance < self._least_at_steps[number]:
                 reports[self._joint[number]][worst.kind] = worst
         return reports
 
     def _scan(self) -> None:
-        """Look at all of a run of few steps, at evenly many times from each step to the next."""
+        """Search a whole run of few samples, at the same number of times from each sample to the next."""
         steps = self._trajectory.times.block(0, self._trajectory.samples)
         each = -(-SCANNED // (len(steps) - 1))
         time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
@@ -188,7 +189,7 @@ class Between:
         self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
 
     def _search(self, known: Known, steps: Known) -> None:
-        """Find the minima where clearances are known, and keep those lower than the steps around them."""
+        """Find the minima where clearances are known, and keep those lower than the samples around them."""
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         given = brackets(known)
         found = narrowed(self._chosen(given, steps.time), self._evaluated)
@@ -205,13 +206,13 @@ class Between:
     def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
         """Return the brackets with the lowest minima of each quantity so far that lie between samples.
 
-        A minimum counts if more may be flagged there than in the middle, or if it may be the least.
+        A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
         middle = given.time[:, 1]
         at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
         flagged = self._flagged_below(given.function, given.value[:, 1])
         counts = np.minimum(NEAR, np.maximum(flagged, self._least_at_steps[given.function]))
-        with np.errstate(invalid="ignore"):  # beside a clearance that is infinite
+        with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
             expected = given.value[:, 1] - given.fall
         given = given.where((given.unknown | ~at_step) & ~(expected > counts))
         chosen = np.zeros(len(given.function), dtype=bool)
@@ -223,12 +224,12 @@ class Between:
         return given.where(chosen)
 
     def _flagged_below(self, quantity: IndexArray, clearance: FloatArray) -> FloatArray:
-        """Return the clearance below which each quantity gets a further flag; -inf if it has all."""
+        """Return the clearance below which each quantity gets another flag; -inf if it has all."""
         first = self._flagged[quantity]
         return np.where(clearance >= first, first, np.where(clearance >= 0, 0.0, -np.inf))
 
     def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
-        """Everything at minima, with the flags of what is least there, for the block of the nearest step."""
+        """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         for part in self._parts(len(steps)):
             quantity, time = found.function[part], found.time[part, 1]
             block, joint = self._judged(self._compute(self._trajectory.at(time))), self._joint[quantity]

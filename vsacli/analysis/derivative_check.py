@@ -1,4 +1,8 @@
-"""The self-check of a run: results are compared with their equations, derivatives with finite differences."""
+"""The self-check of a run: residuals of its equations, and derivatives against finite differences.
+
+`ladder` compares each derivative of `RUNGS`, and the energy balances, with differences over several steps at
+about 200 times. `BalanceCheck` collects the residuals of (14) and of the shafts at all samples.
+"""
 
 from __future__ import annotations
 
@@ -37,23 +41,22 @@ if TYPE_CHECKING:
 
 
 LADDER_BOUND = 1e-8
-"""Bound on derivative errors relative to their peak: a hundred times what rounding leaves, a millionth of
-1 %. Where differences must be taken over short steps rounding leaves more, see `ROUNDING_GAIN`."""
+"""Bound on derivative errors relative to their peak: a hundred times the usual rounding. Differences over
+short steps have larger rounding, see `ROUNDING_GAIN`."""
 
 ROUNDING_GAIN = 30.0
-"""Rounding of a difference over the step h relative to the derivative, in eps T/h.
+"""Bound on the rounding of a difference over the step h relative to the derivative, in eps T/h.
 
-A time up to T is rounded by eps T/2, a value v by some eps v, so that a difference is off by
-eps (T v' + v)/h, which relative to the peak of v' is eps T/h, or a few times that, since v is hardly above
-T v'. For motions that are declared T/h is 4000 and the bound above is larger. Recordings have a knot a
-sample, and h must stay between knots: with 1e6 samples T/h is 5e7 and the bound 3e-7. On 34 recordings of 2
-to 30 s at 5 to 50 kHz, of arms of 2 to 7 joints, at most 2 eps T/h were seen, and once 21, where the rounding
-of stamps since 1970 was interpolated.
+A time up to T is rounded by eps T/2, a value v by about eps v, so that a difference has the error
+eps (T v' + v)/h. Relative to the peak of v' this is a few eps T/h, since v is hardly above T v'. For declared
+motions T/h is 4000, and `LADDER_BOUND` is larger. Recordings have a knot at each sample, and h must stay
+between knots: with 1e6 samples T/h is 5e7 and the bound 3e-7. On 34 recordings of 2 to 30 s at 5 to 50 kHz,
+of arms of 2 to 7 joints, at most 2 eps T/h occurred, and once 21, with interpolated time stamps since 1970.
 """
 
 
 class Rung(NamedTuple):
-    """A variable, its derivative, and the variable of which that is the derivative of an order."""
+    """A variable and its derivative, which is the derivative `order` of another variable."""
 
     value: str
     derivative: str
@@ -74,44 +77,43 @@ RUNGS = (
 stiffness where it is not commanded."""
 
 PROBES = 200
-"""About how many times are probed, and steps at which the laws of springs are evaluated apart."""
+"""Approximate number of times of the derivative check, and of samples at which `BalanceCheck` recomputes."""
 
 STEP_SCALES = np.array([8.0**-power for power in range(5)])
-"""Difference steps tried at each time; the best counts, since a wrong derivative is wrong at every step.
+"""Difference steps tried at each time; the best decides, since a wrong derivative is wrong at every step.
 
-The smallest are for motions that leave the corridor within a thousandth of their duration.
+The smallest are for motions that leave the attainable range within a thousandth of their duration.
 """
 
 FIRST_SCALES = STEP_SCALES[:2]
 """Scales tried first: for most motions the smaller ones only add rounding."""
 
 CLEAR = 1e-10
-"""Error at which smaller steps are not tried any more, a hundredth of the bound."""
+"""Error below which smaller steps are not tried, a hundredth of the bound."""
 
 OFFSETS = np.arange(-3, 4)
-"""Steps from the time that is probed to those at which its differences are taken."""
+"""Offsets of the times of a difference from the time that is checked, in steps."""
 
 MIDDLE = len(OFFSETS) // 2
-"""The place of that time among them."""
+"""Index of the offset zero."""
 
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """Central first difference of sixth order over these offsets."""
 
 SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / math.sqrt(924)
-"""The sixth difference over them, scaled so that independent errors are passed on with their size."""
+"""Sixth difference over these offsets, scaled so that independent errors keep their size."""
 
 NEIGHBORS = 5
-"""Probes to either side from which the noise at one is taken: one sixth difference may be small by
-chance, of 11 that are drawn from a normal distribution the largest is below a third of its width once in 10^7
-times."""
+"""Number of neighbors to either side whose largest sixth difference estimates the noise: one may be small by
+chance, but of 11 normally distributed ones the largest is below a third of the width once in 10^7 draws."""
 
 NOISE_GAIN = 12.0
-"""Errors beyond this multiple of that noise fail. Of 10^6 drawn from a normal distribution the largest lies
-at 5 of its widths, and the largest of 11 sixth differences may be a third of the noise."""
+"""Multiple of that estimate beyond which an error fails. The largest of 10^6 normally distributed errors lies
+at 5 widths, and the estimate may be a third of the width."""
 
 SMALL_JOINT = 1e-3
-"""Share of the largest joint's peak against which smaller joints are measured: what is below may be nothing
-but rounding of the larger torques."""
+"""Smallest scale of a joint's errors, as a share of the largest joint's peak: smaller peaks may be rounding
+of the larger torques."""
 
 
 def ladder(
@@ -120,12 +122,11 @@ def ladder(
     engine: Engine = NUMPY,
     internal: InternalMotions | None = None,
 ) -> tuple[float, float]:
-    """Largest error of a derivative of `RUNGS`, or of a power, relative to its peak; its bound.
+    """Return the largest error of a derivative of `RUNGS` or of a power, relative to its peak, and its bound.
 
-    Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
-    Motor motion is compared where it is smooth over the difference. Of the errors that is the largest which
-    is nearest to, or farthest beyond, what rounding admits with its step. The engine is that
-    of the run, and so is what moves inside damped transmissions.
+    Differences are taken at about 200 times with individual steps, over which the trajectory is analytic.
+    Motor motion is compared where it is smooth over the difference. The error returned is the one nearest to,
+    or farthest beyond, its bound. Engine and internal motions of damped transmissions are those of the run.
     """
     trajectory = trajectory.from_zero()
     times, reach = trajectory.check_points(PROBES)
@@ -133,7 +134,7 @@ def ladder(
 
     frame = None if trajectory.wrench is None else trajectory.wrench.frame
     damped = () if internal is None else internal.joints
-    kernel = BalancedDynamics(robot, frame, internal=damped)  # as that of the run, which is compiled
+    kernel = BalancedDynamics(robot, frame, internal=damped)  # equal to that of the run: code is shared
 
     def compute(time: FloatArray) -> Block:
         inside = {} if internal is None else internal.at(time)
@@ -155,16 +156,16 @@ def _ladder(
     times: FloatArray,
     steps: FloatArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Errors (derivatives, times) by the best of some steps, what noise admits, and whether all was compared.
+    """Return errors (derivatives, times) at the best scale, bounds by noise, and whether all was compared.
 
-    This many times are computed together as fill a block, since a run has the memory for one.
+    Times are computed together up to the size of a block, which bounds the memory as in a run.
 
     Args:
-        kernel: of the robot.
-        trajectory: the commanded motion.
-        compute: gives everything at times.
-        times: (times,), s.
-        steps: (scales, times), s.
+        kernel: Kernel of the robot.
+        trajectory: Commanded motion.
+        compute: Function from times to a block.
+        times: Times to check, (times,), s.
+        steps: Difference steps, (scales, times), s.
     """
     robot, everywhere = kernel.robot, True
     found = [_RungErrors(steps) for _ in (*RUNGS, "energy")]
@@ -193,11 +194,11 @@ def _ladder(
 
 
 def _energy_balances(kernel: BalancedDynamics, block: Block) -> Iterator[FloatArray]:
-    """Energy, the power that changes it, the size of its terms, and the grain; each (samples, joints + 1).
+    """Return energy, the power that changes it, the size of its terms, and the grain; (samples, joints + 1).
 
-    Rotors and springs of each joint, then all links together. The grain is what rounding may leave of the
-    energy in springs, which formulas compute as differences of terms as large as stiffness times a radian
-    squared, say K (1 - cos(2 phi)). The result then changes by leaps, between which it shows no noise.
+    The columns are rotors and springs of each joint, then all links together. The grain is the rounding of
+    elastic energies that a formula computes as a difference of terms of the size of stiffness times a radian
+    squared, such as K (1 - cos(2 phi)): the result changes by jumps, between which it shows no noise.
     """
     robot = kernel.robot
     of_joints = [block.of_joint(index) for index in range(len(robot.joints))]
@@ -218,16 +219,16 @@ def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> F
 
 
 def _compared(actuator: Actuator, name: str) -> list[bool]:
-    """Return which columns of a variable are computed, not commanded, at such an actuator."""
+    """Return whether each column of a variable is computed, not commanded, for this actuator."""
     commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
     return [False] if name in commanded else actuator.has(VARIABLES[name])
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
-    """Over which differences, (scales, times, joints), of a block of the shape (scales, offsets, times).
+    """Return which differences, (scales, times, joints), are smooth in a block (scales, offsets, times).
 
-    No step is infeasible, singular or near-singular, and the margin changes by less than a tenth: the motors'
-    motion has features as short as the way to the end of the corridor.
+    No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
+    motion has features as short as the distance to the end of the attainable range.
     """
     troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
     gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper).reshape(*shape, -1)
@@ -237,10 +238,10 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
 
 
 class _RungErrors:
-    """Errors of a derivative over its peak; `add` times in order, then ask for the errors at all of them.
+    """Errors of a derivative relative to its peak; `add` times in order, then call `relative`.
 
     Args:
-        steps: (scales, times), s, of all times.
+        steps: Difference steps of all times, (scales, times), s.
     """
 
     def __init__(self, steps: FloatArray) -> None:
@@ -259,11 +260,11 @@ class _RungErrors:
         """Merge some times.
 
         Args:
-            values: of what is derived, (scales, offsets, times, joints, motors).
-            derivatives: that are to be checked, as above.
-            compared: (scales, times, joints).
-            size: what errors are measured against, if it is the largest; (times, joints, motors).
-            grain: least noise of the values, (scales, times, joints, motors).
+            values: Values of the variable, (scales, offsets, times, joints, motors).
+            derivatives: Derivatives to be checked, as above.
+            compared: Whether the difference is compared, (scales, times, joints).
+            size: Scale of the errors, if larger than the derivatives; (times, joints, motors).
+            grain: Smallest noise of the values, (scales, times, joints, motors).
         """
         difference, *noise = (
             _combined(weights, each)
@@ -283,8 +284,8 @@ class _RungErrors:
     def relative(self) -> tuple[FloatArray, FloatArray]:
         """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each.
 
-        Of the steps that counts at which error and noise are least: noise grows as steps shrink, and a
-        wrong derivative is wrong at each of them.
+        The step with the least sum of error and noise decides: noise grows as steps shrink, and a wrong
+        derivative is wrong at each step.
         """
         difference, derivative, *noise, there = map(
             partial(np.concatenate, axis=1), zip(*self._found, strict=True)
@@ -324,13 +325,13 @@ def _largest_near(noise: FloatArray) -> FloatArray:
 
 
 SPRING_BOUND = 1e-11
-"""Bound on the scaled residual of (14); solutions reach 1e-15, and 1e-12 is asked of them."""
+"""Bound on the scaled residual of (14); solutions have 1e-15, and 1e-12 is required of them."""
 
 SHAFT_BOUND = 1e-11
-"""The same of the balances of motors and windings, whose terms are sums of a few products: 2e-15 is seen."""
+"""Bound on the scaled residual of motors and windings, sums of a few products: 2e-15 is usual."""
 
 DRIFT_BOUND = 1e-6
-"""The same where the deflections are followed by integration: below what spring constants are known to."""
+"""Bound on the residual of (14) of integrated deflections: below the accuracy of spring constants."""
 
 
 @dataclass(frozen=True)
@@ -338,12 +339,12 @@ class SelfCheck(Stored):
     """Outcome of the self-check.
 
     Attributes:
-        spring_residual: largest scaled residual of (14); NaN, like `ladder`, if a number is missing.
-        ladder: largest relative error of a derivative against differences of what it derives.
-        spring_bound: bound on the residual of (14).
-        ladder_bound: bound on the error of a derivative, where it is nearest to its bound.
-        shaft_residual: largest scaled residual of the balances of motors and windings, NaN there, too; 0 in
-            results of before these were balanced.
+        spring_residual: Largest scaled residual of (14); NaN if a value is missing.
+        ladder: Largest relative error of a derivative against finite differences; NaN if a value is missing.
+        spring_bound: Bound on the residual of (14).
+        ladder_bound: Bound on the error of a derivative, where it is nearest to its bound.
+        shaft_residual: Largest scaled residual of motors and windings; NaN if a value is missing; 0 in
+            results from before these were checked.
     """
 
     spring_residual: float
@@ -359,19 +360,18 @@ class SelfCheck(Stored):
 
     @property
     def passed(self) -> bool:
-        """Whether all are within their bounds."""
+        """Whether all residuals and errors are within their bounds."""
         springs_and_shafts = self.spring_residual <= self.spring_bound and self.shaft_residual <= SHAFT_BOUND
         return springs_and_shafts and self.ladder <= self.ladder_bound
 
 
 class BalanceCheck:
-    """The residuals of (14) and of the shafts over a run; `add` its blocks in order.
+    """Residuals of (14) and of the shafts over a run; `add` its blocks in order.
 
-    The program that computes a step also computes its residuals, which covers all steps, but would be wrong
-    with the program. So at `PROBES` steps they are computed apart from it, by NumPy, from the variables
-    that it found. A program has no path that depends on values, but for its branches, loops and tables. If
-    one of these, or all of it, is wrong, so is a stretch of the run, and one that takes more than a 199th of
-    the steps is met.
+    The program of the run computes residuals at all samples, but would be wrong where the program is. So
+    NumPy recomputes them from the variables at `PROBES` samples. Except for branches, loops and tables, a
+    program has no path that depends on values; if one of these, or the whole program, is wrong, so is a
+    stretch of the run, and a stretch of more than a 199th of the samples is met.
     """
 
     def __init__(self, robot: Robot, samples: int) -> None:
@@ -396,7 +396,7 @@ class BalanceCheck:
         self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
 
     def residuals(self) -> tuple[float, float]:
-        """Return the largest scaled residual of springs and of shafts; NaN if a number is missing."""
+        """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
         probed = {name: np.concatenate([each[name] for each in self._excerpts]) for name in self._excerpts[0]}
         of_joints = [of_joint(probed, index) for index in range(len(self._joints))]
         apart = balances(self._joints, of_joints)

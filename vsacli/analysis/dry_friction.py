@@ -1,4 +1,4 @@
-"""Dry friction along a run: torques that it leaves open, and signs that change between the samples."""
+"""Dry friction along a run: undetermined torques at rest, and changes of sign between the samples."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 REACH = 3.0
-"""Widths up to which friction still changes: tanh is within 0.5 % of its limit there."""
+"""Velocity, in widths, up to which smooth friction changes: tanh is within 0.5 % of its limit there."""
 
 COARSE = 0.5
-"""Widths by which the velocity may change from step to step, so that steps show all of it."""
+"""Largest change of velocity from sample to sample, in widths, at which the samples show the friction."""
 
 LEVELS, HALVINGS = 25, 40
-"""Velocities in a passage at which the motors are looked at, and halvings that find when each is."""
+"""Number of velocities in a passage at which torques are computed, and of bisections to find their times."""
 
 MOST = 200
-"""Passages of a joint that are looked at, the fastest ones."""
+"""Largest number of passages of a joint that are computed, the fastest ones."""
 
 MORE = 1.05
-"""Times the largest torque at the steps, from which on more is told."""
+"""Smallest ratio of the torque in a passage to the largest torque at the samples that is reported."""
 
 
 class FrictionPassages:
-    """The passages of a run; `add` blocks in order, then ask for the `notes`."""
+    """Passages of a run: smooth friction changes its sign; `add` blocks in order, then call `notes`."""
 
     def __init__(self, robot: Robot) -> None:
         self._joints: list[tuple[int, Joint, float]] = [
@@ -50,7 +50,7 @@ class FrictionPassages:
         self._time, self._dq = np.empty(0), np.empty((0, len(robot.joints)))
 
     def add(self, block: Block) -> None:
-        """Merge consecutive steps."""
+        """Add the next block."""
         time, dq = np.append(self._time, block.time), np.concatenate([self._dq, block.dq])
         self._time, self._dq = time[-1:], dq[-1:]
         for number, (index, _, width) in enumerate(self._joints):
@@ -99,17 +99,17 @@ def _times(trajectory: Trajectory, passages: FloatArray, index: int, width: floa
 
 @dataclass(frozen=True)
 class DryFriction(Stored):
-    """A motor whose friction is the sign function's, where that is two-valued.
+    """Samples at which a motor with sharp friction rests or turns back, where its torque is two-valued.
 
     Attributes:
         motor: 1 or 2.
-        lowest: what may add to the stated torque at rest, N m (N), joint side; zero or negative.
-        highest: the other end of that range; zero or positive.
-        start: steps at rest from the first step on.
-        between: steps at rest on the way.
-        end: steps at rest up to the last step.
-        reversals: how often it turns back; its torque jumps by `highest` - `lowest` there.
-        first_reversal: time of the first step after it first does, s; NaN if it never does.
+        lowest: Lower end of the range of torque to add at rest, N m (N), joint side; zero or negative.
+        highest: Upper end of that range; zero or positive.
+        start: Number of samples at rest from the first sample on.
+        between: Number of samples at rest on the way.
+        end: Number of samples at rest up to the last sample.
+        reversals: Number of reversals; the torque jumps by `highest` - `lowest` at each.
+        first_reversal: Time of the first sample after the first reversal, s; NaN without a reversal.
     """
 
     motor: int
@@ -131,15 +131,15 @@ class DryFriction(Stored):
 
     @property
     def jump(self) -> float:
-        """Jump of the torque where it turns back, N m (N)."""
+        """Jump of the torque at a reversal, N m (N)."""
         return self.highest - self.lowest
 
 
 class DryFrictionSummary:
-    """Finds where one motor rests and turns back; `add` blocks in order, then ask for the `report`.
+    """Search for rest and reversals of one motor; `add` samples in order, then call `report`.
 
     Attributes:
-        number: of the motor, 1 or 2.
+        number: Number of the motor, 1 or 2.
     """
 
     def __init__(self, number: int, motor: JointMotor) -> None:
@@ -149,7 +149,7 @@ class DryFrictionSummary:
         self._reversals, self._first_reversal = 0, math.nan
 
     def add(self, time: FloatArray, dtheta: FloatArray) -> None:
-        """Merge consecutive steps, (samples,)."""
+        """Add consecutive samples, (samples,)."""
         direction = direction_of(dtheta)
         moving = np.flatnonzero(direction)
         self._rest += len(time) - len(moving)
@@ -180,7 +180,7 @@ class DryFrictionSummary:
 
 
 def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
-    """Return a summary of each motor of a joint whose friction is that of the sign function."""
+    """Return a summary of each motor of a joint with sharp friction."""
     return [
         DryFrictionSummary(number, motor)
         for number, motor in enumerate(motors, 1)
@@ -189,7 +189,7 @@ def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
 
 
 def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterator[str]:
-    """Yield a line on rest and one on turning back, for named joints with a motor each."""
+    """Yield a line on rest and one on reversals, from (joint name, joint type, motor) entries."""
     resting = [entry for entry in found if entry[2].start + entry[2].between + entry[2].end]
     if resting:
         name, joint_type, most = max(resting, key=lambda entry: entry[2].jump)

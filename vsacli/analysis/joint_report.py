@@ -1,4 +1,4 @@
-"""Findings of a run at one joint."""
+"""Findings of a run at one joint: records that the report stores, without the code that computes them."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ COUNTED = {
     "slack": Flag.SLACK,
     "over_limit": LIMITS,
 }
-"""Kinds of trouble whose steps are counted, and the bits that make them."""
+"""Kinds of trouble whose samples are counted, with their bits."""
 
 UNKNOWN = (math.nan, math.nan)
-"""Values of both motors in reports written before these were stated."""
+"""Values of both motors in reports from before these values existed."""
 
 
 DETERMINED = 0.1
-"""Largest share of a variable's root mean square by which it may be wrong."""
+"""Largest error of a determined variable, as a share of its root mean square."""
 
 JUDGED = "tau_motor"
-"""The variable that a run is for, unless others are asked for."""
+"""Variable that decides whether a recording is sufficient, unless others are requested."""
 
 
 @dataclass(frozen=True)
 class Worst(Stored):
-    """The worst step of a kind of trouble: when, what value, against which bound.
+    """Worst sample of a kind of trouble: time, value and bound.
 
     `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
     """
@@ -52,18 +52,18 @@ class Worst(Stored):
 
 @dataclass(frozen=True)
 class Spread(Stored):
-    """The uncertainty of a variable of a joint, away from the unreliable ends of recordings.
+    """Uncertainty of a variable of a joint, away from the unreliable ends of recordings.
 
     Attributes:
-        name: of the variable.
-        rms: root mean square of its standard deviation; of the motor with the larger one, if it is one of
-            motors. NaN if none can be stated, as the records do not determine a derivative.
-        max: largest standard deviation.
-        share: of the root mean square of the variable itself that `rms` is; the larger one of both motors.
-        bound: share by which the variable may be wrong, twice `share`; where none is stated, what trials with
-            such records left. NaN if nothing can be said.
-        peak: largest size of the variable itself.
-        unit: of all but the share.
+        name: Name of the variable.
+        rms: Root mean square of the standard deviation, for a motor variable the larger of both motors. NaN
+            if none can be stated, since the recordings do not determine a derivative.
+        max: Largest standard deviation.
+        share: Ratio of `rms` to the root mean square of the variable; the larger of both motors.
+        bound: Largest relative error, twice `share`; where none is stated, the error of trials with such
+            recordings. NaN if unknown.
+        peak: Largest absolute value of the variable.
+        unit: Unit of all but the share.
     """
 
     name: str
@@ -79,21 +79,20 @@ class Spread(Stored):
 
     @property
     def determined(self) -> bool:
-        """Whether the records determine the variable to `DETERMINED`."""
+        """Whether the recordings determine the variable to `DETERMINED`."""
         return self.bound <= DETERMINED
 
 
 @dataclass(frozen=True)
 class JointUncertainty(Stored):
-    """The uncertainty of a joint that recorded signals leave.
+    """Uncertainty of a joint's variables by recorded signals.
 
     Attributes:
-        variables: how uncertain the motor torque is, and each variable that was asked for.
-        asked: names of those that were asked for, and so decide.
-        steps: how many of the steps that are infeasible, and singular, would be otherwise within twice the
-            standard deviation of the margin.
-        limits: for each limit that is exceeded by no more than the uncertainty and does not count as
-            exceeded there, the step at which it is exceeded most.
+        variables: Uncertainty of the motor torque, and of each requested variable.
+        asked: Names of the requested variables, which decide on the verdict.
+        steps: Number of infeasible, and of singular samples that are not so within twice the standard
+            deviation of the margin.
+        limits: Worst sample of each limit that is exceeded only within the uncertainty, and not flagged.
     """
 
     variables: dict[str, Spread] = field(default_factory=dict)
@@ -111,35 +110,35 @@ class JointUncertainty(Stored):
 
 @dataclass(frozen=True)
 class JointReport(Stored):
-    """The findings of a run at one joint; torques in N m (N), stiffness in N m/rad (N/m).
+    """Findings of a run at one joint; torques in N m (N), stiffness in N m/rad (N/m).
 
     Attributes:
-        name: of the joint.
+        name: Name of the joint.
         type: "revolute" or "prismatic".
-        actuator: its kind; what that does not have is NaN: motor 2, margin and corridor, stiffness.
-        steps: how many steps have each kind of trouble.
-        first_time: when each kind that occurs first does, s.
-        worst: the worst step of each kind that occurs; limits one by one.
-        margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
-        margin_time: when.
-        reachable: the corridor at that time.
-        stiffness_min: smallest commanded stiffness.
-        stiffness_max: the largest.
-        peak_tau_e: largest |tau_e|.
-        peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
-        start_theta: motor positions at the first step, to which the motors go before the start.
-        torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
-            at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
-        other_preload: whether every infeasible step could be done with the opposite preload.
-        energy: work of the motors, elastic energy, co-contraction.
-        start_dtheta: motor velocities at the first step.
-        end_theta: motor positions at the last step of the trajectory; NaN if that was not computed.
-        end_dtheta: motor velocities there.
-        peak_dtheta: largest |dtheta| of motors 1 and 2, over the steps where it exists.
-        uncertainty: what recorded signals leave uncertain; None if nothing comes from fits of records.
-        between: what comes nearer to its bound between the steps than at any step: "margin" is the stiffness
-            in its corridor, others are called as the flags of their limits.
-        dry_friction: of each motor whose friction is sharp, where its torque is two-valued.
+        actuator: Kind of the actuator; values that it lacks are NaN: motor 2, margin, stiffness range.
+        steps: Number of samples with each kind of trouble.
+        first_time: Time of the first sample of each kind that occurs, s.
+        worst: Worst sample of each kind that occurs; limits one by one.
+        margin: Smallest margin, relative to the stiffness; NaN if a torque cannot be carried.
+        margin_time: Time of the smallest margin, s.
+        reachable: Attainable range of the stiffness at that time.
+        stiffness_min: Smallest commanded stiffness.
+        stiffness_max: Largest commanded stiffness.
+        peak_tau_e: Largest |tau_e|.
+        peak_tau_motor: Largest |tau_motor| of motors 1 and 2, over the samples at which it exists.
+        start_theta: Initial motor positions.
+        torque_step: |tau_motor - tau_spring| at the first sample: discontinuity of the torque of motors that
+            rest before the start; NaN at a rigid joint, where tau_e may jump as well.
+        other_preload: Whether every infeasible sample is feasible with the opposite preload.
+        energy: Work of the motors, elastic energy, co-contraction.
+        start_dtheta: Initial motor velocities.
+        end_theta: Final motor positions; NaN if the last sample was not computed.
+        end_dtheta: Final motor velocities.
+        peak_dtheta: Largest |dtheta| of motors 1 and 2, over the samples at which it exists.
+        uncertainty: Uncertainty by recorded signals; None if no signal comes from a fit of a recording.
+        between: Quantities nearer to their bound between samples than at any sample: "margin" for the
+            stiffness, or the flag of a limit.
+        dry_friction: Dry friction of each motor with sharp friction, whose torque at rest is two-valued.
     """
 
     name: str
@@ -188,7 +187,7 @@ class JointReport(Stored):
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """Return a report from `as_json`: no upper end alone is NaN, so it is infinite."""
+        """Return a report from the output of `as_json`; a missing upper end alone stands for infinity."""
         joint = super().from_json(content, **further)
         lower, upper = joint.reachable
         if math.isnan(upper) and not math.isnan(lower):
@@ -198,14 +197,14 @@ class JointReport(Stored):
 
 @dataclass(frozen=True)
 class JointDrift(Stored):
-    """The drift of the integrated deflections of a joint.
+    """Drift of the integrated deflections of a joint.
 
     Attributes:
-        joint: its name.
-        largest: largest distance of a deflection from the root of (14), NaN if no step was integrated.
-        time: when, s.
-        unit: of the distance.
-        stop: from when on they could not be integrated, and why.
+        joint: Name of the joint.
+        largest: Largest distance of a deflection from the root of (14); NaN if no sample was integrated.
+        time: Time of the largest distance, s.
+        unit: Unit of the distance.
+        stop: Time and reason at which the integration ended, if it did.
     """
 
     joint: str

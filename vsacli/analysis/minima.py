@@ -1,4 +1,8 @@
-"""Least margins and distances to limits, between samples as well."""
+"""Clearances, that is margins and distances to limits, and a search for their minima between samples.
+
+`brackets` finds three consecutive times around each local minimum; `narrowed` evaluates further times between
+them until the minimum is known. `between_samples` applies both to the blocks of a run.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +23,19 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 REACH = Flag.INFEASIBLE | Flag.SLACK | Flag.SINGULAR | Flag.NEAR_SINGULAR | Flag.NOT_FINITE
-"""Bits that concern a stiffness in its corridor."""
+"""Bits that concern a stiffness in its attainable range."""
 
 MARGIN = "margin"
-"""Name of the clearance of a stiffness; those of limits have the names of their flags."""
+"""Name of the clearance of a stiffness; clearances of limits have the names of their flags."""
 
 
 class Bounded(NamedTuple):
-    """A quantity that has bounds.
+    """A quantity with bounds.
 
     Attributes:
-        joint: whose it is.
-        number: of the joint.
-        limit: what bounds it; None is the stiffness in its corridor.
+        joint: Joint of the quantity.
+        number: Index of the joint.
+        limit: Limit that bounds it; None for the stiffness in its attainable range.
     """
 
     joint: Joint
@@ -40,22 +44,22 @@ class Bounded(NamedTuple):
 
     @property
     def bits(self) -> Flag:
-        """The bits that say what is wrong with it."""
+        """Bits that a sample may have for this quantity."""
         return REACH if self.limit is None else self.limit.flag
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
-        """Relative distance to the nearer bound, (samples,), negative beyond it.
+        """Return the relative distance to the nearer bound, (samples,), negative beyond it.
 
-        Where the springs cannot carry the torque at all it is -inf. A number of a motor that does not exist
-        is near no limit: +inf.
+        It is -inf where the springs cannot carry the torque at all, and +inf where a motor variable does not
+        exist, since that is near no limit.
         """
         if self.limit is not None:
-            return np.fmin(self.limit.clearance(of_joint), np.inf)  # the one of both that is no NaN
+            return np.fmin(self.limit.clearance(of_joint), np.inf)  # fmin replaces NaN by inf
         gap = margin(of_joint["stiffness"], of_joint["stiffness_lower"], of_joint["stiffness_upper"])
         return np.fmax(gap, -np.inf)
 
     def at(self, block: Block, step: int) -> Worst:
-        """Return a step of a block as a report has it: the value, and the nearer bound."""
+        """Return a sample of a block for a report: the value, and the nearer bound."""
         of_joint, limit = block.of_joint(self.number), self.limit
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
@@ -69,7 +73,7 @@ class Bounded(NamedTuple):
 
 
 def bounded_quantities(robot: Robot) -> list[Bounded]:
-    """Everything of a robot that has bounds."""
+    """Return all bounded quantities of a robot."""
     return [
         Bounded(joint, index, limit)
         for index, joint in enumerate(robot.joints)
@@ -78,41 +82,42 @@ def bounded_quantities(robot: Robot) -> list[Bounded]:
 
 
 def clearances(quantities: list[Bounded], block: Block) -> FloatArray:
-    """Clearances of all quantities, (quantities, samples)."""
+    """Return the clearances of all quantities, (quantities, samples)."""
     of_joints = {number: block.of_joint(number) for number in {quantity.number for quantity in quantities}}
     rows = [quantity.clearance(of_joints[quantity.number]) for quantity in quantities]
     return np.array(rows).reshape(-1, len(block.time))
 
 
 KNOWN = 1e-3
-"""Share of a minimum to which it shall be known."""
+"""Relative accuracy to which a minimum is determined."""
 
 ROUNDING = 1e-10
-"""Differences that do not count: a tenth of the margin that is singular, or of the excess over a limit."""
+"""Difference that is ignored: a tenth of the singular margin, or of the ignored excess over a limit."""
 
 SHARES = np.array([1, 2]) / 3
-"""Places in both halves of a bracket, for functions that no parabola describes."""
+"""New times in both halves of a bracket, for functions that no parabola describes."""
 
 CLOSE = np.array([-0.01, 0.0, 0.01])
-"""Places about the lowest point of a parabola, in widths of the bracket: around a smooth minimum that
-becomes fifty times narrower, and its fall 2500 times smaller."""
+"""New times about the lowest point of a parabola, in widths of the bracket: around a smooth minimum the
+bracket becomes fifty times narrower, and the possible fall 2500 times smaller."""
 
 ROUNDS = 16
-"""Most rounds: 3^-16 of a step is 2e-8 of it. Smooth minima take one or two, kinks and jumps more."""
+"""Largest number of rounds, after which a bracket is 3^-16 = 2e-8 of a sample distance wide. Smooth minima
+need one or two, kinks and jumps more."""
 
 TINY = np.finfo(float).tiny
 
 Evaluate = Callable[[IndexArray, FloatArray], FloatArray]
-"""Function from numbers of quantities, (n,), and times for each, (n, times), to values (n, times)."""
+"""Function from indices of quantities, (n,), and times for each, (n, times), to values (n, times)."""
 
 
 class Known(NamedTuple):
     """Functions at consecutive times.
 
     Attributes:
-        first: number of the first time.
-        time: ascending, (times,).
-        value: at these times, (functions, times).
+        first: Index of the first time.
+        time: Times, ascending, (times,).
+        value: Values at these times, (functions, times).
     """
 
     first: int
@@ -121,20 +126,20 @@ class Known(NamedTuple):
 
     @property
     def stop(self) -> int:
-        """Number of the time after the last one."""
+        """Index of the time after the last one."""
         return self.first + len(self.time)
 
     def last(self, count: int) -> Known:
-        """Return the last this many."""
+        """Return the last `count` times."""
         dropped = max(0, len(self.time) - count)
         return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 
     def followed_by(self, time: FloatArray, value: FloatArray) -> Known:
-        """Return these with the next ones."""
+        """Return these times followed by others."""
         return Known(self.first, np.append(self.time, time), np.hstack((self.value, value)))
 
     def opened(self) -> Known:
-        """Return these with the first time twice, so that it has a neighbour on either side."""
+        """Return these with the first time twice, so that it has a neighbor on either side."""
         return Known(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
 
     def closed(self) -> Known:
@@ -146,9 +151,9 @@ class Brackets(NamedTuple):
     """Times around minima, the middle one of which has the lowest value.
 
     Attributes:
-        function: whose minimum it is, by number, (n,).
-        time: ascending, (n, 3).
-        value: at these times, (n, 3).
+        function: Index of the function, (n,).
+        time: Times, ascending, (n, 3).
+        value: Values at these times, (n, 3).
     """
 
     function: IndexArray
@@ -157,10 +162,10 @@ class Brackets(NamedTuple):
 
     @property
     def fall(self) -> FloatArray:
-        """Bound of the fall of a minimum below the middle, (n,).
+        """Bound on the fall of a minimum below the middle, (n,).
 
         A convex function lies above the lines through the middle and either end. An end at the time of the
-        middle is taken for one as far away, and as high, as the other.
+        middle is replaced by the mirror image of the other end.
         """
         before, after = np.diff(self.time).T
         first, second = self.value[:, 0] - self.value[:, 1], self.value[:, 2] - self.value[:, 1]
@@ -173,10 +178,7 @@ class Brackets(NamedTuple):
 
     @property
     def unknown(self) -> BoolArray:
-        """Brackets whose minimum may be lower than the middle by more than `KNOWN`, (n,).
-
-        Where a value does not exist nothing is looked for.
-        """
+        """Whether the minimum may be below the middle by more than `KNOWN`, (n,); not at missing values."""
         with np.errstate(invalid="ignore"):
             unknown: BoolArray = self.fall > KNOWN * np.abs(self.value[:, 1]) + ROUNDING
         return unknown & np.isfinite(self.value).all(axis=1)
@@ -193,14 +195,14 @@ class Brackets(NamedTuple):
         return lowest
 
     def where(self, chosen: BoolArray | IndexArray) -> Brackets:
-        """Return some of them."""
+        """Return a selection of the brackets."""
         return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
 
 
 def brackets(known: Known) -> Brackets:
-    """Brackets around the local minima of functions; the first and the last time are neighbours only.
+    """Return brackets of the local minima of functions; the first and the last time are neighbors only.
 
-    Of equal values the last counts.
+    Of equal adjacent values, the last is the middle.
     """
     time, values = known.time, known.value
     falls = values[:, 1:] <= values[:, :-1]
@@ -210,7 +212,7 @@ def brackets(known: Known) -> Brackets:
 
 
 def narrowed(given: Brackets, evaluate: Evaluate) -> Brackets:
-    """Return the brackets narrowed until each minimum is known; every round computes all of them together."""
+    """Return the brackets narrowed until each minimum is known; each round evaluates all of them together."""
     function, time, value = given.function, given.time.copy(), given.value.copy()
     open_ = np.flatnonzero(given.unknown)
     for _ in range(ROUNDS):
@@ -222,7 +224,7 @@ def narrowed(given: Brackets, evaluate: Evaluate) -> Brackets:
 
 
 def _round(given: Brackets, evaluate: Evaluate) -> Brackets:
-    """Return the lowest of the three times and of new ones between them, with its neighbours."""
+    """Return the lowest of the three times and of new ones between them, with its neighbors."""
     left, middle, right = np.hsplit(given.time, 3)
     close = given.lowest_of_parabola + CLOSE * (right - left)
     new = np.hstack(

@@ -1,4 +1,4 @@
-"""The verdict on a run: one object, rendered as text and as JSON, and stored in the result file."""
+"""The report of a run: one object, rendered as text and as JSON, and stored in the result file."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ VERDICTS = ("ok", "over_limit", "singular", "infeasible", "doubtful", "self_chec
 
 @dataclass(frozen=True)
 class Report(Stored):
-    """The verdict on a run.
+    """Report of a run, with the verdict.
 
     Attributes:
-        robot: name of the robot.
-        trajectory: name of the trajectory.
-        samples: steps computed, both ends included.
-        duration: time from the first to the last step of the trajectory, s.
-        complete: whether every step of the trajectory was computed.
-        warnings: doubts about the inputs.
-        notes: how they were understood, where that is not obvious.
-        self_check: outcome of the self-check.
-        joints: one report a joint.
-        drifts: one a joint if the deflections were integrated, else none.
-        fits: what is known of the splines that recorded samples were replaced by, JSON values.
+        robot: Name of the robot.
+        trajectory: Name of the trajectory.
+        samples: Number of samples computed, both ends included.
+        duration: Time from the first to the last sample of the trajectory, s.
+        complete: Whether every sample of the trajectory was computed.
+        warnings: Doubts about the inputs.
+        notes: Interpretation of the inputs, where it is not obvious.
+        self_check: Outcome of the self-check.
+        joints: Reports of the joints.
+        drifts: Drifts of the joints if the deflections were integrated, else empty.
+        fits: Facts about the splines that replace recorded samples, JSON values.
     """
 
     robot: str
@@ -58,7 +58,7 @@ class Report(Stored):
 
     @property
     def verdict(self) -> str:
-        """The worst of `VERDICTS` that applies."""
+        """Verdict: the worst of `VERDICTS` that applies."""
         if not self.self_check.passed:
             return VERDICTS[-1]
         applies = (each for each in reversed(VERDICTS) if any(joint.shows(each) for joint in self.joints))
@@ -66,11 +66,11 @@ class Report(Stored):
 
     @property
     def deflections(self) -> str:
-        """Method for the deflections: the "root" of (14) at each sample, or "integrate"."""
+        """Method for the deflections: "root" of (14) at each sample, or "integrate"."""
         return "integrate" if self.drifts else "root"
 
     def as_text(self) -> ReportText:
-        """Return the report in its parts, as people read it."""
+        """Return the report in its parts, for a reader."""
         lines = [
             *text.warnings_and_notes(self.warnings, self.notes),
             *sentences(self.joints),
@@ -99,11 +99,12 @@ class Report(Stored):
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """Return the report from `as_json`, as result files hold it.
+        """Return the report from the output of `as_json`, which result files hold.
 
         Raises:
-            LookupError, TypeError, AttributeError, ValueError: it is no such report.
+            LookupError, TypeError, AttributeError, ValueError: The content is no such report.
         """
         report = super().from_json(content, **further)
+        # The bound is not stored: it follows from the method for the deflections.
         bound = DRIFT_BOUND if report.drifts else SPRING_BOUND
         return replace(report, self_check=replace(report.self_check, spring_bound=bound))

@@ -1,4 +1,4 @@
-"""The report of a run as text for a terminal: headline, table, energy, and what to know before a start."""
+"""The report of a run as text for a terminal: headline, table, energy, initial and final motor positions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vsacli.dynamics.energy import JointEnergy
 
 
 def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
-    """Yield sums of energy, if all joints have them, and the joints with the most."""
+    """Yield the total energies, if all joints have them, and the joints with the largest ones."""
     energies = [energy for _, _, energy in joints]
     if not any(math.isnan(energy.spent) for energy in energies):
         spent, recovered = (
@@ -48,25 +48,25 @@ def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
 WIDTH = 78
 JOINTS_PER_LINE = 3
 MOST_APART = 7
-"""Joints of a robot up to which each is spoken of on its own."""
+"""Largest number of joints that are described one by one."""
 
 
 HUGE = 1e8
-"""Torque or stiffness shown with an exponent, as next to a singular step."""
+"""Torque or stiffness from which on an exponent is shown, as next to a singular sample."""
 
 RESTING_SHARE = 1e-3
-"""Share of its own peak velocity below which a motor rests: records of a rest-to-rest motion, rounded to
-four digits or with noise of 1e-4 rad, left 1e-4."""
+"""Share of its own peak velocity below which a motor counts as resting: recordings of a rest-to-rest motion,
+rounded to four digits or with noise of 1e-4 rad, had 1e-4."""
 
 ROUNDING_SHARE = 1e-9
-"""Share of the largest velocity of any motor that may be nothing but rounding: that of a joint held still."""
+"""Share of the largest velocity of any motor that may be rounding, for a joint held still."""
 
 TROUBLE = ("doubtful", "infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
 
 
 def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
-    """Yield a line each, marked as what it is."""
+    """Yield one line for each warning and each note, labeled."""
     yield from (f"warning: {warning}" for warning in warnings)
     yield from (f"note: {note}" for note in notes)
 
@@ -81,7 +81,7 @@ def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
 
 
 def joint_rows(joints: Iterable[JointReport]) -> list[tuple[str, ...]]:
-    """Return a table of peaks, stiffness, and what of it can be reached, below its header."""
+    """Return a table of peaks, stiffness and attainable range, with its header."""
     header = ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
     return [header, *map(_row, joints)]
 
@@ -126,19 +126,19 @@ def _span(low: float, high: float) -> str:
 
 
 def number(value: float) -> str:
-    """One decimal for large numbers, three digits for small ones and for those that no machine has."""
+    """Format with one decimal for large numbers, and three digits for small and for enormous ones."""
     return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
 
 
 def percent(share: float) -> str:
-    """Two decimals, or one digit of what is smaller."""
+    """Format a percentage with two decimals, or one digit of a smaller one."""
     if math.isnan(share):
         return "none"
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
 
 
 def apart(value: float, bound: float) -> tuple[str, str]:
-    """Both with as many digits as it takes to see how far they are apart, at least four."""
+    """Format two numbers with the digits that show their difference, at least four."""
     for digits in range(4, 17):
         shown = _rounded(value, digits), _rounded(bound, digits)
         if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
@@ -152,12 +152,12 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def count(steps: int) -> str:
-    """Steps by number."""
+    """Return a number of samples as text."""
     return f"{steps} step" if steps == 1 else f"{steps} steps"
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Yield the initial motor positions, which motors move, and the largest torque step."""
+    """Yield the initial motor positions, the moving motors, and the largest initial torque discontinuity."""
     yield _all(
         "start motors at: ", joints, [_positions(joint, joint.start_theta, "first") for joint in joints]
     )
@@ -170,7 +170,7 @@ def start(joints: Sequence[JointReport]) -> Iterator[str]:
 
 
 def end(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Yield the final motor positions, and which motors still move; nothing if not computed."""
+    """Yield the final motor positions, and the motors that still move; nothing if not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
     yield _all("end motors at: ", joints, [_positions(joint, joint.end_theta, "last") for joint in joints])
@@ -191,7 +191,7 @@ def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str
 def _moving(
     label: str, joints: Sequence[JointReport], velocities: Sequence[tuple[float, float]]
 ) -> Iterator[str]:
-    """Yield the joints whose motors do not rest at an end of the motion, and how fast they are."""
+    """Yield the joints whose motors do not rest at an end of the motion, with their velocities."""
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = {
         number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
@@ -210,7 +210,7 @@ def _signed(values: Iterable[float]) -> str:
 
 
 def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
-    """Yield from when on deflections could not be integrated."""
+    """Yield the times from which deflections could not be integrated."""
     infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
     for drift in drifts:
         if drift.stop is not None:
@@ -232,7 +232,7 @@ def _drift_of(drift: JointDrift) -> str:
 
 
 def by_joint(label: str, entries: Sequence[str]) -> str:
-    """Return an entry for each joint, a few to a line."""
+    """Return the entries of the joints, several to a line."""
     lines = [
         ", ".join(entries[first : first + JOINTS_PER_LINE])
         for first in range(0, len(entries), JOINTS_PER_LINE)
@@ -241,7 +241,7 @@ def by_joint(label: str, entries: Sequence[str]) -> str:
 
 
 def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
-    """Return entries of joints by number; equal ones of many joints are listed together."""
+    """Return entries of joints by index; equal entries of many joints are combined."""
     alike: dict[str, list[int]] = {}
     for number, words in said.items():
         alike.setdefault(words, []).append(number)

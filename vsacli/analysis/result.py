@@ -1,4 +1,4 @@
-"""Results: a run with its variables in memory, and result files opened from Python."""
+"""Results in Python: variables and report of a run in memory, and result files opened for reading."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Shown:
-    """The display of a result in a terminal and in a notebook: run, verdict, a line for each joint."""
+    """Display of a result in a terminal or a notebook: run, verdict, a line for each joint."""
 
     report: Report
 
@@ -41,11 +41,11 @@ class Shown:
 
 
 class Result(Shown, Block):
-    """Every variable over the whole trajectory, and the report on it.
+    """All variables over the whole trajectory, with the report.
 
     Attributes:
-        report: the verdict, and what led to it; `print` shows it as the commands do.
-        robot, trajectory: what was computed.
+        report: Verdict and findings; `print` shows them as the commands do.
+        robot, trajectory: Inputs of the run.
     """
 
     def __init__(self, *, report: Report, robot: Robot, trajectory: Trajectory, **arrays: AnyArray) -> None:
@@ -60,17 +60,17 @@ class Result(Shown, Block):
     def save(
         self, path: str | os.PathLike[str], *, overwrite: bool = False, precision: str = "double"
     ) -> None:
-        """Write the result file that `vsacli invdyn` writes: the whole of it, or nothing.
+        """Write the result file that `vsacli invdyn` writes, completely or not at all.
 
         Args:
-            path: the HDF5 file.
-            overwrite: whether a file that exists may be replaced.
-            precision: in which values are stored, "double" or "single"; times are always double.
+            path: HDF5 file.
+            overwrite: Whether an existing file may be replaced.
+            precision: Storage precision, "double" or "single"; times are always double.
 
         Raises:
-            StorageError: the file exists and must not be replaced, cannot be written, or its disk is
-                full; a value is too large for single precision.
-            InputError: there is no such precision.
+            StorageError: The file exists and must not be replaced, cannot be written, or its disk is full; or
+                a value is too large for single precision.
+            InputError: The precision is unknown.
         """
         from vsacli.base.outputs import Outputs
         from vsacli.results.store.writer import ResultWriter
@@ -92,19 +92,19 @@ class Result(Shown, Block):
         file_format: str = "png",
         overwrite: bool = False,
     ) -> Figures:
-        """Draw the figures of `vsacli plot`, from a result file that exists no longer than it takes.
+        """Draw the figures of `vsacli plot`, by way of a temporary result file.
 
         Args:
-            folder: where to save them as `<stem>-<name>.<file_format>`; they are not saved if None.
-            stem: what the names of the files begin with.
+            folder: Folder for the files `<stem>-<name>.<file_format>`; they are not saved if None.
+            stem: Beginning of the file names.
             file_format: "png", "pdf" or "svg".
-            overwrite: whether files that exist may be replaced.
+            overwrite: Whether existing files may be replaced.
 
         Returns:
             Matplotlib figures by name, such as "motion".
 
         Raises:
-            StorageError: a file exists and must not be replaced, or the folder cannot be written.
+            StorageError: A file exists and must not be replaced, or the folder cannot be written.
         """
         from vsacli.base.storage import temporary_folder
         from vsacli.results.plots import plot_stored, save_figures
@@ -123,7 +123,7 @@ class Result(Shown, Block):
         """Return the variables as an `xarray.Dataset`, with named dimensions, units and flags as in the file.
 
         Raises:
-            ModuleNotFoundError: xarray is not installed; the sentence says how to get it.
+            ModuleNotFoundError: Xarray is not installed; the message says how to install it.
         """
         from vsacli.results.exports.formats import labelled_dataset
 
@@ -133,12 +133,12 @@ class Result(Shown, Block):
 class ResultFile(Shown, StoredResult):
     """A result file of `vsacli invdyn` or `Result.save`; a context manager that closes it.
 
-    Each variable is an attribute, a NumPy array that is read when it is first asked for, as in `Result`.
+    Each variable is an attribute as in `Result`, a NumPy array that is read at first access.
 
     Attributes:
-        report: the verdict, and what led to it.
-        joint_names: base to tip.
-        variables: names of the variables that the file holds.
+        report: Verdict and findings.
+        joint_names: Names of the joints, base to tip.
+        variables: Names of the variables in the file.
     """
 
     def __init__(self, path: str | Path, file: Any) -> None:
@@ -156,7 +156,7 @@ class ResultFile(Shown, StoredResult):
             values = self.read(name)
         except InputError as error:
             if name in self.variables:
-                raise  # it is damaged
+                raise  # the file is damaged
             raise AttributeError(str(error)) from None
         setattr(self, name, values)
         return values
@@ -178,8 +178,8 @@ class ResultFile(Shown, StoredResult):
         """Draw the figures of `vsacli plot`, and save them if a folder is given; see `Result.plot`.
 
         Raises:
-            InputError: nothing can be drawn from the variables of the file.
-            StorageError: a file exists and must not be replaced, or the folder cannot be written.
+            InputError: The file has no variables that can be drawn.
+            StorageError: A file exists and must not be replaced, or the folder cannot be written.
         """
         from vsacli.results.plots import plot_stored, save_figures
 
@@ -199,9 +199,9 @@ def open_result(path: str | os.PathLike[str]) -> ResultFile:
     """Open a result file of `vsacli invdyn` or `Result.save`, as a context manager that closes it.
 
     Raises:
-        InputError: there is no such file, or it is not a complete file of the format this version reads.
-        StorageError: the operating system refuses to read it, or another program is writing it.
-        TypeError: path is of another type.
+        InputError: The file does not exist, or is not a complete file of a format that this version reads.
+        StorageError: The operating system refuses to read the file, or another program is writing it.
+        TypeError: The path is of another type.
     """
     check_path(path, "open_result(path)")
     return open_one_of(Path(path), ResultFile)

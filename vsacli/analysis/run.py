@@ -1,4 +1,8 @@
-"""Inverse dynamics along a trajectory: the one place that walks over time, block by block."""
+"""Inverse dynamics along a trajectory, computed block by block.
+
+`Run` yields blocks of samples: each is computed by the kernel `BalancedDynamics`, searched for minima between
+samples, merged into the summaries of the report, and released. `inverse_dynamics` joins them in memory.
+"""
 
 from __future__ import annotations
 
@@ -42,29 +46,29 @@ DEFLECTIONS = ("root", "integrate")
 
 
 class Run:
-    """One pass over a trajectory: iterate it for the blocks, then ask it for the report.
+    """One pass over a trajectory: iterate it to obtain the blocks, then call `report`.
 
     Args:
-        robot: the robot.
-        trajectory: the commanded motion.
-        stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does; one that is
-            nearest to something infeasible between the steps counts.
-        near_singular: margin below which a step is near-singular.
-        deflections: "root" of (14) at each step; "integrate" follows that of the first step by (19); or those
-            that were integrated before.
-        block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
-        engine: what computes, one of `vsacli.compute.engine.NAMES`.
-        threads: of compiled code; as many as there are processors if None.
-        asked: names of the variables that the run is for; if recorded signals leave them too uncertain, the
-            run is doubtful.
-        tell: learns of the engine what goes wrong before one is found, and what will take long.
+        robot: Robot.
+        trajectory: Commanded motion.
+        stop_on_infeasible: Whether to end with the first infeasible sample, as the paper's algorithm does;
+            also with the sample nearest to an infeasible point between samples.
+        near_singular: Margin below which a sample is near-singular.
+        deflections: "root" solves (14) at each sample; "integrate" follows the root of the first sample by
+            (19); or deflections that were integrated before.
+        block_samples: Samples in a block, `usual_block` if None; results do not depend on it.
+        engine: Backend, one of `vsacli.compute.engine.NAMES`.
+        threads: Number of threads of compiled code; by default the number of CPU cores.
+        asked: Names of the requested variables; if recorded signals leave them too uncertain, the verdict is
+            doubtful.
+        tell: Callback for messages of the choice of the engine: failures, and work that takes long.
 
     Attributes:
-        choice: the engine that was chosen, and why.
+        choice: Engine that was chosen, with the reason.
 
     Raises:
-        InputError: the margin is impossible, the trajectory does not fit the robot, deflections or engine are
-            unknown, or there is no C compiler for it.
+        InputError: The margin is impossible, the trajectory does not fit the robot, deflections or engine are
+            unknown, or there is no C compiler for the engine.
     """
 
     def __init__(
@@ -95,7 +99,7 @@ class Run:
         integrated = self._deflections is not None
         self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
-        busy = int(self._ahead)  # one thread updates the report while the others compute
+        busy = int(self._ahead)  # one thread updates the summaries while the others compute
         self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
@@ -110,17 +114,18 @@ class Run:
     def __iter__(self) -> Iterator[Block]:
         """Yield the blocks in time order; each is released before the next is computed."""
         waiting: deque[Block] = deque()
+        # Blocks wait until the samples after them are known: a minimum between two blocks may set a flag.
         for block in self._computed():
             self._between.look(block)
             waiting.append(block)
-            del block
+            del block  # else this name would keep the block alive while the next is computed
             while waiting and self._between.knows(len(waiting[0].time)) and not self._stopped:
                 yield self._merged(waiting.popleft())
             if self._stopped:
                 return
 
     def _computed(self) -> Iterator[Block]:
-        """Return all samples in blocks, as computed; of several threads all but one compute ahead."""
+        """Return an iterator of computed blocks; with several threads, blocks are computed ahead."""
         starts = range(0, self.trajectory.samples, self._block_samples)
         motions = (self.trajectory.block(start, start + self._block_samples) for start in starts)
         if self.choice.threads == 1 or not self._ahead:
@@ -136,13 +141,14 @@ class Run:
         return block_of(self._kernel, motion, engine, integrated=integrated, internal=internal)
 
     def _judged(self, block: Block) -> Block:
-        """Return the block with flags of limits exceeded beyond the uncertainty of recorded signals."""
+        """Return the block with flags only of limits exceeded beyond the uncertainty of recorded signals."""
         return block if self._uncertainty is None else self._uncertainty.judged(block)
 
     def _merged(self, block: Block) -> Block:
-        """Return the next block with flags that hold between its samples, deviations and motor energy.
+        """Merge the next block into the summaries, up to the first infeasible sample if the run stops there.
 
-        It is merged into the report, up to the first infeasible sample if the run stops there.
+        Returns:
+            The block with flags of minima between its samples, standard deviations and motor energy.
         """
         between = self._between.mark(block)
         if self._stop_on_infeasible:
@@ -169,7 +175,7 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Values needed to repeat the run: engine and options."""
+        """Engine and options, for repeating the run."""
         options = {
             "stop_on_infeasible": self._stop_on_infeasible,
             "near_singular": self._near_singular,
@@ -178,7 +184,7 @@ class Run:
         return {**self.choice.provenance, "options": json.dumps(options)}
 
     def report(self) -> Report:
-        """Return the verdict on the blocks so far, with the self-check of the whole."""
+        """Return the report on the blocks so far, with the self-check of the whole run."""
         complete = self._samples == self.trajectory.samples
         found = zip(self._energy.report(), self._between.reports(), self._uncertainties(), strict=True)
         return Report(
@@ -207,14 +213,14 @@ class Run:
         return [None] * len(self._summaries) if self._uncertainty is None else self._uncertainty.report()
 
     def _internal_stops(self) -> Iterator[str]:
-        """Yield where motions inside damped transmissions end before the trajectory does."""
+        """Yield a note for each internal motion that ends before the trajectory does."""
         for index, stop in self._internal.stops.items() if self._internal is not None else ():
             joint = self.robot.joint_names[index]
             when = f"cannot go on beyond t = {time_text(stop.time)}"
             yield f"{joint}: what moves inside its damped transmission {when}: {stop.reason}"
 
     def _self_check(self) -> SelfCheck:
-        """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
+        """Return the self-check; its bound is larger for integrated deflections, which drift off (14)."""
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
         error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
         of_springs, of_shafts = self._balances.residuals()
@@ -222,7 +228,7 @@ class Run:
 
 
 def _is_long(robot: Robot) -> bool:
-    """Return whether memory bounds the blocks of a chain, so that none is computed beside another."""
+    """Return whether memory limits the blocks of a chain; then only one is computed at a time."""
     return usual_block(len(robot.joints)) < usual_block(1)
 
 
@@ -234,25 +240,24 @@ def inverse_dynamics(
     deflections: str | IntegratedDeflections = "root",
     engine: str = "numpy",
 ) -> Result:
-    """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
+    """Compute the motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
 
-    Pure: prints nothing, writes nothing; but compiled code is kept in the user's cache folder.
+    The function prints and writes nothing, except for compiled code in the user's cache folder.
 
     Args:
-        robot: the robot, from `load_robot` or built in Python.
-        trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
-        stop_on_infeasible: end with the first infeasible step.
-        deflections: "root" of (14) at each step; "integrate" follows that of the first step by (19); or those
-            that were integrated before.
-        engine: what computes, "numpy", compiled "c", or "auto", which takes the latter where that saves
-            time.
+        robot: Robot, from `load_robot` or built in Python.
+        trajectory: Trajectory for this robot, from `load_trajectory` or `Trajectory.from_samples`.
+        stop_on_infeasible: Whether to end with the first infeasible sample.
+        deflections: "root" solves (14) at each sample; "integrate" follows the root of the first sample by
+            (19); or deflections that were integrated before.
+        engine: Backend: "numpy", compiled "c", or "auto", which uses compiled code where that saves time.
 
     Returns:
         Every variable of `Block` over (samples, joints[, 2]); `report` holds the verdict.
 
     Raises:
-        InputError: the trajectory has another number of joints than the robot, or no stiffness for a joint
-            that needs one; there are no such deflections, there is no such engine, or no C compiler for it.
+        InputError: The trajectory has a different number of joints than the robot, or no stiffness for a
+            joint that needs one; deflections or engine are unknown, or there is no C compiler.
     """
     from vsacli.analysis.result import Result
 
@@ -265,7 +270,7 @@ def inverse_dynamics(
 def _integrated(
     deflections: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
 ) -> IntegratedDeflections | None:
-    """Return the deflections to use instead of the root of (14) at each step; None for the root."""
+    """Return the deflections to use instead of the root of (14) at each sample; None for the root."""
     if not isinstance(deflections, str):
         return deflections
     if deflections not in DEFLECTIONS:
@@ -278,7 +283,7 @@ def _integrated(
 
 
 def _internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions | None:
-    """Return the motions inside damped transmissions; None if there are none."""
+    """Return the internal motions of damped transmissions; None without a damped transmission."""
     if not any(joint.damper_at("transmission") for joint in robot.joints):
         return None
     from vsacli.dynamics.internal_motion import internal_motions
@@ -307,7 +312,7 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[D
 
 
 def _joined(blocks: list[Block]) -> dict[str, AnyArray]:
-    """Blocks one after the other, samples contiguous."""
+    """Return the variables of consecutive blocks, concatenated, with the samples contiguous in memory."""
     rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
     return {
         name: np.moveaxis(np.concatenate([row[name] for row in rows], axis=-1), -1, 0) for name in rows[0]

@@ -1,4 +1,4 @@
-"""Uncertainty of a run by its recorded signals: deviations, limits judged by them, shares."""
+"""Uncertainty of a run by its recorded signals: standard deviations, their effect on limits, summaries."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 SMALLEST_SHARE = 0.01
-"""Share of the largest torque of any joint that smaller ones are compared with: torques of a resting joint
-may be nothing but noise."""
+"""Smallest scale of a torque's uncertainty, as a share of the largest torque of any joint: the torque of a
+resting joint may be only noise."""
 
 WITHIN = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
-"""Kinds of steps of which those within the uncertainty are counted."""
+"""Kinds of samples that are counted if they are within the uncertainty."""
 
 
 def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
-    """Return the variables whose uncertainty decides whether what was asked for is determined.
+    """Return the variables whose uncertainty decides whether the requested ones are determined.
 
-    Whether steps can be done, `flags`, depends on elastic torques, and on what the limits of the robot bound.
-    What has no deviation of its own is judged by the motor torques, which depend on everything.
+    `flags` depends on elastic torques, and on the variables with limits. A variable without a deviation is
+    judged by the motor torques, which depend on everything.
 
     Args:
-        names: of the variables that were asked for.
-        robot: whose limits count.
+        names: Names of the requested variables.
+        robot: Robot, with its limits.
     """
     judged: set[str] = set()
     for name in (name.removesuffix(deviation("")) for name in names):
@@ -47,18 +47,18 @@ def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
 
 
 class RunUncertainty:
-    """Deviations of a run along recorded signals; `add` blocks in order, then ask for the `report`."""
+    """Standard deviations of a run along recorded signals; `add` blocks in order, then call `report`."""
 
     def __init__(
         self, robot: Robot, trajectory: Trajectory, asked: Sequence[str], engine: Engine = NUMPY
     ) -> None:
-        """Begin.
+        """Prepare the deviations.
 
         Args:
-            robot: the robot.
-            trajectory: along which at least one signal was recorded and fitted.
-            asked: the variables that decide, see `judged_variables`.
-            engine: the backend.
+            robot: Robot.
+            trajectory: Trajectory with at least one recorded and fitted signal.
+            asked: Variables that decide, see `judged_variables`.
+            engine: Backend.
         """
         self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
         first, last = trajectory.times.span
@@ -75,7 +75,7 @@ class RunUncertainty:
         return Uncertainty(self._robot, self._trajectory, self._engine)
 
     def add(self, block: Block) -> Block:
-        """Return the block with its deviations and limit flags, and merge it into the report."""
+        """Merge a block into the report, and return it with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         self._count_steps(block, deviations.pop(MARGIN))
         inside = (block.time >= self._inside[0]) & (block.time <= self._inside[1])
@@ -89,7 +89,7 @@ class RunUncertainty:
         return self._with(deviations, block)
 
     def judged(self, block: Block) -> Block:
-        """Return a block of times between the steps with its deviations and limit flags."""
+        """Return a block of times between the samples with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         del deviations[MARGIN]
         return self._with(deviations, block)
@@ -112,7 +112,7 @@ class RunUncertainty:
                 steps[kind] += int(np.count_nonzero(found))
 
     def _judge_limits(self, block: Block, index: int) -> None:
-        """Take the bits of limits away where the excess is within the uncertainty."""
+        """Clear the bits of limits where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
         seen, exceeded = np.zeros((2, len(block.time)), dtype=np.uint32)
         for check in limit_checks(joint):
@@ -124,7 +124,7 @@ class RunUncertainty:
             if excess is not None and (label not in kept or excess.size > kept[label][0]):
                 time, unit = float(block.time[excess.step]), check.unit(joint.type)
                 kept[label] = excess.size, Worst(label, time, excess.value, excess.bound, unit, check.motor)
-        block.flags[:, index] &= ~(seen & ~exceeded)  # others are of what lies between the steps
+        block.flags[:, index] &= ~(seen & ~exceeded)  # other bits are of minima between the samples
 
     def report(self) -> list[JointUncertainty]:
         """Return the findings so far, for each joint."""
@@ -142,26 +142,26 @@ class RunUncertainty:
 
 
 def _sum(before: FloatArray, terms: FloatArray) -> FloatArray:
-    """One term after the other, so that rounding does not depend on how they are divided into blocks."""
+    """Sum one term after the other, so that rounding does not depend on the division into blocks."""
     total: FloatArray = np.cumsum(np.concatenate([before[None], terms]), axis=0)[-1]
     return total
 
 
 class _Powers:
-    """Sums over steps of the squares of a variable and of its deviation, (joints[, 2])."""
+    """Sums over samples of the squares of a variable and of its deviation, (joints[, 2])."""
 
     def __init__(self, unstated: BoolArray) -> None:
-        """Begin.
+        """Begin with empty sums.
 
         Args:
-            unstated: of which the deviation must not be stated, (joints[, 2]).
+            unstated: Whether a deviation must not be stated, (joints[, 2]).
         """
         self._unstated = unstated
         self._count, self._values, self._deviations = np.zeros((3, *unstated.shape))
         self._peak, self._largest = np.zeros((2, *unstated.shape))
 
     def add(self, values: FloatArray, deviations: FloatArray) -> None:
-        """Merge steps, (samples, joints[, 2]); those without a value do not count."""
+        """Add samples, (samples, joints[, 2]); samples without a value are left out."""
         exists = np.isfinite(values)
         self._count += np.sum(exists, axis=0)
         self._values = _sum(self._values, np.where(exists, values, 0.0) ** 2)

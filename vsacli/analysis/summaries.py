@@ -1,4 +1,4 @@
-"""Merges blocks of steps into the report of a joint: counts, first times, worst steps, peaks, drift."""
+"""Summaries of a run, block by block, for the report: counts, first times, worst samples, peaks, drift."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 
 REACH = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "near_singular": Flag.NEAR_SINGULAR}
-"""Kinds of trouble whose worst step is the one with the smallest margin."""
+"""Kinds of trouble whose worst sample is the one with the smallest margin."""
 
 
 class JointSummary:
-    """The summary of one joint; `add` blocks in order, then call `report`."""
+    """Summary of one joint; `add` blocks in order, then call `report`."""
 
     def __init__(self, joint: Joint, index: int) -> None:
         self._joint = joint
@@ -41,7 +41,7 @@ class JointSummary:
         self._dry_friction = dry_frictions(joint.actuator.motors)
 
     def add(self, block: Block) -> None:
-        """Merge a block of steps."""
+        """Merge a block."""
         index = self._index
         flags = block.flags[:, index]
         stiffness = block.stiffness[:, index]
@@ -65,7 +65,7 @@ class JointSummary:
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
     def add_bounded(self, block: Block) -> None:
-        """Merge what is worst, of steps or of minima between them, whose flags have steps that count."""
+        """Merge the worst values of samples, or of minima between them, without counting their flags."""
         flags = block.flags[:, self._index]
         flagged = bool(flags.any())
         if "stiffness" in self._joint.actuator.commanded:
@@ -76,11 +76,11 @@ class JointSummary:
             self._record_limits(flags, block)
 
     def _add_reach(self, flags: FlagArray, block: Block, *, flagged: bool) -> None:
-        """Merge what there is to say about the corridor."""
+        """Merge margins and attainable range."""
         index = self._index
         stiffness = block.stiffness[:, index]
         corridor = block.stiffness_lower[:, index], block.stiffness_upper[:, index]
-        # A step whose torque cannot be carried at all is worse than any margin.
+        # A sample whose torque cannot be carried at all is worse than any margin.
         gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
         if flagged:
@@ -101,10 +101,10 @@ class JointSummary:
         """Return the report of the joint; at least one block must have been added.
 
         Args:
-            energy: of the joint.
-            between: what is worse between the steps than at them.
-            uncertainty: of the joint; None if no signal was recorded.
-            complete: whether the last step that was added is that of the trajectory.
+            energy: Energy of the joint.
+            between: Clearances that are lower between the samples than at them.
+            uncertainty: Uncertainty of the joint; None if no signal was recorded.
+            complete: Whether the last sample that was added is the last of the trajectory.
         """
         assert self._start is not None
         least, time, reachable = self._margin
@@ -156,7 +156,7 @@ class JointSummary:
             )
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
-        """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
+        """Record the worst sample of each kind; none where integrated deflections end inside the range."""
         outside = (gap < -SINGULAR_MARGIN) & ~has(flags, Flag.NOT_FINITE)
         for kind, bits in REACH.items():
             hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
@@ -170,7 +170,7 @@ class JointSummary:
                 self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
 
     def _record_not_finite(self, flags: FlagArray, time: FloatArray) -> None:
-        """The first step counts: what is not finite is as bad as any other."""
+        """Record the first sample: values that are not finite are equally bad."""
         hit, label = has(flags, Flag.NOT_FINITE), Flag.NOT_FINITE.label
         if hit.any() and label not in self._first_time:
             self._first_time[label] = first = float(time[hit.argmax()])
@@ -178,14 +178,14 @@ class JointSummary:
             self._keep(0.0, Worst(label, first, math.nan, math.nan, unit))
 
     def _record_without_stiffness(self, flags: FlagArray, time: FloatArray) -> None:
-        """The first singular step, where a spring whose stiffness is not commanded has none."""
+        """Record the first singular sample of a spring without a commanded stiffness."""
         hit = has(flags, Flag.SINGULAR)
         if hit.any():
             unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
             self._keep(0.0, Worst("singular", float(time[hit.argmax()]), 0.0, math.nan, unit))
 
     def _record_instability(self, flags: FlagArray, block: Block) -> None:
-        """The first step counts: from there on it grows."""
+        """Record the first sample: the instability grows from there on."""
         hit, label = has(flags, Flag.INTERNAL_INSTABILITY), Flag.INTERNAL_INSTABILITY.label
         if hit.any() and label not in self._first_time:
             step = int(hit.argmax())
@@ -208,7 +208,7 @@ class JointSummary:
                 self._keep(excess.size, worst)
 
     def _torque_step(self, block: Block) -> FloatArray:
-        """Return the torque step of motors behind springs, whose torques do not jump."""
+        """Return the initial torque discontinuity of motors with springs, whose torques are continuous."""
         if not self._joint.actuator.sprung:
             return np.full(len(MOTORS), np.nan)
         step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
@@ -220,10 +220,7 @@ class JointSummary:
 
 
 class DriftSummary:
-    """The drift of the integrated deflections of one joint from the root of (14).
-
-    `add` blocks in order, then ask for the `report`.
-    """
+    """Drift of a joint's integrated deflections from the root of (14); `add` blocks, then call `report`."""
 
     def __init__(self, joint: Joint, index: int, stop: Stop | None) -> None:
         self._joint = joint
@@ -232,7 +229,7 @@ class DriftSummary:
         self._largest, self._time = math.nan, math.nan
 
     def add(self, block: Block) -> None:
-        """Merge a block of steps; those without deflections do not count."""
+        """Merge a block; samples without deflections are left out."""
         demand = block.tau_e[:, self._index], block.stiffness[:, self._index], block.q[:, self._index]
         root = self._joint.actuator.solve(*demand).deflections
         drift = np.fmax.reduce(np.abs(block.phi[:, self._index].T - root))
@@ -249,7 +246,7 @@ class DriftSummary:
 
 
 def _motors_at(block: Block, step: int, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Position and velocity of the motors of a joint at a step."""
+    """Return position and velocity of the motors of a joint at a sample."""
     return block.theta[step, joint], block.dtheta[step, joint]
 
 
@@ -259,6 +256,6 @@ def _pair(values: FloatArray) -> tuple[float, float]:
 
 
 def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:
-    """Yield the step with the largest badness among those hit, if there is one."""
+    """Yield the sample with the largest badness among those hit, if there is one."""
     if hit.any():
         yield int(np.where(hit, badness, -np.inf).argmax())

@@ -1,4 +1,4 @@
-"""Sentences on the trouble of joints: what, when, by how much, how uncertain, and what would fix it."""
+"""Sentences of the report on the trouble of joints: kind, time, amount, uncertainty, and possible fixes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vsacli.base.flags import Flag
 from vsacli.base.units import time_text
 
 DIFFERENT_PEAK = 1.1
-"""Factor between a peak at the ends of a record and that inside from which on it is said where it is."""
+"""Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
 
 
 def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
@@ -64,13 +64,13 @@ def undetermined_text(spread: Spread) -> str:
 
 
 MOST_TOLD = 4
-"""Joints whose trouble of a kind is told in full, where more than one more have it."""
+"""Number of joints with one kind of trouble that are described in full, if at least two more have it."""
 
 
 def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
-    """One sentence for each kind of trouble of a joint, naming it.
+    """Return one sentence for each kind of trouble of a joint, with its name.
 
-    Where many joints have a kind, the others follow in a few words each.
+    If many joints have a kind, the others follow in a few words each.
     """
     kinds = dict.fromkeys(kind for joint in joints for kind in joint.worst)
     told = {kind: _worst_of([joint for joint in joints if kind in joint.worst], kind) for kind in kinds}

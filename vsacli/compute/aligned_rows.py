@@ -1,4 +1,4 @@
-"""Rows of samples that lie well in memory for vector registers and caches."""
+"""Rows of samples aligned in memory for vector registers and caches."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from vsacli.base.arrays import AnyArray
 
 LINE = 64
-"""Bytes of the longest vector, and of a line of the processor's cache."""
+"""Bytes of the longest vector register, and of a cache line."""
 
 
 def aligned_rows(rows: int, samples: int, dtype: type[np.generic] = np.float64) -> AnyArray:
-    """Space for rows (rows, samples), not set, that each begin at a whole vector.
+    """Return uninitialized rows, (rows, samples), each of which begins at a multiple of `LINE` bytes.
 
-    They are an odd number of lines apart: at a power of two, all would fall into the same sets of a cache.
+    Rows are an odd number of lines apart: at a power of two, all would be in the same sets of a cache.
     """
     size = np.dtype(dtype).itemsize
     distance = LINE * (samples * size // LINE // 2 * 2 + 3)
@@ -23,6 +23,6 @@ def aligned_rows(rows: int, samples: int, dtype: type[np.generic] = np.float64) 
 
 
 def address(array: AnyArray) -> int:
-    """Return the address of its first entry."""
+    """Return the memory address of the first entry."""
     found: int = array.__array_interface__["data"][0]
     return found

@@ -1,9 +1,9 @@
-"""Loops and branches over samples, each of which runs as if it were alone; and calls that are alike.
+"""Loops and conditionals per sample, and calls that are recorded once, for kernels that run or are traced.
 
 Everything else in the solvers is elementwise: NumPy functions, comparisons, `np.where`, and lookups in
-constant arrays with `np.searchsorted` and `look_up`. So one text computes blocks of samples, or is traced to
-a program for a single one. The functions here have two texts: that of `..._on` is chosen by the class of
-its first argument, and `vsacli.compute.tracing` registers the second text, for arrays of symbols.
+constant arrays with `np.searchsorted` and `look_up`. So the same code computes blocks of samples, or is
+traced to a program for one sample. The functions here have two implementations: `..._on` dispatches on the
+class of its first argument, and `vsacli.compute.tracing` registers the one for arrays of symbols.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ def repeat(step: Step, state: Values, constants: Values, limit: int) -> Values:
     """Return the state of each sample after as many steps as it needs, at most `limit`.
 
     Args:
-        step: from a state and the constants to the next state, and whether the sample is done with it.
-        state: where to begin; arrays of any one shape.
-        constants: further inputs of the step for each sample; arrays of that shape.
-        limit: largest number of steps.
+        step: Function from a state and the constants to the next state, and whether the sample is done.
+        state: Initial state; arrays of any one shape.
+        constants: Further inputs of the step; arrays of that shape.
+        limit: Largest number of steps.
     """
     result: Values = repeat_on(state[0], step, state, constants, limit)
     return result
 
 
 def where_needed(mask: BoolArray, function: Function, arguments: Values, otherwise: Values) -> Values:
-    """`function(*arguments)` where the mask holds, computed for those samples only; `otherwise` elsewhere."""
+    """Return `function(*arguments)` where the mask holds, computed only there; `otherwise` elsewhere."""
     result: Values = where_needed_on(mask, function, arguments, otherwise)
     return result
 
@@ -48,65 +48,65 @@ def look_up(tables: Sequence[FloatArray], index: IndexArray) -> Values:
 
 
 def cell_of(position: FloatArray, count: int) -> IndexArray:
-    """Index of the cell in which a position lies, or of the nearest: of `count` of width 1 from zero on.
+    """Return the index of the cell with a position, or of the nearest, of `count` cells of width 1 from zero.
 
-    NaN lies in any.
+    The cell of NaN is arbitrary.
     """
     result: IndexArray = cell_on(position, count)
     return result
 
 
 def subroutine(function: Function, arguments: Values) -> Values:
-    """`function(*arguments)`, which code that must be short has once, however often it is computed.
+    """Return `function(*arguments)`; generated code that must be short contains the function once.
 
     Args:
-        function: from arrays (samples,) to as many as it likes; what it takes and returns are real numbers.
-        arguments: the arrays.
+        function: Function of arrays (samples,) that returns a tuple of arrays; all of real numbers.
+        arguments: Arrays.
     """
     result: Values = subroutine_on(arguments[0], function, arguments)
     return result
 
 
 def call(row: Any, function: Callable[..., Any], *arguments: Any) -> Any:
-    """`function(*arguments)`, which may be recorded once for all calls that are alike.
+    """Return `function(*arguments)`; while tracing, equal calls share one recorded body.
 
-    These have equal functions, and arguments that are equal but for rows of samples. So what is computed
-    joint by joint need not be written out as often.
+    Calls are equal if their functions are, and their arguments except for rows of samples. So the program of
+    a long chain contains the computation of equal joints once. Without tracing, this is a plain call.
 
     Args:
-        row: any of the rows of samples among the arguments.
-        function: one that does nothing but compute its result, of nothing but its arguments; hashable.
-        arguments: rows of samples, constants, hashable objects, and tuples, lists and dictionaries of such.
+        row: Any row of samples among the arguments; its class chooses the implementation.
+        function: Pure function; hashable, see `Keyed`.
+        arguments: Rows of samples, constants, hashable objects, and tuples, lists and dictionaries of such.
     """
     return call_on(row, function, arguments)
 
 
 @dataclass(frozen=True)
 class Keyed:
-    """A function that equals another one if its key does, for `call`.
+    """A function that equals another if their keys are equal, for `call`.
 
     Attributes:
-        key: all that decides on its results.
-        function: the function.
+        key: All objects that its results depend on, arguments apart.
+        function: Function.
     """
 
     key: Hashable
     function: Callable[..., Any] = field(compare=False)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Return the values of the function."""
+        """Call the function."""
         return self.function(*arguments)
 
 
 @singledispatch
 def repeat_on(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
-    """`repeat` on NumPy arrays."""
+    """Run `repeat` on NumPy arrays."""
     found = _repeated(step, _flat(state), _flat(constants), limit)
     return _shaped(found, state[0].shape)
 
 
 def _repeated(step: Step, state: Values, constants: Values, limit: int) -> Values:
-    """Samples that are done keep their state; once they are half of all, the others go on without them."""
+    # Samples that are done keep their state. Once they are half of all, the others continue without them.
     result = state
     over: BoolArray = np.zeros(state[0].size, dtype=bool)
     while limit and 2 * np.count_nonzero(over) < over.size:
@@ -129,7 +129,7 @@ def _kept(over: BoolArray, result: Values, latest: Values) -> Values:
 
 @singledispatch
 def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise: Values) -> Values:
-    """`where_needed` on NumPy arrays."""
+    """Run `where_needed` on NumPy arrays."""
     samples = np.flatnonzero(mask)
     if not samples.size:
         return otherwise
@@ -141,25 +141,25 @@ def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise:
 
 @singledispatch
 def call_on(_: Any, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
-    """`call` on anything but rows of symbols."""
+    """Run `call` on everything but rows of symbols."""
     return function(*arguments)
 
 
 @singledispatch
 def subroutine_on(_: Any, function: Function, arguments: Values) -> Values:
-    """`subroutine` on NumPy arrays."""
+    """Run `subroutine` on NumPy arrays."""
     return function(*arguments)
 
 
 @singledispatch
 def look_up_on(index: Any, tables: Sequence[FloatArray]) -> Values:
-    """`look_up` on NumPy arrays."""
+    """Run `look_up` on NumPy arrays."""
     return tuple(table[index] for table in tables)
 
 
 @singledispatch
 def cell_on(position: Any, count: int) -> IndexArray:
-    """`cell_of` on NumPy arrays."""
+    """Run `cell_of` on NumPy arrays."""
     cell: IndexArray = np.fmin(np.fmax(position, 0), count - 1).astype(np.intp)
     return cell
 

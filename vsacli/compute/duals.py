@@ -1,9 +1,9 @@
-"""Dual numbers: arrays that carry their derivatives along, so that the text of a computation differentiates.
+"""Dual numbers: arrays that carry their derivatives along, so that a kernel computes derivatives as it is.
 
 Forward mode of automatic differentiation (Griewank & Walther, Evaluating Derivatives, 2nd ed., chapter 3):
-each function of NumPy's that a kernel uses is applied to the values, and its derivative to the tangents. A
-number keeps the tangents alone of those parameters that it depends on, so that one run carries all of them
-and costs what each of them changes. Derivatives are exact to rounding. Choices (`np.where`, comparisons,
+each NumPy function that a kernel uses is applied to the values, and its derivative to the tangents. A number
+stores only the tangents of parameters that it depends on, so that one run with all parameters costs no more
+than the affected operations. Derivatives are exact to rounding. Choices (`np.where`, comparisons,
 `np.maximum`) are made by the values.
 """
 
@@ -20,15 +20,15 @@ from vsacli.compute.control_flow import cell_of, cell_on
 from vsacli.compute.vector import Scalar, add, exact, mul, sub, trigonometric, trigonometric_of
 
 Tangents = Mapping[int, Any]
-"""Derivatives by direction, arrays that spread to the shape of the value; in other directions it is zero."""
+"""Derivatives by direction, arrays that broadcast to the shape of the value; zero in other directions."""
 
 
 class Dual(NDArrayOperatorsMixin):
-    """Values and their derivatives in some directions, by the protocols of NumPy (NEP 13 and 18).
+    """Values with their derivatives in some directions, by the protocols of NumPy (NEP 13 and 18).
 
     Attributes:
-        value: the values, of any shape; exact constants of `compute.vector` fold.
-        tangents: their derivatives by direction.
+        value: Values, of any shape; exact constants of `compute.vector` fold.
+        tangents: Their derivatives by direction.
     """
 
     def __init__(self, value: Any, tangents: Tangents) -> None:
@@ -62,7 +62,7 @@ class Dual(NDArrayOperatorsMixin):
             raise NotImplementedError(f"numpy.{function.__name__} carries no derivatives along")
         return ARRANGED[function](*arguments, **options)
 
-    # What the recursion is made of, without the way through NumPy's protocol: a fifth of its time.
+    # Operators of the recursion, without NumPy's protocol: a fifth of the time.
 
     def __add__(self, other: Any) -> Dual:
         return _sum_of(self, other)
@@ -86,7 +86,7 @@ class Dual(NDArrayOperatorsMixin):
         return len(self.value)
 
     def __bool__(self) -> bool:
-        """Return whether it is more than nothing: a zero that a parameter may change is not left out."""
+        """Return whether value or a tangent is nonzero: a zero that a parameter may change is no zero."""
         return bool(self.value) or any(np.any(tangent) for tangent in self.tangents.values())
 
     @property
@@ -120,7 +120,7 @@ class Dual(NDArrayOperatorsMixin):
 
 
 def seeds(values: Sequence[Any], first: int = 0) -> list[Dual]:
-    """Values as dual numbers, each array with a direction of its own, from the direction `first` on."""
+    """Return values as dual numbers, each array with its own direction, from the direction `first` on."""
     return [Dual(value, {first + at: 1}) for at, value in enumerate(values)]
 
 
@@ -130,7 +130,7 @@ def value_of(array: Any) -> Any:
 
 
 def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArray:
-    """Return the derivatives of an array, (directions, *shape); zero if it is an ordinary one."""
+    """Return the derivatives of an array, (directions, *shape); zero for an ordinary array."""
     derivatives = np.zeros((directions, *shape))
     for direction, tangent in tangents_of(array).items():
         derivatives[direction] = tangent
@@ -138,7 +138,7 @@ def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArra
 
 
 def tangents_of(array: Any) -> Tangents:
-    """Return the derivatives of an array by direction; none if it is an ordinary one."""
+    """Return the derivatives of an array by direction; empty for an ordinary array."""
     return array.tangents if isinstance(array, Dual) else {}
 
 
@@ -203,7 +203,7 @@ def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tang
 
 @exact.register
 def _(number: Dual) -> Dual:
-    """Return the value folds, whatever its derivatives."""
+    """Return a dual whose value folds, whatever its derivatives."""
     return Dual(exact(number.value), number.tangents)
 
 
@@ -216,7 +216,7 @@ def _(angle: Dual, name: str) -> Dual:
 
 @cell_on.register
 def _(position: Dual, count: int) -> IndexArray:
-    """Cells are chosen by the values."""
+    """Choose cells by the values."""
     return cell_of(position.value, count)
 
 
@@ -252,7 +252,7 @@ SLOPES: Mapping[np.ufunc, Slopes] = {
     np.minimum: lambda _r, a, b: (lambda: 1.0 * (a <= b), lambda: 1.0 * (a > b)),
     np.copysign: lambda r, a, _b: (lambda: np.sign(a) * np.sign(r), lambda: 0.0),
 }
-"""The functions of NumPy that carry derivatives along."""
+"""Derivatives of NumPy functions."""
 
 FLAT = frozenset(
     {
@@ -260,17 +260,17 @@ FLAT = frozenset(
         *(np.isfinite, np.isnan, np.isinf, np.sign, np.signbit, np.floor, np.ceil, np.rint),
     }
 )
-"""Functions whose results do not change with their operands, but for jumps."""
+"""Functions that are piecewise constant."""
 
 FREQUENT: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
     np.add: _sum_of,
     np.subtract: _difference_of,
     np.multiply: _product_of,
 }
-"""Functions without the detour by slopes."""
+"""Frequent functions, computed without `SLOPES`."""
 
 SHAPE_FUNCTIONS = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim, np.searchsorted})
-"""Functions whose results are shapes and places, which do not change with what numbers are."""
+"""Functions whose results are shapes and indices, which have no derivatives."""
 
 
 def _where(condition: Any, a: Any, b: Any) -> Dual:
@@ -283,7 +283,7 @@ def _clip(values: Any, low: Any, high: Any) -> Any:
 
 
 def _joined(function: Callable[..., Any]) -> Callable[..., Dual]:
-    """Stacking or concatenating, for which all parts must have tangents."""
+    """Wrap stacking or concatenating, for which all parts need tangents."""
 
     def joined(arrays: Sequence[Any], axis: int = 0) -> Dual:
         value = function([value_of(each) for each in arrays], axis=axis)

@@ -1,9 +1,9 @@
 """Derivatives of functions of several variables: truncated power series, computed along with the values.
 
-A jet holds the Taylor coefficients of a function at a point, up to those that are asked for. Coefficients are
-numbers, NumPy arrays or arrays of symbols, so that one text gives values or leaves a program; those that are
-zero whatever the point is are not there and cost nothing. A. Griewank & A. Walther, Evaluating Derivatives,
-2nd ed. (2008), chapter 13.
+A jet stores the Taylor coefficients of a function at a point, up to requested orders. Coefficients are
+numbers, NumPy arrays or arrays of symbols, so that the same code computes values or is traced; coefficients
+that are zero at every point are not stored and cost nothing. A. Griewank & A. Walther, Evaluating
+Derivatives, 2nd ed. (2008), chapter 13.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ import numpy as np
 from vsacli.compute.vector import Scalar, add, mul, sub
 
 Order = tuple[int, ...]
-"""Number of differentiations by each variable."""
+"""Number of differentiations over each variable."""
 
 Terms = Mapping[Order, Scalar]
 
 MOST_FACTORS = 1000
-"""Exponent up to which whole powers are products, so that they hold at zero, too."""
+"""Largest integer exponent whose power is computed by products, so that it is valid at zero."""
 
 
 class Truncation:
-    """The set of derivatives that jets hold, closed under fewer differentiations.
+    """Set of derivatives that jets store, closed under fewer differentiations.
 
     Attributes:
-        variables: number of variables.
-        orders: of the derivatives, the lower ones first.
-        degree: most differentiations.
-        zeroth: the order of the function itself.
+        variables: Number of variables.
+        orders: Orders of the derivatives, the lower ones first.
+        degree: Largest number of differentiations.
+        zeroth: Order of the function itself.
     """
 
     def __init__(self, orders: Iterable[Order]) -> None:
@@ -69,10 +69,10 @@ def _total(a: Order, b: Order) -> Order:
 
 
 class Jet:
-    """A function at a point, with its derivatives; has + - * / and powers among its kind and with numbers."""
+    """A function at a point with its derivatives; + - * / and powers combine jets, and jets with numbers."""
 
     __slots__ = ("_terms", "_truncation")
-    __array_ufunc__ = None  # so that a number of NumPy leaves its operators to those below
+    __array_ufunc__ = None  # so that NumPy numbers defer to the operators below
 
     def __init__(self, truncation: Truncation, terms: Terms) -> None:
         self._truncation = truncation
@@ -80,11 +80,11 @@ class Jet:
 
     @property
     def value(self) -> Scalar:
-        """The function."""
+        """Value of the function."""
         return self._terms.get(self._truncation.zeroth, 0)
 
     def derivative(self, order: Order) -> Scalar:
-        """Return a derivative; the number zero where it vanishes whatever the point is."""
+        """Return a derivative; the number zero if it vanishes at every point."""
         return mul(prod(map(factorial, order)), self._terms.get(order, 0))
 
     def _joined(self, other: Any, join: Callable[[Scalar, Scalar], Scalar]) -> Jet:
@@ -138,7 +138,7 @@ class Jet:
         return _compose(_exponential, self * np.log(base))
 
     def composed(self, outer: Iterator[Scalar]) -> Jet:
-        """Another function of this one, from the Taylor coefficients of that at the value of this."""
+        """Return the composition with an outer function, from its Taylor coefficients at `value`."""
         zeroth = self._truncation.zeroth
         inner = Jet(self._truncation, {order: term for order, term in self._terms.items() if order != zeroth})
         result, power = Jet(self._truncation, {zeroth: next(outer)}), inner
@@ -153,7 +153,7 @@ def _is_zero(term: Scalar) -> bool:
 
 
 def _whole_power(base: Jet, exponent: int) -> Jet:
-    """Return a whole power by squaring, which is valid at zero too."""
+    """Return an integer power by squaring, which is valid at zero, too."""
     result, square = base * 0 + 1, base
     while exponent:
         if exponent % 2:
@@ -172,7 +172,7 @@ def _reciprocal(base: Jet) -> Jet:
 
 
 def _binomial(first: Scalar, value: Scalar, exponent: float) -> Iterator[Scalar]:
-    """Taylor coefficients of a power of the value, from the power itself; without end, as those below are."""
+    """Yield the Taylor coefficients of a power of the value, from the power itself, without end."""
     coefficient = first
     for number in count():
         yield coefficient
@@ -233,4 +233,4 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "exp": _of_either(np.exp, _exponential),
     "log": _of_either(np.log, _logarithmic),
 }
-"""Functions of jets, and of numbers, by their words in expressions."""
+"""Functions of jets and of numbers by their names in expressions."""

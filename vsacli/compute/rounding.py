@@ -1,4 +1,4 @@
-"""Tolerances that rounding sets: code for a coarser arithmetic than double precision needs larger ones."""
+"""Tolerances in proportion to rounding, so that code in single precision gets larger ones."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ _SMALLEST, _LARGEST = float(np.finfo(np.float32).tiny), float(np.finfo(np.float3
 class OfRounding(float):
     """A tolerance for double precision, proportional to a power of the rounding of a number near 1.
 
-    It computes as a float does, but recorded programs keep what it is.
+    It behaves as a float, but programs keep its type, from which `single` derives the larger tolerance.
 
     Attributes:
-        power: the power; 1/2 where a step that converges quadratically takes what is left to rounding.
+        power: Power; 1/2 for a step whose square is rounding, since the method converges quadratically.
     """
 
     power: float
 
     def __new__(cls, value: float, power: float = 1.0) -> Self:
-        """Return a tolerance from that for double precision."""
+        """Return a tolerance with this value in double precision."""
         new = super().__new__(cls, value)
         new.power = power
         return new
 
     def in_single_precision(self) -> float:
-        """Return the tolerance there."""
+        """Return the tolerance for single precision."""
         return float(self * COARSER**self.power)
 
 
 def single(number: float) -> float:
-    """Return a constant as single precision has it: a larger tolerance; zero only for zero."""
+    """Return a constant for single precision: a larger tolerance, and zero only for zero."""
     if isinstance(number, OfRounding):
         number = number.in_single_precision()
     if number and abs(number) < _SMALLEST:

@@ -1,4 +1,4 @@
-"""Rows of numbers by the name of the array that they belong to, instead of by their place."""
+"""Layout of a kernel's input and output rows: arrays by name, one entry a row."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _Row = TypeVar("_Row")
 
 
 class RowLayout:
-    """Arrays whose entries lie one after the other, a row each, as a kernel takes and gives them.
+    """Named arrays whose entries follow each other, a row each, in the input or output of a kernel.
 
     Attributes:
-        shapes: of each array at one instant, by name, in the order of the rows.
-        size: number of rows.
+        shapes: Shape of each array at one instant, by name, in the order of the rows.
+        size: Number of rows.
     """
 
     def __init__(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
@@ -28,40 +28,40 @@ class RowLayout:
         self._places = dict(zip(self.shapes, (slice(*place) for place in pairwise(ends)), strict=True))
 
     def unpack(self, rows: Sequence[_Row]) -> dict[str, Sequence[_Row]]:
-        """Return the rows of each array; further ones are ignored."""
+        """Return the rows of each array by name; further rows are ignored."""
         return {name: rows[place] for name, place in self._places.items()}
 
     def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:
-        """Return each array in its shape, followed by what axes a row has."""
+        """Return each array in its shape, followed by the axes of a row."""
         return {
             name: rows[place].reshape((*self.shapes[name], *rows.shape[1:]))
             for name, place in self._places.items()
         }
 
     def pack(self, rows: Mapping[str, Iterable[_Row]]) -> list[_Row]:
-        """Return the rows of all arrays."""
+        """Return the rows of all arrays, in the order of `shapes`."""
         return [row for name in self.shapes for row in rows[name]]
 
 
 class RowKernel(ABC):
-    """A kernel, as engines carry out, whose rows are arrays by name."""
+    """A kernel for an engine, whose rows belong to named arrays."""
 
     @property
     @abstractmethod
     def arguments(self) -> RowLayout:
-        """Rows that it takes."""
+        """Layout of the input rows."""
 
     @property
     @abstractmethod
     def results(self) -> RowLayout:
-        """Rows that it gives."""
+        """Layout of the output rows."""
 
     @property
     def inputs(self) -> int:
-        """Number of rows taken."""
+        """Number of input rows."""
         return self.arguments.size
 
     @property
     def outputs(self) -> int:
-        """Number of rows given."""
+        """Number of output rows."""
         return self.results.size

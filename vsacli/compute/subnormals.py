@@ -1,7 +1,7 @@
-"""Numbers of less than full precision, below 2.2e-308: taken for zero while rows of samples are computed.
+"""Subnormal numbers, below 2.2e-308, treated as zero while rows of samples are computed.
 
-Some processors, those of Intel among them, take a hundred times longer for an operation on them, and motions
-that decay are full of them. Compiled code does the same (engine/lanes.c).
+On some processors, such as Intel's, an operation on them takes a hundred times longer, and decaying motions
+are full of them. Compiled code does the same (engine/lanes.c).
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _Environment = ctypes.c_uint32 * 8
 """The floating-point environment of glibc on x86-64, fenv_t; its last word is the register MXCSR."""
 
 RESULTS_ARE_ZERO, OPERANDS_ARE_ZERO = 0x8000, 0x0040
-"""Bits of that register: Intel's manual, volume 1, 10.2.3."""
+"""Bits of MXCSR: Intel's manual, volume 1, 10.2.3."""
 
 
 @contextmanager
 def subnormals_as_zero() -> Iterator[None]:
-    """Small operands and results are zero, in this thread; that is so in Linux on x86-64 only."""
+    """Treat subnormal operands and results as zero in this thread; Linux on x86-64 only."""
     library = _mathematics()
     if library is None:
         yield
@@ -42,10 +42,8 @@ def subnormals_as_zero() -> Iterator[None]:
 
 @cache
 def _mathematics() -> ctypes.CDLL | None:
-    """Return the library with the functions of fenv.h, where their data are as above.
-
-    NumPy finds the limits of numbers when it is first asked for them: here, before the smallest are zero.
-    """
+    """Return the library with the functions of fenv.h if its data are as above, else None."""
+    # NumPy computes the limits of each type at first use: here, before subnormals are zero.
     for kind in (np.float16, np.float32, np.float64):
         np.finfo(kind)
     if sys.platform == "linux" and os.uname().machine == "x86_64" and sys.maxsize > 2**32:

@@ -1,8 +1,8 @@
 """3-vectors of arbitrary scalars with + - *, in which exact zeros and ones cost nothing.
 
 A component is a number, a NumPy row of samples, a complex number, a fraction or a symbol. The Python integers
-0, 1 and -1 stand for exact constants: products and sums with them are folded instead of computed, so that one
-text serves every geometry without a branch on a value.
+0, 1 and -1 are exact constants: products and sums with them are folded instead of computed, so that the same
+code is efficient for every geometry, without a conditional on values.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Scalar = Any
-"""Anything with + - * among its kind and with Python integers."""
+"""Any type with + - * among its instances and with Python integers."""
 
 
 @singledispatch
@@ -27,13 +27,13 @@ def exact(number: Scalar) -> Scalar:
 
 
 def trigonometric(name: str, angle: Scalar) -> Scalar:
-    """`cos` or `sin` of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
+    """Return `cos` or `sin` of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
     return trigonometric_of(angle, name)
 
 
 @singledispatch
 def trigonometric_of(angle: Scalar, name: str) -> Scalar:
-    """`trigonometric` of any scalars but these."""
+    """Return `trigonometric` for scalars without a registered case."""
     return getattr(np, name)(angle)
 
 
@@ -79,7 +79,7 @@ def _times_integer(factor: int, a: Scalar) -> Scalar:
 
 
 class Vector(NamedTuple):
-    """Components in one frame; `+` and `-` act on vectors, `*` takes a scalar on its right."""
+    """Components in one frame; `+` and `-` act on vectors, `*` on a vector and a scalar on its right."""
 
     x: Scalar
     y: Scalar
@@ -95,7 +95,7 @@ class Vector(NamedTuple):
         return Vector(mul(self.x, factor), mul(self.y, factor), mul(self.z, factor))
 
     def dot(self, other: Vector) -> Scalar:
-        """Inner product."""
+        """Return the inner product."""
         return add(add(mul(self.x, other.x), mul(self.y, other.y)), mul(self.z, other.z))
 
 
@@ -103,7 +103,7 @@ ZERO, ONES = Vector(0, 0, 0), Vector(1, 1, 1)
 
 
 def cross(a: Vector, b: Vector, along: Vector = ONES) -> Vector:
-    """Vector product a x b; of it only what an inner product with `along` needs, if that is given."""
+    """Return the vector product a x b; with `along`, only what an inner product with it needs."""
     return Vector(
         0 if _vanishes(along.x) else sub(mul(a.y, b.z), mul(a.z, b.y)),
         0 if _vanishes(along.y) else sub(mul(a.z, b.x), mul(a.x, b.z)),
@@ -143,7 +143,7 @@ class Rotation(NamedTuple):
     sin_alpha: Scalar
 
     def apply(self, v: Vector) -> Vector:
-        """R v."""
+        """Return R v."""
         y = sub(mul(self.cos_alpha, v.y), mul(self.sin_alpha, v.z))
         return Vector(
             sub(mul(self.cos_theta, v.x), mul(self.sin_theta, y)),
@@ -152,7 +152,7 @@ class Rotation(NamedTuple):
         )
 
     def undo(self, v: Vector) -> Vector:
-        """R^T v."""
+        """Return R^T v."""
         y = sub(mul(self.cos_theta, v.y), mul(self.sin_theta, v.x))
         return Vector(
             add(mul(self.cos_theta, v.x), mul(self.sin_theta, v.y)),
@@ -173,5 +173,5 @@ class Matrix(NamedTuple):
         return Vector(self.x.dot(v), self.y.dot(v), self.z.dot(v))
 
     def transposed(self) -> Matrix:
-        """Transpose, the inverse of a rotation."""
+        """Return the transpose, the inverse of a rotation."""
         return Matrix(*(Vector(*column) for column in zip(self.x, self.y, self.z, strict=True)))

@@ -1,4 +1,7 @@
-"""Equations (36)-(74) over blocks of samples, and the forward dynamics."""
+"""Inverse dynamics (36)-(74) over blocks of samples, forward dynamics (5), energy and losses.
+
+The inverse dynamics is `inverse`: `recursion` for the links, `drive` for each joint. Read them in this order.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,8 @@
-"""Balances that every result must satisfy: torques on each shaft, power passed, energy of the links."""
+"""Balances that every result must satisfy, for the self-check: springs (14), shafts (73)-(74), link energy.
+
+`BalancedDynamics` computes the residuals of springs and shafts with every sample. The energies and powers of
+shafts and links are for `analysis.derivative_check`, which compares an energy's derivative with the power.
+"""
 
 from __future__ import annotations
 
@@ -29,23 +33,23 @@ SHAFT_VARIABLES = (
     *("q", "dq", "tau_e", "stiffness", "damping", "theta", "dtheta", "ddtheta", "dphi", "tau_damper"),
     *("tau_motor", "motor_power", "current", "voltage", "copper_loss", "dissipated_power"),
 )
-"""The variables of a joint that are balanced, where it has them."""
+"""Variables of a joint that enter the balances, where it has them."""
 
 POSITION_ROUNDING = 8 * np.finfo(float).eps
-"""Share of q and theta by which their difference phi may be off: a few roundings."""
+"""Error of phi = theta - q by rounding, relative to the size of q and theta: a few roundings."""
 
 Residual = tuple[FloatArray, FloatArray]
-"""Residual of a balance, and the size of its terms, to which rounding is relative."""
+"""Residual of a balance, and the size of its terms."""
 
 
 def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular: BoolArray) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
-        joint: the joint.
-        of_joint: its variables by name, `SHAFT_VARIABLES` among them.
-        tau_spring: torque of the springs against each motor by their laws, (motors, samples).
-        regular: where there must be numbers; the error is zero elsewhere.
+        joint: Joint.
+        of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
+        tau_spring: Torque of the springs against each motor by their laws, (motors, samples).
+        regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
         np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
@@ -94,7 +98,7 @@ def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_spring: Fl
 
 
 def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
-    """Row `index` of B theta'', term by term: the rate of what the kinetic energy has as momentum."""
+    """Return row `index` of B theta'', term by term."""
     own = joint.actuator.motors[index].inertia * ddtheta[index]
     coupling = joint.actuator.coupled_rotors
     return [own, coupling * ddtheta[1 - index]] if coupling else [own]
@@ -121,7 +125,7 @@ def _winding_residuals(
 
 
 def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[FloatArray]:
-    """Dry friction as the mean of both directions, half their difference, and the offset."""
+    """Return dry friction as the mean of both directions, half their difference, and the offset."""
     if friction is None:
         return []
     backward, forward = friction.coulomb
@@ -134,7 +138,7 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
 
 
 def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, FloatArray]:
-    """Velocity of each damper of a joint, by the motor that feels it; None is one between the links."""
+    """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
     if joint.damper_at("link"):
@@ -144,7 +148,7 @@ def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, Floa
 
 
 def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
-    """Power that is lost between the two links of a joint, term by term."""
+    """Return the power lost between the two links of a joint, term by term."""
     dq = of_joint["dq"]
     lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
     if joint.damper_at("link"):
@@ -153,7 +157,7 @@ def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
 
 
 def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
-    """Power that is lost between the motors and the link of a joint, term by term."""
+    """Return the power lost between the motors and the link of a joint, term by term."""
     lost = []
     for motor, dtheta in zip(joint.actuator.motors, of_joint["dtheta"], strict=False):
         lost.append(motor.damping * dtheta * dtheta)
@@ -165,7 +169,7 @@ def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
 
 
 def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
-    """Kinetic energy of the rotors of a joint, and the energy in its springs, (samples,), J."""
+    """Return the kinetic energy of the rotors of a joint plus the energy in its springs, (samples,), J."""
     energy: FloatArray = of_joint["elastic_energy"]
     motors, dtheta = joint.actuator.motors, of_joint["dtheta"]
     for motor, velocity in zip(motors, dtheta, strict=False):
@@ -192,26 +196,29 @@ BALANCES = {
         Variable("damped_size", ("damped",), units.TORQUE, "size of the torques that are balanced", "(14)"),
     )
 }
-"""Quantities of the balances, which are computed with the variables of a result but not stored."""
+"""Quantities of the balances; they are computed with the result variables, but not stored."""
 
 
 BALANCED = {*SHAFT_VARIABLES, "phi", "flags"}
-"""The variables from which springs and shafts are balanced."""
+"""Variables from which the balances of springs and shafts are computed."""
 
 
 class BalancedBlock(Block):
-    """A block with `BALANCES`, too."""
+    """A block with the result variables and `BALANCES`."""
 
     declared: ClassVar[Mapping[str, Variable]] = {**VARIABLES, **BALANCES}
 
 
 class BalancedDynamics(InverseDynamics):
-    """Inverse dynamics with `BALANCES` at each step: as part of its program they take next to no time."""
+    """Kernel of a run: inverse dynamics with `BALANCES` at each sample.
+
+    As part of one program the balances take hardly any time.
+    """
 
     block = BalancedBlock
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of its variables at one instant, by name."""
+        """Return the shapes of the computed variables at one instant, by name."""
         motors, damped = (len(self.robot.joints), SIDES), (len(damped_joints(self.robot.joints)),)
         return {
             **super().shapes(),
@@ -219,7 +226,7 @@ class BalancedDynamics(InverseDynamics):
         }
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """Return the rows of each result by name, from kernel arguments and variables of the joints."""
+        """Return the rows of each result by name, those of `BALANCES` last."""
         joints = self.robot.joints
         passed = [
             call(rows[0], behind_link(passed_power, joint), of_joint)
@@ -236,12 +243,12 @@ def damped_joints(joints: Sequence[Joint]) -> list[int]:
 
 
 def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
-    """Return the balances of (14) by the springs' laws at phi, and of the shafts, by name.
+    """Return the residuals of (14), by the springs' laws at phi, and of the shafts, by name.
 
-    Zero at steps that are not regular. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k| and
-    |sum sigma_k - sigma| / sum |sigma_k|. An elastic joint has one
-    law; a rigid one has none, and so no residual. Beside a damper the torque of the springs may be zero where
-    nothing else is small, so that only a whole run says what residuals are to be measured against.
+    They are zero at infeasible and singular samples. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k|
+    and |sum sigma_k - sigma| / sum |sigma_k|; a rigid joint has no springs and no residual. With a parallel
+    damper the torque of the springs may pass zero while nothing else is small, so the torque residual is
+    returned unscaled, with its size: only the whole run has a scale for it.
     """
     springs, shafts, missing, sizes = [np.zeros_like(of_joints[0]["tau_e"])], [], [], []
     for joint, of_joint in zip(joints, of_joints, strict=True):
@@ -260,9 +267,9 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
 
 
 def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
-    """Errors of stiffness and torque of the springs, both scaled, and of the shafts.
+    """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
-    Beside a damper that of the torque is in N m, with its size, which is None elsewhere.
+    With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
     regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
     tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
@@ -291,8 +298,8 @@ def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:
 def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
     """Return the power of motors into springs, dampers and damping, and its rate, W, W/s.
 
-    It is the motors' power but for that of their inertia and of dry friction. Each (2, samples), NaN where
-    there is no motor.
+    It is the motor power without that of inertia and dry friction, which `energy` integrates separately. Each
+    (2, samples), NaN where there is no motor.
     """
     dtheta, ddtheta = of_joint["dtheta"], of_joint["ddtheta"]
     motors = [motor.damping for motor in joint.actuator.motors]
@@ -308,14 +315,14 @@ def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArra
 
 
 class _Moving(NamedTuple):
-    """A link frame, all in its own components.
+    """Motion of a link frame, in components of that frame.
 
     Attributes:
-        origin: from that of frame 0.
-        velocity: of the origin.
-        omega: angular velocity.
-        gravity: acceleration.
-        rotations: from frame 0 on.
+        origin: Vector from the origin of frame 0.
+        velocity: Velocity of the origin.
+        omega: Angular velocity.
+        gravity: Acceleration.
+        rotations: Rotations from frame 0 on.
     """
 
     origin: Vector
@@ -326,7 +333,7 @@ class _Moving(NamedTuple):
 
 
 def link_energy(robot: Robot, block: Block) -> FloatArray:
-    """Kinetic and potential energy of all links, (samples,), J."""
+    """Return the kinetic and potential energy of all links, (samples,), J."""
     energy = np.zeros(len(block.time))
     for joint, moving in zip(robot.joints, _link_motions(robot, block), strict=True):
         link = link_constants(joint)
@@ -341,9 +348,9 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
     """Return the powers that change `link_energy`: joints, losses between links, and the wrench; W.
 
     Args:
-        robot: the robot.
-        block: its variables.
-        frame: along whose axes the wrench is given; None if there is none.
+        robot: Robot.
+        block: Variables of the robot.
+        frame: Frame of the components of the wrench; None without a wrench.
     """
     powers = []
     for index, joint in enumerate(robot.joints):
@@ -376,7 +383,7 @@ def _link_motions(robot: Robot, block: Block) -> Iterator[_Moving]:
 
 
 def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:
-    """Power of the wrench on the end effector."""
+    """Return the power of the wrench on the end effector."""
     *_, last = _link_motions(robot, block)
     force, moment = Vector(*block.wrench.T[:3]), Vector(*block.wrench.T[3:])
     velocity = last.velocity + cross(last.omega, Vector(*robot.tool.xyz))

@@ -1,4 +1,4 @@
-"""Inputs and outputs of the recursion for a moving chain of links, with scalars of any kind."""
+"""Inputs and outputs of the recursion, with scalars of any kind."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ class LinkConstants(NamedTuple):
     """Constants of a joint and its link for the recursion; scalars of any kind.
 
     Attributes:
-        revolute: kind of the joint.
-        a: length of the Denavit-Hartenberg row.
-        cos_alpha: cosine of its twist.
-        sin_alpha: sine of its twist.
-        mass: mass of the augmented link.
-        com: its centre of mass, in the link frame.
-        inertia: its tensor about the centre of mass, link axes.
-        damping: viscous damping D of the joint.
+        revolute: Kind of the joint.
+        a: Length of the Denavit-Hartenberg row.
+        cos_alpha: Cosine of its twist.
+        sin_alpha: Sine of its twist.
+        mass: Mass of the augmented link.
+        com: Center of mass, in the link frame.
+        inertia: Inertia tensor about the center of mass, link axes.
+        damping: Viscous damping D of the joint.
     """
 
     revolute: bool
@@ -41,7 +41,7 @@ class TorqueDerivatives(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that damper and friction take."""
+    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque against damper and friction."""
 
     cos: Scalar
     sin: Scalar
@@ -51,13 +51,13 @@ class JointState(NamedTuple):
 
 
 class TipLoad(NamedTuple):
-    """The force and moment of the end effector on the environment, at a point of the last link.
+    """Force and moment of the end effector on the environment, at a point of the last link.
 
     Attributes:
-        force: its components and their first and second derivatives.
-        moment: as above, about that point.
-        point: from the origin of frame N, in frame N.
-        in_base: whether the components are along the axes of frame 0, else of frame N.
+        force: Force and its first and second derivatives.
+        moment: Moment about the point and its first and second derivatives.
+        point: Vector from the origin of frame N, in frame N.
+        in_base: Whether the components are along the axes of frame 0, else of frame N.
     """
 
     force: Sequence[Vector]
@@ -70,10 +70,10 @@ class Chain(NamedTuple):
     """A whole chain, base to tip.
 
     Attributes:
-        links: constants of each joint and link.
-        states: pose and motion of each joint.
-        gravity: gravity acceleration in frame 0, m/s^2.
-        tip: load of the end effector on the environment, if any; N and N m per s^k.
+        links: Constants of each joint and link.
+        states: Pose and motion of each joint.
+        gravity: Gravity acceleration in frame 0, m/s^2.
+        tip: Load of the end effector on the environment, if any; N and N m per s^k.
     """
 
     links: Sequence[LinkConstants]

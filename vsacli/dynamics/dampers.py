@@ -1,7 +1,7 @@
-"""Dampers whose damping is commanded, in the equations of motion of links and motors.
+"""Dampers with commanded damping, in the equations of motion of links and motors.
 
-Between the links a damper takes d q' of the joint's torque. Beside the springs it passes d (theta_k' - q')
-from each motor that a spring lies behind to the link, as the springs pass their torques.
+A damper between the links resists the joint with the torque d q'. A damper parallel to the springs transmits
+d (theta_k' - q') to the link from each motor with a spring, in addition to the torque of the spring.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from vsacli.robot.model import Robot
 
 
 def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
-    """D v and its first two derivatives.
+    """Return the torque d v of a damper and its first two derivatives.
 
     Args:
         damping: d, d', d''.
-        rates: the velocity v of the damper, v', v''; scalars of any kind.
+        rates: Velocity v of the damper, v', v''; scalars of any kind.
     """
     (d, d_d, dd_d), (v, dv, ddv) = damping, rates
     return TorqueDerivatives(
@@ -38,7 +38,7 @@ def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueD
 
 
 def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[Scalar]:
-    """Velocity of each damper of a joint, from its own and those of the deflections; or accelerations."""
+    """Return the velocity of each damper of a joint from dq and dphi; or accelerations."""
     if joint.damper_at("link"):
         return [dq]
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
@@ -58,7 +58,7 @@ def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArr
 
 
 class Passed(NamedTuple):
-    """Torques of dampers on the links, (..., joints), and against motors with springs, (..., springs)."""
+    """Torques of parallel dampers on the links, (..., joints), and against sprung motors, (..., springs)."""
 
     links: Scalar
     motors: Scalar
@@ -80,17 +80,14 @@ class Dampers:
     def of_links(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, ddq: Scalar = 0, d3q: Scalar = 0
     ) -> TorqueDerivatives:
-        """Return the torques of dampers between the links, with derivatives; exact zeros without any."""
+        """Return the torques of dampers between the links, with derivatives; exact zeros without dampers."""
         if not self._between_links.any():
             return TorqueDerivatives(0, 0, 0)
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
     def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
-        """Return the torques of dampers parallel to springs, at velocities of joints and of sprung motors.
-
-        Exact zeros if there is none.
-        """
+        """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
         if not self._beside.any():
             return Passed(0, 0)
         damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
@@ -100,7 +97,7 @@ class Dampers:
     def variables(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
     ) -> dict[str, FloatArray]:
-        """Result variables of the dampers by name, (..., joints); none if there are no dampers."""
+        """Return the result variables of the dampers by name, (..., joints); none if there are no dampers."""
         if self._absent.all():
             return {}
         damping = commanded[DAMPING.key]

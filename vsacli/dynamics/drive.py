@@ -1,6 +1,7 @@
-"""Actuation of a joint, (61)-(74): stiffness, motor motion and motor torques, whatever the kind of actuator.
+"""Actuation of a joint, (61)-(74): stiffness, motor motion and motor torques, for every kind of actuator.
 
-`driven_by` completes the variables that `Actuator.transmit` returns, `drive` adds the flags of limits.
+`Actuator.transmit` computes (61)-(68) and (70)-(72), `driven_by` adds (69) and (73)-(74), and `drive` the
+flags of limits.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ ACTUATED = (
 """Result variables of the actuation of every joint, in the order of their rows."""
 
 OF_DEVICES = ("tau_damper", *ELECTRICAL)
-"""Further ones of a joint with a damper, or with a motor that has a torque constant; they follow."""
+"""Further result variables, of joints with a damper or with a motor that has a torque constant."""
 
 
 def drive(
@@ -47,17 +48,17 @@ def drive(
     """Compute motor motion and motor torques of a joint, (61)-(74).
 
     Args:
-        joint: the joint with its actuator.
-        command: commanded motion and stiffness, and the elastic torque with its two derivatives.
-        near_singular: margin below which a step is near-singular.
-        integrated: deflections of a joint to use instead of the root of (14), (2, samples); a
-            step where they are NaN is infeasible.
-        internal: motion inside a transmission that is damped.
+        joint: Joint with its actuator.
+        command: Commanded motion and stiffness, and the elastic torque with its two derivatives.
+        near_singular: Margin below which a sample is near-singular.
+        integrated: Deflections to use instead of the root of (14), (2, samples); a sample where they are
+            NaN is infeasible.
+        internal: Internal motion of a damped transmission.
 
     Returns:
-        The variables `ACTUATED`, and those of `OF_DEVICES` that the joint has. Where a step is infeasible,
-        everything of the motors is NaN; where it is singular, everything that needs the inverse of the
-        decoupling matrix. A motor that the actuator does not have is NaN throughout.
+        The variables `ACTUATED`, and those of `OF_DEVICES` that the joint has. At infeasible samples all
+        motor variables are NaN; at singular samples those that need the inverse of the decoupling matrix. A
+        motor that the actuator does not have is NaN throughout.
     """
     driven = driven_by(joint, command, near_singular, integrated, internal)
     of_joint = {**command.arrays(), **driven}
@@ -73,10 +74,10 @@ def driven_by(
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
 ) -> OfJoint:
-    """Compute as `drive`, with the flags of reach alone; also with scalars that carry derivatives."""
+    """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
     if internal is None:
-        found = dict(actuator.transmit(command, near_singular, integrated))
+        found = dict(actuator.transmit(command, near_singular, integrated))  # (61)-(68), (70)-(72)
     else:
         from vsacli.actuators.damped_springs import DampedSprings
 
@@ -93,6 +94,7 @@ def driven_by(
         found |= windings.with_axis_behind().variables(tau_motor, dtheta)
     found["theta"] = actuator.motor_positions(found["phi"], command.q)  # (69)
     found |= {"dtheta": dtheta, "tau_motor": tau_motor, "motor_power": tau_motor * dtheta}
+    # Until here phi may include what a motor sets, such as a serial actuator's theta_2: no spring deflection.
     found |= {name: _published(actuator, found[name]) for name in ("phi", "dphi")}
     return {name: found[name] for name in (*ACTUATED, *(each for each in OF_DEVICES if each in found))}
 
@@ -112,7 +114,7 @@ def motor_torques(
 def _damper_torques(
     joint: Joint, command: Command, dphi: FloatArray
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return the torques of a damper on the link, (samples,), and against each motor, (2, samples)."""
+    """Return the damper torque on the link, (samples,), and on each motor, (2, samples); None if absent."""
     if joint.damper is None:
         return None, None
     damping = command.commanded[DAMPING.key]
@@ -124,18 +126,19 @@ def _damper_torques(
 
 
 def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
-    """B theta'', (2, samples)."""
+    """Return B theta'', (2, samples), with the coupling B_12 of the rotors."""
     own = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
     coupling = actuator.coupled_rotors
     return own + coupling * ddtheta[::-1] if coupling else own
 
 
 def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
-    """Return where a variable of the motors is not finite, and neither infeasible nor singular says why.
+    """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
-    A demand that is not finite is neither. By (69) and (73)-(74) every variable of a motor enters its
-    position or its power; singular steps have no power.
+    Samples with a demand that is not finite count, too.
     """
+    # Three variables suffice: by (69) and (73)-(74) every variable of a motor enters its position or its
+    # power. Singular samples have no power.
     theta, tau_spring, power = (
         finite(of_joint[name][: joint.actuator.motor_count])
         for name in ("theta", "tau_spring", "motor_power")
@@ -147,7 +150,7 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
 
 
 def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
-    """Return phi of the motors behind a spring; NaN for one that sets the springs."""
+    """Return phi of the motors behind a spring; NaN for a motor that adjusts the springs."""
     there = actuator.has(VARIABLES["phi"])[: actuator.motor_count]
     return phi if all(there) else np.where(np.array(actuator.has(VARIABLES["phi"]))[:, None], phi, np.nan)
 

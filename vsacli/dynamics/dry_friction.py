@@ -1,4 +1,4 @@
-"""Dry friction: smooth between two links, and sharp in motors, which stick and slide."""
+"""Dry friction in the equations of motion: smooth at joints, and sharp in motors, which stick and slip."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from vsacli.dynamics.chain import TorqueDerivatives
 
 
 def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> TorqueDerivatives:
-    """F tanh(q'/w) + F_o and its derivatives, of which tanh' = 1 - tanh^2.
+    """Return F tanh(q'/w) + F_o and its derivatives, with tanh' = 1 - tanh^2.
 
     Args:
-        friction: of the joint; None if there is none.
-        rates: q', q'', q''', q''''; scalars of any kind that has a tanh, integers where they are exact.
+        friction: Friction of the joint; None without friction.
+        rates: q', q'', q''', q''''; scalars of any kind with tanh; exact zeros are integers.
     """
     if friction is None:
         return TorqueDerivatives(0, 0, 0)
@@ -36,12 +36,12 @@ def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> Torque
 
 
 class Response(NamedTuple):
-    """Accelerations that follow from motor torques.
+    """Accelerations caused by motor torques.
 
     Attributes:
-        ddq: acceleration of the joints, (..., joints).
-        ddtheta: of the motors with springs, (..., springs).
-        friction: dry friction of all motors, (..., motors); None if none has any.
+        ddq: Acceleration of the joints, (..., joints).
+        ddtheta: Acceleration of the motors with springs, (..., springs).
+        friction: Dry friction of all motors, (..., motors); None without friction.
     """
 
     ddq: FloatArray
@@ -50,9 +50,8 @@ class Response(NamedTuple):
 
 
 Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
-"""Function from the torques of all motors (..., motors) and those held (None if none can be) to the
-accelerations of joints and of motors with springs, and to the torques that hold the held ones, (...,
-motors), 0 for others."""
+"""Function from the torques of all motors, (..., motors), and a mask of held motors (None if none can be
+held) to accelerations of joints and of sprung motors, and to holding torques, (..., motors), 0 for others."""
 
 
 def response_with_friction(
@@ -62,15 +61,15 @@ def response_with_friction(
     slip: FloatArray | None,
     balance: Balance,
 ) -> Response:
-    """Accelerations under motor torques and dry friction.
+    """Return the accelerations under motor torques and dry friction.
 
     Args:
-        laws: dry friction of all motors.
-        torque: of all motors, (..., motors).
-        velocity: of all motors, (..., motors).
-        slip: where friction is sharp the direction in which a motor slides, 0 while it is held, (motors,). If
-            None, a motor that rests is held as long as its friction can.
-        balance: accelerations without friction.
+        laws: Dry friction of all motors.
+        torque: Torques of all motors, (..., motors).
+        velocity: Velocities of all motors, (..., motors).
+        slip: Direction in which each motor with sharp friction slides, 0 while it is held, (motors,). If
+            None, a motor at rest is held as long as its friction suffices.
+        balance: Equations of motion without friction.
     """
 
     def under(direction: FloatArray) -> tuple[Response, FloatArray]:
@@ -86,5 +85,6 @@ def response_with_friction(
         return under(np.broadcast_to(slip, velocity.shape))[0]
     direction = direction_of(velocity)
     found, beyond = under(direction)
+    # A motor at rest whose holding torque exceeds its friction begins to slide in that direction.
     released = np.where(direction == 0, beyond, 0.0)
     return under(direction + released)[0] if released.any() else found

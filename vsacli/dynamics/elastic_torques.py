@@ -1,4 +1,8 @@
-"""Torques that the links demand of the joints, over blocks of samples."""
+"""Link torques tau_e, tau_e', tau_e'', (36)-(60), over blocks of samples.
+
+`LinkTorques` is the kernel: it assembles constants and states of the joints and runs the recursion.
+`link_torques` is the function for users.
+"""
 
 from __future__ import annotations
 
@@ -37,11 +41,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 TORQUES = ("tau_e", "dtau_e", "ddtau_e")
-"""Outputs of the recursion."""
+"""Outputs of the recursion, by name."""
 
 
 def link_constants(joint: Joint) -> LinkConstants:
-    """Constants of a joint for the recursion, with exact zeros and ones where the geometry has them."""
+    """Return the constants of a joint for the recursion; zeros and ones of the geometry are exact."""
     inertia = joint.link.inertia
     return LinkConstants(
         revolute=joint.is_revolute,
@@ -61,9 +65,9 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
     """Return the load of the end effector while the environment exerts a wrench on it.
 
     Args:
-        robot: whose base and tool count.
-        frame: along whose axes the components are, one of `vsacli.base.wrench.WRENCH_FRAMES`.
-        wrench: the six components, their first and their second derivatives; scalars of any kind.
+        robot: Robot with its base and tool.
+        frame: Frame of the components, one of `vsacli.base.wrench.WRENCH_FRAMES`.
+        wrench: Six components, their first and their second derivatives; scalars of any kind.
     """
     in_base = frame == "base"
     rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(robot.tool)
@@ -78,15 +82,15 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
 
 @dataclass(frozen=True)
 class LinkTorques(RowKernel):
-    """The recursion over rows of samples, for an engine.
+    """Kernel of the recursion over rows of samples, for an engine.
 
     Inputs are q, dq, ddq, d3q, d4q of the joints, the damping and its two derivatives if there are dampers
-    between the links, then the wrench and its two derivatives if there is one;
-    outputs are tau_e, dtau_e, ddtau_e of the joints.
+    between the links, then the wrench and its two derivatives if there is one. Outputs are tau_e, dtau_e,
+    ddtau_e of the joints.
 
     Attributes:
-        robot: the chain.
-        frame: of the wrench; None if there is none.
+        robot: Robot with the chain.
+        frame: Frame of the wrench; None without a wrench.
     """
 
     robot: Robot
@@ -94,14 +98,14 @@ class LinkTorques(RowKernel):
 
     @property
     def arguments(self) -> RowLayout:
-        """Rows that the recursion takes."""
+        """Layout of the input rows."""
         joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
         of_joints = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
         return RowLayout(dict.fromkeys(of_joints, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
 
     @property
     def results(self) -> RowLayout:
-        """Rows that the recursion gives."""
+        """Layout of the output rows."""
         return RowLayout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
@@ -110,7 +114,7 @@ class LinkTorques(RowKernel):
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
     def chain(self, rows: Sequence[Scalar]) -> Chain:
-        """Return the inputs of the recursion, from rows as of `arguments`."""
+        """Return the inputs of the recursion from rows in the layout of `arguments`."""
         given, joints = self.arguments.unpack(rows), self.robot.joints
         none = [0] * len(joints)
         dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
@@ -129,9 +133,9 @@ class ElasticTorques(NamedTuple):
     """Torques that the motion of the links requires of the joints, each ([samples,] joints), N m (N) per s^k.
 
     Attributes:
-        tau_e: total elastic torque (58).
-        dtau_e: its first derivative (59); None if d3q was not given.
-        ddtau_e: its second derivative (60); None if d4q was not given.
+        tau_e: Total elastic torque (58).
+        dtau_e: First derivative of tau_e (59); None if d3q was not given.
+        ddtau_e: Second derivative of tau_e (60); None if d4q was not given.
     """
 
     tau_e: FloatArray
@@ -153,31 +157,31 @@ def link_torques(
     dddamping: ArrayLike | None = None,
     engine: str | Engine = "numpy",
 ) -> ElasticTorques:
-    """Torques that the links demand of the joints, and their first two derivatives, (36)-(60).
+    """Compute the torques that the links require of the joints, with two derivatives, (36)-(60).
 
-    With q alone the robot holds still. A derivative of the torques is computed from what is given, never from
-    zeros in place of what is not: tau_e takes dq and ddq, dtau_e also d3q, ddtau_e also d4q.
+    With q alone the robot holds still. Otherwise missing derivatives of q are not replaced by zeros: tau_e
+    requires dq and ddq, dtau_e also d3q, ddtau_e also d4q.
 
     Args:
-        robot: the chain.
-        q: joint positions, ([samples,] joints), rad (m).
-        dq: their first derivative.
-        ddq: their second derivative.
-        d3q: their third derivative.
-        d4q: their fourth derivative.
-        wrench: what the environment exerts on the end effector, arrays ([samples,] 6); nothing if None.
-        damping: of the dampers between the links, of the shape of q; the least of their ranges if None.
-        ddamping: its first derivative; zero if None.
-        dddamping: its second derivative; zero if None.
-        engine: what computes, one of `vsacli.compute.engine.NAMES`, or one that was chosen before.
+        robot: Robot with the chain.
+        q: Joint positions, ([samples,] joints), rad (m).
+        dq: First derivative of q.
+        ddq: Second derivative of q.
+        d3q: Third derivative of q.
+        d4q: Fourth derivative of q.
+        wrench: Wrench of the environment on the end effector, arrays ([samples,] 6); zero if None.
+        damping: Damping of the dampers between the links, of the shape of q; their minimum if None.
+        ddamping: First derivative of the damping; zero if None.
+        dddamping: Second derivative of the damping; zero if None.
+        engine: Backend: one of `vsacli.compute.engine.NAMES`, or an engine chosen before.
 
     Returns:
-        tau_e, dtau_e, ddtau_e, each of the shape of q; None for those derivatives that lack their input.
+        tau_e, dtau_e, ddtau_e, each of the shape of q; None for derivatives whose input is missing.
 
     Raises:
-        InputError: an array has another shape than the joints of the robot ask for, or than `q` and the
-            wrench; a derivative of q is missing; there is no such engine, or no C compiler for it.
-        TypeError: robot or wrench is of another type.
+        InputError: The shape of an array does not fit the robot, or `q` and the wrench; a derivative of q is
+            missing; the engine is unknown, or there is no C compiler for it.
+        TypeError: Robot or wrench is of another type.
     """
     check_robot(robot)
     if wrench is not None:
@@ -198,7 +202,7 @@ def link_torques(
 
 
 def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
-    """Return the arrays there are, checked: of one shape, and none left out before the last."""
+    """Return the given arrays, checked: of one shape, without a missing derivative before the last."""
     given = [
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
     ]
@@ -250,13 +254,13 @@ def joint_state(
     rates: tuple[Scalar, Scalar, Scalar, Scalar],
     damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
 ) -> JointState:
-    """Pose and motion of a joint for the recursion.
+    """Return the pose and motion of a joint for the recursion.
 
     Args:
-        joint: the joint.
-        q: its position.
-        rates: the four derivatives of that.
-        damping: of its damper, with two derivatives; counts if that lies between the links.
+        joint: Joint.
+        q: Position of the joint.
+        rates: First to fourth derivative of q.
+        damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
     """
     dh = joint.dh
     resistance = link_resistance(joint, rates, damping)
@@ -268,7 +272,7 @@ def joint_state(
 
 
 def link_resistance(joint: Joint, rates: Sequence[Scalar], damping: Sequence[Scalar]) -> TorqueDerivatives:
-    """Return the torque of dry friction and of a damper between the links; arguments as of `joint_state`."""
+    """Return the torque of dry friction and of a damper between the links; arguments as for `joint_state`."""
     damper = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
     return TorqueDerivatives(*map(add, damper, joint_friction(joint.friction, rates)))
 

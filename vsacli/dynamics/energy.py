@@ -1,4 +1,8 @@
-"""Energy of a run: what motors, springs and links hold and exchange, and its integrals over time."""
+"""Energy of a run: work of the motors, elastic energy, co-contraction and losses, integrated over time.
+
+`IntervalEnergy` computes the energy that flows between two samples, `EnergyMeter` sums it up, `RunEnergy`
+runs both over the blocks of a run.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +27,21 @@ from vsacli.robot.model import Robot
 
 @dataclass(frozen=True)
 class JointEnergy(Stored):
-    """Energy of a joint over a run; but for the peak, NaN if the torques of a step do not exist.
+    """Energy of a joint over a run; except for the peak, NaN if the torques at a sample do not exist.
 
-    The torques of two springs split: tau_1^2 + tau_2^2 = tau_e^2/2 + (tau_1 - tau_2)^2/2. The first part
-    is the least with which two motors carry the load, half of it each. The second, co-contraction, moves
-    nothing: it is what the stiffness takes.
-
-    With other springs between the motors and the link, or between the motors, they do not split like this.
+    For two springs, tau_1^2 + tau_2^2 = tau_e^2/2 + (tau_1 - tau_2)^2/2. The first term is the minimum, with
+    which two motors carry half of the load each. The second, co-contraction, moves nothing and is required by
+    the stiffness. With other springs, or a spring between the motors, torques do not split like this.
 
     Attributes:
-        elastic_peak: largest energy in the springs, J, over the steps where it exists.
-        spent: integral of the positive part of each motor's power, summed over the motors, J.
-        recovered: that of the negative part, J; spent - recovered is the work of the motors.
-        co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
+        elastic_peak: Largest energy in the springs, J, over the samples at which it exists.
+        spent: Integral of the positive part of each motor's power, summed over the motors, J.
+        recovered: Integral of the negative part, J; spent - recovered is the work of the motors.
+        co_contraction: Root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
             torques do not split.
-        load: that of tau_e/2, as above.
-        dissipated: what friction and damping of joint and motors took, J; None if nothing has dry friction.
-        copper_loss: heat in the windings of its motors, J; None if no resistance is given.
+        load: Root mean square of tau_e/2, as above.
+        dissipated: Energy lost to friction and damping of joint and motors, J; None without dry friction.
+        copper_loss: Heat in the windings of the motors, J; None if no resistance is given.
     """
 
     elastic_peak: float
@@ -64,16 +66,16 @@ class JointEnergy(Stored):
 
 
 class Flow(NamedTuple):
-    """Energy that flows in consecutive intervals; of the motors (joints, 2, intervals), NaN where none is.
+    """Energy that flows in consecutive intervals; for motors (joints, 2, intervals), NaN for missing ones.
 
     Attributes:
-        intervals: their lengths, (intervals,), s.
-        work: of each motor, J.
-        spent: the positive part of that, J.
-        load: integral of (tau_1 + tau_2)^2/4, (joints, intervals).
-        co_contraction: integral of (tau_1 - tau_2)^2/4, as above.
-        dissipated: taken by friction and damping, (joints, intervals), J; None if there is no dry friction.
-        copper: heat in the windings, of the motors, J; None if it is not known.
+        intervals: Lengths of the intervals, (intervals,), s.
+        work: Work of each motor, J.
+        spent: Positive part of the work, J.
+        load: Integral of (tau_1 + tau_2)^2/4, (joints, intervals).
+        co_contraction: Integral of (tau_1 - tau_2)^2/4, (joints, intervals).
+        dissipated: Energy lost to friction and damping, (joints, intervals), J; None without dry friction.
+        copper: Heat in the windings of each motor, J; None if unknown.
     """
 
     intervals: FloatArray
@@ -93,12 +95,12 @@ class Efforts(NamedTuple):
 
 
 def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[FloatArray]) -> Efforts:
-    """Return the common and the opposing effort of two springs over intervals, by trapezoids.
+    """Return the common and the opposing effort of two springs over intervals, by the trapezoidal rule.
 
     Args:
-        interval: length, s.
-        before: torques of both springs.
-        after: the same at the end of the interval.
+        interval: Length, s.
+        before: Torques of both springs at the beginning of the interval.
+        after: Torques of both springs at its end.
     """
     (tau_1, tau_2), (next_1, next_2) = before, after
     return Efforts(
@@ -110,9 +112,9 @@ def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[
 
 
 class EnergyMeter:
-    """Sums up energy; `add` what flows and the energy in springs at the steps, then `report`.
+    """Sum of energy over a run: `add` flows, `add_stored` elastic energy, then `report`.
 
-    Sums run from interval to interval, so that they do not depend on how these are divided.
+    Terms are added interval by interval, so that rounding does not depend on the division into blocks.
     """
 
     def __init__(self) -> None:
@@ -122,11 +124,11 @@ class EnergyMeter:
         self._peak: FloatArray | float = math.nan
 
     def add(self, flow: Flow) -> FloatArray:
-        """Merge a flow; returns the work up to the end of each interval, in the place of `flow.work`."""
+        """Add a flow; return the work up to the end of each interval, which overwrites `flow.work`."""
         totals = {name: part for name, part in flow._asdict().items() if name != "work" and part is not None}
         self._layout = RowLayout({name: part.shape[:-1] for name, part in totals.items()})
         rows = np.concatenate([part.reshape(-1, len(flow.intervals)) for part in totals.values()])
-        columns = np.ascontiguousarray(rows.T)  # summed side by side, each from step to step
+        columns = np.ascontiguousarray(rows.T)  # so that NumPy adds one interval after the other
         columns[0] += self._totals
         self._totals = np.add.reduce(columns, axis=0)
         work = flow.work
@@ -136,11 +138,11 @@ class EnergyMeter:
         return work
 
     def add_stored(self, elastic_energy: FloatArray) -> None:
-        """Merge the energy in the springs at steps, (joints, samples), J."""
+        """Add the elastic energy at samples, (joints, samples), J, to the peak."""
         self._peak = np.fmax(self._peak, np.fmax.reduce(elastic_energy, axis=-1))
 
     def report(self, robot: Robot) -> list[JointEnergy]:
-        """Return the energy of each joint of a robot; something must have been added."""
+        """Return the energy of each joint of a robot; at least one flow must have been added."""
         there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
         totals = self._layout.arrays(np.asarray(self._totals))
         work, spent = (np.sum(total, axis=1, where=there) for total in (self._work, totals["spent"]))
@@ -171,25 +173,25 @@ def _copper(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | 
 
 
 def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
-    """Root of the mean over time; NaN if no time has passed."""
+    """Return the root of the mean over time; NaN if no time has passed."""
     return np.sqrt(integral / duration) if duration else np.full_like(integral, np.nan)
 
 
 AT_STEPS = ("dtheta", "motor_power", "tau_spring", "passed_power", "passed_rate")
-"""Variables that give the work of motors in an interval, from the samples at both its ends."""
+"""Variables from which the work of motors in an interval follows, at both its ends."""
 
 
 @dataclass(frozen=True)
 class IntervalEnergy(RowKernel):
-    """Energy that flows in intervals between steps, a row each, for an engine.
+    """Kernel of the energy that flows between samples; a sample of its rows is an interval.
 
-    The work of a motor is the integral of the power that it passes on, the change of B theta'^2/2, what dry
-    friction takes, and the work of another motor's acceleration on it.
+    The work of a motor is the sum of the integral of `passed_power`, the change of B theta'^2/2, the work of
+    dry friction, and the work by the acceleration of the other motor through B_12.
 
     Attributes:
-        inertia: of the motors of each joint.
-        coupling: the inertia B_12 of each joint.
-        rubbing: whether the work of dry friction is given.
+        inertia: Inertias of the motors of each joint.
+        coupling: Inertia B_12 of each joint.
+        rubbing: Whether the work of dry friction is an input.
     """
 
     inertia: tuple[tuple[float, ...], ...]
@@ -198,25 +200,25 @@ class IntervalEnergy(RowKernel):
 
     @property
     def at_steps(self) -> tuple[str, ...]:
-        """Names of what it takes at both ends of an interval."""
+        """Names of the input variables at both ends of an interval."""
         return (*AT_STEPS, "ddtheta") if any(self.coupling) else AT_STEPS
 
     @cached_property
     def arguments(self) -> RowLayout:
-        """The length of the interval, what there is before and after it, and the work of dry friction."""
+        """Layout of the input rows: length, variables before and after, and the work of dry friction."""
         motors = (len(self.inertia), SIDES)
         friction = {"friction": motors} if self.rubbing else {}
         return RowLayout({"interval": (), **dict.fromkeys(self.at_steps, (2, *motors)), **friction})
 
     @cached_property
     def results(self) -> RowLayout:
-        """See `Flow.results`."""
+        """Layout of the output rows, as in `Flow`."""
         joints = (len(self.inertia),)
         motors = dict.fromkeys(("work", "spent"), (*joints, SIDES))
         return RowLayout({**motors, **dict.fromkeys(("load", "co_contraction"), joints)})
 
     def __call__(self, rows: Sequence[Any]) -> list[Any]:
-        """Energy joint by joint."""
+        """Compute the energy joint by joint."""
         given = self.arguments.unpack(rows)
         (interval,) = given["interval"]
         friction = _by_joint(given["friction"]) if self.rubbing else [None] * len(self.inertia)
@@ -237,7 +239,7 @@ def _joint_flow(
     ends: Sequence[Mapping[str, Sequence[FloatArray]]],
     friction: Sequence[FloatArray] | None,
 ) -> tuple[list[FloatArray], list[FloatArray], Efforts]:
-    """Work of both motors of a joint, NaN of one that is not there, its positive part, and efforts."""
+    """Return work, positive work and efforts of both motors of a joint; NaN for a missing motor."""
     works = [np.full_like(interval, np.nan)] * SIDES
     for side, of_motor in enumerate(inertia):
         at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
@@ -264,11 +266,11 @@ def _at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
 
 
 class RunEnergy:
-    """The energy of a run of the inverse dynamics; `add` its blocks in order, then ask for the `report`.
+    """Energy of a run of the inverse dynamics; `add` its blocks in order, then call `report`.
 
     Args:
-        robot: the robot.
-        engine: the backend.
+        robot: Robot.
+        engine: Backend.
     """
 
     def __init__(self, robot: Robot, engine: Engine) -> None:
@@ -285,12 +287,13 @@ class RunEnergy:
         self._last: dict[str, list[FloatArray]] = {}
 
     def add(self, block: Block) -> FloatArray:
-        """Merge a block of `BalancedDynamics`; returns `motor_energy` at its steps, (samples, joints, 2)."""
+        """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2)."""
         steps = {name: contiguous_rows(getattr(block, name)) for name in ("time", *self._kernel.at_steps)}
         lost = None if self._losses is None else self._losses.add(block)
         first = _every(steps, slice(1))
         before = self._last or first
-        self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}  # no views
+        # Copies, since views would keep the whole block in memory.
+        self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}
         self._meter.add_stored(np.moveaxis(block.elastic_energy, 0, -1))
         works = [self._flown(before, first, lost and lost.taken(slice(1)))]
         if len(block.time) > 1:
@@ -299,7 +302,7 @@ class RunEnergy:
         return over_time(np.concatenate(works, axis=-1))
 
     def _flown(self, before: _Steps, after: _Steps, lost: Lost | None) -> FloatArray:
-        """Merge what flows from steps to the next ones; the work of motors until these."""
+        """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
         rows = {name: [*before[name], *after[name]] for name in self._kernel.at_steps}
         if lost is not None:
@@ -316,7 +319,7 @@ class RunEnergy:
 
 
 _Steps = Mapping[str, Sequence[FloatArray]]
-"""Rows (samples,) of variables at consecutive steps, by name."""
+"""Rows (samples,) of variables at consecutive samples, by name."""
 
 
 def _every(steps: _Steps, part: slice) -> dict[str, list[FloatArray]]:

@@ -1,4 +1,4 @@
-"""Forward dynamics: the motion that follows from motor torques, for any mixture of actuators."""
+"""Forward dynamics: accelerations from motor torques, (5), for any mixture of actuators."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class State:
     """Full state of a robot, at one instant or over samples; SI units.
 
     Attributes:
-        q, dq: position and velocity of the joints, ([samples,] joints).
-        theta, dtheta: position and velocity of the motors, joint side of the gear, ([samples,] joints, 2);
+        q, dq: Position and velocity of the joints, ([samples,] joints).
+        theta, dtheta: Position and velocity of the motors, joint side of the gear, ([samples,] joints, 2);
             ignored where there is no motor, and at a rigid drive, whose motor moves with the joint.
     """
 
@@ -47,15 +47,15 @@ class Rates(NamedTuple):
 
 
 def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
-    """Mass matrix M(q) of the links, without rotors, ([samples,] joints, joints).
+    """Compute the mass matrix M(q) of the links, without rotors, ([samples,] joints, joints).
 
     Args:
-        robot: the chain.
-        q: joint positions, ([samples,] joints), rad (m).
+        robot: Chain.
+        q: Joint positions, ([samples,] joints), rad (m).
 
     Raises:
-        InputError: q has another shape.
-        TypeError: robot is of another type.
+        InputError: The shape of q does not fit the robot.
+        TypeError: Robot is of another type.
     """
     check_robot(robot)
     return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
@@ -69,20 +69,20 @@ def state_derivative(
     *,
     damping: npt.ArrayLike | None = None,
 ) -> Rates:
-    """Time derivative of the full state under motor torques: (5) solved for q'' and theta''.
+    """Compute the time derivative of the full state under motor torques: (5) solved for q'' and theta''.
 
-    A motor that rests stays at rest as long as its dry friction without a width can hold it.
+    A motor at rest stays at rest as long as its sharp dry friction (width 0) can hold it.
 
     Args:
-        robot: the robot.
-        state: its state, at one instant or over samples.
-        tau_motor: torque of each motor, ([samples,] joints, 2), N m (N), joint side of the gear.
-        wrench: what the environment exerts on the end effector meanwhile, arrays ([samples,] 6).
-        damping: of the dampers of the joints, ([samples,] joints); the least of their ranges if None.
+        robot: Robot.
+        state: State of the robot, at one instant or over samples.
+        tau_motor: Torque of each motor, ([samples,] joints, 2), N m (N), joint side of the gear.
+        wrench: Wrench of the environment on the end effector, arrays ([samples,] 6).
+        damping: Damping of the dampers, ([samples,] joints); their minimum if None.
 
     Raises:
-        InputError: shapes that do not fit, or a mass matrix that is not positive definite.
-        TypeError: robot or state is of another type.
+        InputError: Shapes do not fit, or the mass matrix is not positive definite.
+        TypeError: Robot or state is of another type.
     """
     check_robot(robot)
     if wrench is not None:
@@ -104,13 +104,13 @@ class Plant:
     """A robot prepared for fast evaluation of its equations of motion.
 
     Args:
-        robot: the robot.
-        frame: of the wrench at the end effector; None if there is none.
+        robot: Robot.
+        frame: Frame of the wrench at the end effector; None without a wrench.
 
     Attributes:
-        chain: its links and joints.
-        drivetrain: its motors and springs.
-        dampers: those whose damping is commanded.
+        chain: Links and joints.
+        drivetrain: Motors and springs.
+        dampers: Dampers with commanded damping.
     """
 
     def __init__(self, robot: Robot, frame: str | None = None) -> None:
@@ -123,11 +123,11 @@ class Plant:
         self._damping = self.drivetrain.damping[self.drivetrain.sprung]
 
     def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """q, q' of the joints and theta, theta' of the motors with springs.
+        """Return q, q' of the joints and theta, theta' of the motors with springs.
 
         Raises:
-            InputError: a part has another shape than the robot's.
-            TypeError: state is of another type.
+            InputError: a part of the state has a shape that does not fit the robot.
+            TypeError: State is of another type.
         """
         check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
         joints = len(self.drivetrain.present)
@@ -152,20 +152,20 @@ class Plant:
         commanded: Mapping[str, FloatArray],
         slip: FloatArray | None = None,
     ) -> Response:
-        """Accelerations of the joints and of the motors with springs, by (5).
+        """Compute the accelerations of the joints and of the motors with springs, by (5).
 
-        A motor with sharp friction that rests stays at rest as long as its friction can hold it.
+        A motor with sharp friction at rest stays at rest as long as its friction can hold it.
 
         Args:
-            q: position of the joints, (..., joints).
-            dq: their velocity.
-            theta: position of the motors with springs, (..., springs).
-            dtheta: their velocity.
-            torque: of all motors, (..., motors).
-            wrench: what the environment exerts, if the plant was made for one.
-            commanded: the damping, by name, (..., joints); counts if there are dampers.
-            slip: where friction is sharp the direction in which a motor slides, 0 while it is held,
-                (motors,); if None, a motor that rests is held as long as its friction can.
+            q: Position of the joints, (..., joints).
+            dq: Velocity of the joints.
+            theta: Position of the motors with springs, (..., springs).
+            dtheta: Velocity of the motors with springs.
+            torque: Torques of all motors, (..., motors).
+            wrench: Wrench of the environment, if the plant was made for one.
+            commanded: Damping, by name, (..., joints); counts if there are dampers.
+            slip: Direction in which each motor with sharp friction slides, 0 while it is held, (motors,).
+                If None, a motor at rest is held as long as its friction suffices.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
         damper = self.dampers.passed(commanded, dq, dtheta)
@@ -188,7 +188,7 @@ class Plant:
     def _balanced(
         self, matrix: FloatArray, on_joints: FloatArray, on_motors: FloatArray, held: BoolArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Accelerations under forces on joints and on motors with springs; see `Balance`."""
+        """Return the accelerations under torques on joints and on motors with springs; see `Balance`."""
         rotors = self.drivetrain.rotors
         if held is None or not held.any():
             still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
@@ -205,13 +205,13 @@ class Plant:
     def link_torque(
         self, dq: FloatArray, ddq: FloatArray, tau_e: FloatArray, torque: FloatArray
     ) -> FloatArray:
-        """tau_e (6), (..., joints); of a rigid drive what its motor leaves after moving itself.
+        """Return tau_e (6), (..., joints); for a rigid drive the motor torque minus that of its own rotor.
 
         Args:
-            dq: velocity of the joints, (..., joints).
-            ddq: their acceleration.
-            tau_e: of the springs, (..., joints), 0 where there are none.
-            torque: of all motors less their dry friction, (..., motors).
+            dq: Velocity of the joints, (..., joints).
+            ddq: Acceleration of the joints.
+            tau_e: Torques of the springs, (..., joints), 0 where there are none.
+            torque: Torques of all motors minus their dry friction, (..., motors).
         """
         of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
         return tau_e + self.drivetrain.direct(torque) - of_rotors

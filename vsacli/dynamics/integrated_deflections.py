@@ -1,7 +1,7 @@
-"""Deflections that follow the root of the first step: (19)-(20) integrated, instead of (14) solved anew.
+"""Deflections by integration of (19)-(20) from the root of (14) at the first sample.
 
-Buondonno & De Luca (2016), III-B, who warn of the drift. The pieces between breakpoints of the trajectory are
-integrated by SciPy's DOP853, up to the first joint that cannot be integrated further.
+Buondonno & De Luca (2016), III-B, warn of the drift. SciPy's DOP853 integrates the pieces between breakpoints
+of the trajectory, all joints together; where a joint cannot be integrated further, the others are restarted.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
 
 
 def integrable(joint: Joint) -> bool:
-    """Return whether deflections of a joint can be integrated by (19); behind a damper they already are."""
+    """Return whether (19) applies to a joint; with a parallel damper, deflections are integrated anyway."""
     return joint.actuator.integrable and joint.damper_at("transmission") is None
 
 
 class Task:
-    """A robot and what it is asked to do; deflections are (joints, 2, samples).
+    """A robot and its commanded motion; deflections are (joints, 2, samples).
 
     Attributes:
-        trajectory: the commanded motion.
-        joints: those whose deflections can be integrated.
+        trajectory: Commanded motion.
+        joints: Joints whose deflections can be integrated, by index.
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
@@ -60,13 +60,13 @@ class Task:
         self.joints = tuple(self._actuators)
 
     def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
-        """Roots of (14) of some joints."""
+        """Return the roots of (14) of some joints."""
         return np.stack(
             [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
         )
 
     def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
-        """Rates of the deflections of some joints, (19)."""
+        """Return the rates of the deflections of some joints, (19)."""
         return np.stack(
             [
                 actuator.deflection_rates(of_joint, command)
@@ -75,7 +75,7 @@ class Task:
         )
 
     def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
-        """Why the deflections of some joints cannot be integrated there: indices into `REASONS`."""
+        """Return why deflections of some joints cannot be integrated at times: indices into `REASONS`."""
         return np.stack(
             [
                 _hindrances(actuator, command, of_joint)
@@ -96,7 +96,7 @@ def _root(actuator: Actuator, command: Command) -> PairSolution:
 
 
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
-    """Singular is, too, where det A has another sign than on the joint's branch: it was zero before."""
+    """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
     solution = _root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
@@ -105,23 +105,23 @@ def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.ND
 
 
 MOST_PIECES = 500
-"""Pieces into which a trajectory is divided at its breakpoints; recordings have more of them."""
+"""Largest number of pieces into which a trajectory is divided; recordings have more breakpoints."""
 
 ROUGH_TOLERANCE = 1e-6
-"""Smallest tolerance of pieces with breakpoints inside. A tighter one would fight in vain the rounding of the
-spline's third derivative, 1e-16 over the cube of the sample distance. Pieces are so short that the drift of
-smooth recordings is far smaller."""
+"""Smallest tolerance of pieces with breakpoints inside. A tighter one is out of reach because of rounding in
+the spline's third derivative, 1e-16 over the cube of the sample distance. Pieces are so short that the drift
+of smooth recordings is far smaller."""
 
 CHECKS = 64
-"""Times at which each step is checked, and into which the search for the end of the course divides it."""
+"""Number of times in an integrator step at which a joint is checked; the search for the end divides by it."""
 
 
 class Pieces(NamedTuple):
-    """The pieces of a trajectory that are integrated one after the other.
+    """Pieces of a trajectory that are integrated one after the other.
 
     Attributes:
-        ends: ascending, s.
-        tolerance: relative error admitted in an integration step.
+        ends: Ends of the pieces, ascending, s.
+        tolerance: Relative tolerance of the integrator.
     """
 
     ends: FloatArray
@@ -129,7 +129,7 @@ class Pieces(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, tolerance: float) -> Pieces:
-        """Between all breakpoints if they are not too many, else between some of them."""
+        """Return the pieces between all breakpoints, or between some of them if they are too many."""
         ends = trajectory.breakpoints[1:]
         if len(ends) <= MOST_PIECES:
             return cls(ends, tolerance)
@@ -138,19 +138,19 @@ class Pieces(NamedTuple):
 
 
 class Integration:
-    """The deflections of some joints from a start on.
+    """Integration of the deflections of some joints from a start time, until one of them stops.
 
     Args:
-        task: what they are asked to do.
-        joints: their indices.
-        pieces: of the whole trajectory.
-        start: time of the deflections, s.
-        phi: deflections, (joints, 2).
+        task: Robot and motion.
+        joints: Indices of the joints.
+        pieces: Pieces of the whole trajectory.
+        start: Time of the deflections, s.
+        phi: Deflections, (joints, 2).
 
     Attributes:
-        joints: as given.
-        times: ends of the steps.
-        stopped: why each joint that ended the integration cannot be integrated beyond the last of `times`.
+        joints: Indices of the joints.
+        times: Ends of the integrator's steps, s.
+        stopped: Reasons of the joints that ended the integration at the last of `times`, by index.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class Integration:
         self._steps: list[DenseOutput] = []
         self._tolerance = pieces.tolerance
         self._smallest = float(np.abs(phi).max(axis=1).min())
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # in steps that are refused
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # in rejected steps
             self._run(pieces.ends[pieces.ends > start].tolist(), phi.ravel())
 
     def solution(self) -> OdeSolution:
@@ -219,7 +219,7 @@ class Integration:
         return right
 
     def _fastest(self, integrator: DOP853[np.float64]) -> int:
-        """Return the joint with the fastest relative change of deflections, which makes the steps short."""
+        """Return the joint with the fastest relative change of deflections: it makes the steps short."""
         phi = integrator.y
         speed = np.abs(self._rates(float(integrator.t), phi)) / np.abs(phi)
         return self.joints[int(np.nan_to_num(speed, nan=np.inf).argmax()) // 2]
@@ -231,7 +231,7 @@ def by_joint(state: FloatArray) -> FloatArray:
 
 
 TOLERANCE = 1e-12
-"""Relative error admitted in an integration step; the drift is about as large."""
+"""Relative tolerance of the integrator; the drift is about as large."""
 
 
 @dataclass(frozen=True)
@@ -242,16 +242,16 @@ class _Course:
     solution: OdeSolution
 
     def deflections(self, time: FloatArray) -> FloatArray:
-        """(joints, 2, samples)."""
+        """Return the deflections, (joints, 2, samples)."""
         return by_joint(self.solution(time))
 
 
 @dataclass(frozen=True)
 class IntegratedDeflections:
-    """Deflections along a trajectory, as `integrate_deflections` found them.
+    """Deflections along a trajectory, from `integrate_deflections`.
 
     Attributes:
-        stops: for each joint, where its way ends before the trajectory does.
+        stops: For each joint, the time at which its integration ends before the trajectory, or None.
     """
 
     stops: tuple[Stop | None, ...]
@@ -259,9 +259,9 @@ class IntegratedDeflections:
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Deflections of all joints at any times of the span, (joints, 2, samples).
+        """Return the deflections of all joints at times within the trajectory, (joints, 2, samples).
 
-        NaN from a stop on, and at joints whose stiffness is not commanded.
+        NaN from a stop on, and for joints whose stiffness is not commanded.
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start
@@ -279,16 +279,16 @@ class IntegratedDeflections:
 def integrate_deflections(
     robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE
 ) -> IntegratedDeflections:
-    """Integrate phi' = A(phi)^-1 (tau_e', sigma') (19) from the root of (14) at the first step.
+    """Integrate phi' = A(phi)^-1 (tau_e', sigma') (19) from the root of (14) at the first sample.
 
-    The smooth functions of the trajectory count; derivatives given with samples play no part. The integration
-    of a joint ends where A becomes singular or its stiffness cannot be reached; the other joints go on. Only
-    kinds of actuator that are `integrable` have deflections to integrate.
+    The integration uses the smooth functions of the trajectory and ignores derivatives given with samples.
+    For a joint it ends where A becomes singular or the stiffness is unattainable; the other joints continue.
+    Only kinds of actuator that are `integrable` have deflections to integrate.
 
     Args:
-        robot: the robot.
-        trajectory: the commanded motion.
-        tolerance: relative error admitted in an integration step, at least 1e-13.
+        robot: Robot.
+        trajectory: Commanded motion.
+        tolerance: Relative tolerance of the integrator, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     task = Task(robot, trajectory)

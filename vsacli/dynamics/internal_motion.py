@@ -1,8 +1,9 @@
-"""Internal motion of transmissions with a damper: states of the inverse, integrated along a trajectory.
+"""Internal motion of transmissions with a damper: states of the inverse dynamics, integrated over time.
 
-Collocation at Radau's points solves the implicit differential equation in cells of time. Radau IIA methods
-are L-stable and stiffly accurate (Hairer & Wanner, Solving Ordinary Differential Equations II, IV.5), so that
-a fast motion that has died away does not shorten the cells; their polynomial is the dense output.
+Collocation at Radau points solves the implicit differential equation d w = tau_l - T in cells of time. Radau
+IIA methods are L-stable and stiffly accurate (Hairer & Wanner, Solving Ordinary Differential Equations II,
+IV.5): a fast motion that has decayed does not shorten the cells, whose polynomial is the dense output.
+`internal_motions` marches each joint through the trajectory; `actuators.damped_springs` has the equations.
 """
 
 from __future__ import annotations
@@ -26,17 +27,17 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 STAGES = 12
-"""Stages of a cell: with 12, half a second from rest to rest is exact to rounding in some forty cells."""
+"""Stages per cell: with 12, half a second from rest to rest is exact to rounding in about 40 cells."""
 
 
 class _Rule(NamedTuple):
     """Collocation in the cell [-1, 1].
 
     Attributes:
-        nodes: (stages,), the last at 1.
-        to_coefficients: of Chebyshev's polynomials, from values at -1 and at the nodes.
-        through_nodes: the same from values at the nodes alone.
-        slopes: derivatives at the nodes from values at -1 and at the nodes.
+        nodes: Nodes, (stages,), the last at 1.
+        to_coefficients: Matrix from values at -1 and the nodes to coefficients of Chebyshev polynomials.
+        through_nodes: Matrix from values at the nodes alone to coefficients.
+        slopes: Derivatives at the nodes from values at -1 and at the nodes.
     """
 
     nodes: FloatArray
@@ -57,7 +58,7 @@ def _rule(stages: int) -> _Rule:
 
 
 class Collocation:
-    """The rule, ready for use."""
+    """The collocation rule, scaled to cells of time."""
 
     def __init__(self, stages: int = STAGES) -> None:
         self._rule = _rule(stages)
@@ -67,23 +68,23 @@ class Collocation:
         return start + (end - start) / 2 * (1 + self._rule.nodes)
 
     def slopes(self, start: float, end: float) -> FloatArray:
-        """Rates at the nodes from values at the start and at the nodes, (stages, stages + 1), 1/s."""
+        """Return the matrix from values at start and nodes to rates at nodes, (stages, stages + 1), 1/s."""
         return self._rule.slopes * (2 / (end - start))
 
     def coefficients(self, values: FloatArray) -> FloatArray:
-        """Return the polynomial with these values at the start and at the nodes, (..., stages + 1)."""
+        """Return the coefficients from values at the start and at the nodes, (..., stages + 1)."""
         return values @ self._rule.to_coefficients.T
 
     def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
-        """Return the polynomial with these values at the nodes, (..., stages)."""
+        """Return the coefficients from values at the nodes, (..., stages)."""
         return values @ self._rule.through_nodes.T
 
 
 class Piecewise:
-    """A function in cells, each with the coefficients of Chebyshev's polynomials.
+    """A piecewise polynomial, with coefficients of Chebyshev polynomials in each cell.
 
     Args:
-        ends: of the cells, ascending, (cells + 1,), s.
+        ends: Ends of the cells, ascending, (cells + 1,), s.
         coefficients: (cells, rows, degree + 1).
     """
 
@@ -102,39 +103,39 @@ class Piecewise:
 
 
 FIRST_CELLS = 8
-"""Cells that a trajectory is divided into at first; those that a polynomial does not fit are halved."""
+"""Number of cells of a trajectory at first; cells that a polynomial does not fit are halved."""
 
 RESOLVED = 1e-14
-"""Share of the largest deflection that the last coefficients of a polynomial may have: rounding."""
+"""Size of the last coefficients of a polynomial, relative to the largest deflection, that is rounding."""
 
 LEAST_SHARE, LEAST_SPREAD = 1e-6, 1e-9
 """Smallest scale of a spread: as a share of the largest deflection, and in rad (m)."""
 
 TOLERATED, GAIN = 1e-9, 4.0
-"""Below, halving twice must lower that share by this factor to be worth another one: else it is noise of the
-trajectory itself, whose knots may lie denser than the cells."""
+"""Share below which a cell is halved again only if two halvings lowered it by the factor `GAIN`. Otherwise
+it is noise of the trajectory itself, whose knots may be denser than the cells."""
 
 HALVINGS = 20
-"""Bisections to the end of a motion that cannot go on, exact to a millionth of a first cell."""
+"""Largest number of halvings; they locate the end of a motion to a millionth of a first cell."""
 
 LAYER = 4.0
-"""Largest cell, in time constants, where the demand begins anew: a fast decay there could hide in a longer
-one, whose polynomial passes over it."""
+"""Largest cell, in time constants, at a breakpoint of the demand: the polynomial of a longer one could miss a
+fast decay there."""
 
 FAST = 100.0
-"""Time constants of a cell from which the polynomial of the spread gives better rates than the equation.
+"""Time constants of a cell above which rates come from the polynomial of the spread, not from the equation.
 
-By that rounding makes them wrong by eps T/d, by the polynomial by some eps spread STAGES^2 2/duration, which
-is less beyond 288 time constants; for the next derivative beyond 170.
+The equation has the rounding error eps T/d, the polynomial about eps spread STAGES^2 2/duration, which is
+smaller beyond 288 time constants, and for the next derivative beyond 170.
 """
 
 NEWTON_STEPS = 20
-"""Mostly five are taken."""
+"""Largest number of Newton steps; five are usual."""
 
 CONVERGED = 1e-12
-"""Step, relative to the spread, after which the next one, which is quadratic in it, is rounding.
+"""Step relative to the spread after which the next, which is quadratic in it, is rounding.
 
-Where the load passes zero, so does the spread, and is rounding itself: there, relative to that of the peak
+Where the load passes zero, the spread is rounding itself; the step is then relative to the spread of the peak
 torque.
 """
 
@@ -142,17 +143,17 @@ LOST, SINGULAR = (
     "its springs cannot have the stiffness at the deflection that the damper has let through",
     "the stiffness does not determine the second motor any more",
 )
-"""Why it cannot go on."""
+"""Reasons why a motion ends."""
 
 
 class Marched(NamedTuple):
-    """The motion inside as functions of time.
+    """An internal motion as functions of time.
 
     Attributes:
-        phi: deflections, (2, samples), up to where they go; None if they go nowhere.
+        phi: Deflections, (2, samples), up to `end`; None if the motion ends at once.
         rates: w and its derivative, (2, samples), as above.
-        end: up to which time, s.
-        reason: why not further; None at the end of the trajectory.
+        end: End of the motion, s.
+        reason: Reason of the end; None at the end of the trajectory.
     """
 
     phi: Piecewise | None
@@ -162,14 +163,14 @@ class Marched(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """The solution of a cell, at its start and nodes, or at its nodes alone.
+    """Solution in a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
-        phi: deflections, (2, 1 + stages).
+        phi: Deflections, (2, 1 + stages).
         rates: w and its derivative by the equation, (2, stages).
-        torque: the largest that is asked of the joint.
-        damping: the largest.
-        constants: the time constants that the cell lasts.
+        torque: Largest |tau_e| in the cell.
+        damping: Largest damping in the cell.
+        constants: Duration of the cell in its smallest time constant.
     """
 
     phi: FloatArray
@@ -180,13 +181,13 @@ class _Solution(NamedTuple):
 
 
 class _Cell(NamedTuple):
-    """A cell that is still to be solved.
+    """A cell to be solved.
 
     Attributes:
-        left, right: its ends, s.
-        new: whether the demand sets in anew where it begins.
-        shares: of the last coefficients in the cells that it is a half and a quarter of, the latter first.
-        halved: how often it was halved.
+        left, right: Ends of the cell, s.
+        new: Whether the cell begins at a breakpoint of the demand.
+        shares: Shares of the last coefficients two halvings and one halving before.
+        halved: Number of halvings.
     """
 
     left: float
@@ -196,7 +197,7 @@ class _Cell(NamedTuple):
     halved: int = 0
 
     def halves(self, share: float) -> tuple[_Cell, _Cell]:
-        """Left and right."""
+        """Return the left and the right half."""
         middle = (self.left + self.right) / 2
         return (
             _Cell(self.left, middle, self.new, (self.shares[1], share), self.halved + 1),
@@ -205,18 +206,18 @@ class _Cell(NamedTuple):
 
 
 class March:
-    """Solves d w = tau_l - T from deflections at the start on.
+    """Solver of d w = tau_l - T, cell after cell, from initial deflections.
 
     Args:
-        springs: of the joint.
-        demand: what the joint is asked to do at times (samples,), s.
+        springs: Springs of the joint.
+        demand: Function from times (samples,), s, to the command of the joint.
     """
 
     def __init__(self, springs: DampedSprings, demand: Callable[[FloatArray], Command]) -> None:
         self._springs, self._demand, self._rule = springs, demand, Collocation()
 
     def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
-        """Return the whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
+        """Return the motion from deflections (2, 1); the demand is smooth between adjacent `ends`, s."""
         ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
         peaks = _Peaks(self._springs, self._demand(ends), phi)
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
@@ -242,7 +243,7 @@ class March:
         return Marched(*_joined(ended, solved), ended[-1], None)
 
     def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
-        """Coefficients of deflections and rates; the latter by the equation, in fast cells derivatives."""
+        """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         from numpy.polynomial import chebyshev
 
         phi = self._rule.coefficients(found.phi)
@@ -254,12 +255,12 @@ class March:
         return phi, np.stack((first, second))
 
     def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
-        """Deflections in a cell from those at its start, by Newton's method; or why there are none.
+        """Return deflections in a cell from those at its start, by Newton's method, or a reason of failure.
 
         Args:
-            cell: where.
-            start: deflections (2, 1).
-            peak: torque so far, N m (N).
+            cell: Cell to solve.
+            start: Deflections (2, 1).
+            peak: Torque so far, N m (N).
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
@@ -292,17 +293,18 @@ class March:
 
 
 class _Peaks:
-    """The largest numbers so far, which the last coefficients are measured by.
+    """Largest values so far, as scales of the last coefficients.
 
-    A motion from rest begins with torques that are nothing but rounding, so these are looked at beforehand.
+    A motion from rest begins with torques that are only rounding, so torques at the ends of the first cells
+    are included from the start.
 
     Args:
-        springs: of the joint.
-        demand: at the ends of the first cells.
-        start: deflections at the first of them.
+        springs: Springs of the joint.
+        demand: Commands at the ends of the first cells.
+        start: Deflections at the first end.
 
     Attributes:
-        torque: N m (N).
+        torque: Largest torque, N m (N).
     """
 
     def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
@@ -331,7 +333,7 @@ def _largest(values: FloatArray) -> float:
 def _joined(
     ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[Piecewise | None, Piecewise | None]:
-    """Deflections and rates over all cells."""
+    """Return the deflections and rates over all cells."""
     if not solved:
         return None, None
     phi, rates = (Piecewise(np.array(ended), np.stack(each)) for each in zip(*solved, strict=True))
@@ -340,11 +342,11 @@ def _joined(
 
 @dataclass(frozen=True)
 class InternalMotions:
-    """The motion inside each damped transmission; joints whose damping is zero all the time have none.
+    """Internal motions of damped transmissions; a joint whose damping is always zero has none.
 
     Attributes:
-        joints: indices of those that have one.
-        stops: for each of these whose motion ends before the trajectory does, where.
+        joints: Indices of the joints with an internal motion.
+        stops: Time and reason, by joint, if the motion ends before the trajectory does.
     """
 
     joints: tuple[int, ...]
@@ -353,12 +355,12 @@ class InternalMotions:
 
     @property
     def breakpoints(self) -> FloatArray:
-        """Ends of the pieces, from the first step on, s: short where what moves inside dies away."""
+        """Ends of the cells, s after the first sample; cells are short where an internal motion decays."""
         ends = [each.phi.ends for each in self._marched.values() if each.phi is not None]
         return np.unique(np.concatenate([np.zeros(0), *ends]))
 
     def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
-        """Return the motion of each joint at times from the first step on; NaN from a stop on."""
+        """Return the motion of each joint at times, s after the first sample; NaN from a stop on."""
         return {joint: self._at(joint, elapsed) for joint in self.joints}
 
     def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
@@ -372,9 +374,9 @@ class InternalMotions:
 
 
 def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
-    """Integrate what moves inside the damped transmissions of a robot, from the first step to the last.
+    """Integrate the internal motions of a robot's damped transmissions over the trajectory.
 
-    The smooth functions of the trajectory count; derivatives given with samples play no part.
+    The integration uses the smooth functions of the trajectory and ignores derivatives given with samples.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     joints = damped_joints(robot, trajectory)
@@ -398,21 +400,22 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
-    """Return the joints with a damper parallel to their springs that is not at zero all the time."""
+    """Return the joints with a damper parallel to their springs whose damping is not always zero."""
     chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
     if not chosen:
         return ()
+    # The first sample decides: `with_devices` refuses a damping that is zero only somewhere.
     damping = trajectory.block(0, 1).commanded[DAMPING.key][0]
     return tuple(index for index in chosen if damping[index])
 
 
 def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:
-    """Refuse what looks at steps one by one, where a step depends on all before.
+    """Raise an error in work on single samples if a transmission is damped, where samples depend on the past.
 
     Args:
-        robot: the robot.
-        trajectory: fitted to the robot.
-        work: what refuses, a plural.
+        robot: Robot.
+        trajectory: Fitted to the robot.
+        work: Subject of the message, a plural.
 
     Raises:
         InputError: a transmission is damped.
@@ -426,7 +429,7 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
 
 
 class _Demand:
-    """The demand on joints over time, which remembers earlier times."""
+    """Commands of joints over time; joints share the recursion's pass at the times of a cell."""
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
         self._robot, self._trajectory = robot, trajectory

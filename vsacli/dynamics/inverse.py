@@ -1,4 +1,8 @@
-"""All variables of a block of steps: recursion, then actuation joint by joint."""
+"""Inverse dynamics of a block of samples, (36)-(74): the recursion, then the actuation joint by joint.
+
+`InverseDynamics` is the kernel that an engine runs on rows of samples; `block_of` packs a motion into its
+rows, and the results into a `Block`. Before that, `fitted` checks a trajectory for a robot.
+"""
 
 from __future__ import annotations
 
@@ -42,18 +46,21 @@ COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 
 
 INTERNAL = ("internal_phi", "internal_velocity", "internal_acceleration")
-"""Rows of the motion inside damped transmissions, as the fields of `InternalMotion`."""
+"""Names of the rows of internal motion in damped transmissions, in the order of `InternalMotion`."""
 
 
 def usual_block(joints: int) -> int:
-    """Steps computed at a time: one pass of NumPy's, which hides the interpreter and bounds the memory."""
+    """Return the usual number of samples in a block: one pass of the NumPy engine.
+
+    Long enough to hide the time of the interpreter, short enough to bound the memory.
+    """
     signals = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
     return samples_per_pass(joints * sum(signal.orders for signal in signals))
 
 
 @dataclass(frozen=True)
 class Stop(Stored):
-    """The time, s, from which the deflections of a joint cannot be integrated, and the reason."""
+    """Time, s, from which the deflections of a joint cannot be integrated, and the reason."""
 
     time: float
     reason: str
@@ -63,18 +70,18 @@ class Stop(Stored):
 class InverseDynamics(RowKernel):
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
-    Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, then the
-    deflections if they are integrated; outputs the variables of `COMPUTED` one after the other.
+    Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, deflections
+    if they are integrated, and internal motion. Outputs are the variables of `COMPUTED`, in that order.
 
     Attributes:
-        robot: the robot.
-        frame: of the wrench; None if there is none.
-        near_singular: margin below which a step is near-singular.
-        integrated: whether deflections are given, else they are solved for.
-        internal: the joints whose transmission is damped, by index: what moves inside them is given.
-        driven: whether of that the deflections alone are given, and their rates follow from the damping.
-        limits: those of each joint, since springs compare equal whatever their limits.
-        block: what holds its results.
+        robot: Robot whose motion is computed.
+        frame: Frame of the wrench; None without a wrench.
+        near_singular: Margin below which a sample is near-singular.
+        integrated: Whether deflections are inputs; otherwise (14) is solved for them.
+        internal: Joints with damped transmissions, by index; their internal motion is an input.
+        driven: Whether only the internal deflections are inputs; their rates then follow from the damping.
+        limits: Limits of each joint; a field, since springs compare equal whatever their limits.
+        block: Class of the blocks that hold the results.
     """
 
     block: ClassVar[type[Block]] = Block
@@ -93,12 +100,12 @@ class InverseDynamics(RowKernel):
 
     @property
     def links(self) -> LinkTorques:
-        """The recursion alone."""
+        """Kernel of the recursion alone."""
         return LinkTorques(self.robot, self.frame)
 
     @property
     def arguments(self) -> RowLayout:
-        """Rows that inverse dynamics takes."""
+        """Layout of the input rows."""
         joints = len(self.robot.joints)
         names = (name for signal in self.robot.signals for name in signal.names)
         commanded = dict.fromkeys(names, (joints,))
@@ -110,11 +117,11 @@ class InverseDynamics(RowKernel):
 
     @cached_property
     def results(self) -> RowLayout:
-        """Rows that inverse dynamics gives."""
+        """Layout of the output rows."""
         return RowLayout(self.shapes())
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of its variables at one instant, by name."""
+        """Return the shapes of the computed variables at one instant, by name."""
         joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
         return {
             variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
@@ -124,12 +131,13 @@ class InverseDynamics(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
+        # `BalancedDynamics`, the kernel of a run, overrides `rows_of` to append the rows of the self-check.
         return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
 
     def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
         """Return the variables of each joint by name, without those that it does not have."""
         links, given = self.links, self.arguments.unpack(rows)
-        demanded = links(rows[: links.inputs])
+        demanded = links(rows[: links.inputs])  # (36)-(60); `arguments` begins with the inputs of `links`
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
         of_all = {**given, **torques}
         names = Command.names(signal.key for signal in self.robot.signals)
@@ -138,6 +146,7 @@ class InverseDynamics(RowKernel):
             command = Command.of({name: of_all[name][index] for name in names})
             phi = np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None
             internal = self._internal(index, given)
+            # Computes drive(joint, ...), (61)-(74). `call` lets equal joints share one recorded body.
             driving = behind_link(drive, joint, self.limits[index])
             driven = call(rows[0], driving, command, self.near_singular, phi, internal)
             found.append({**command.arrays(), **driven})
@@ -148,7 +157,7 @@ class InverseDynamics(RowKernel):
         return found
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """Return the rows of each result by name, from kernel arguments and variables of the joints."""
+        """Return the rows of each result by name, from the input rows and the variables of the joints."""
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
         return {
             name: rows_of_joints(
@@ -159,7 +168,7 @@ class InverseDynamics(RowKernel):
         }
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
-        """Return the internal motion of a joint, if its transmission is damped."""
+        """Return the internal motion of a joint; None unless its transmission is damped."""
         if index not in self.internal:
             return None
         from vsacli.actuators.damped_springs import InternalMotion
@@ -171,26 +180,28 @@ class InverseDynamics(RowKernel):
 
 
 def _check_limits(limits: Sequence[LimitCheck], of_joint: OfJoint) -> None:
-    """Refuse a limit on a variable that no joint computes, which would be skipped without a word."""
+    """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
     for check in limits:
         if check.variable not in of_joint:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
 def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:
-    """Wrap `function(joint, ...)` so that name, DH row and link do not count when joints are compared.
+    """Wrap `function(joint, ...)` so that `call` records one body for joints with equal actuators.
+
+    Name, DH row and link of the joint are ignored in the comparison.
 
     Args:
-        function: takes the joint first.
-        joint: the joint.
-        further: keys to compare in addition.
+        function: Function whose first argument is the joint.
+        joint: Joint to bind to it.
+        further: Keys to compare in addition.
     """
     counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
     return Keyed((function, *counting, *further), partial(function, joint))
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
-    """Return a torque as a row of samples; the recursion gives a plain zero for joints that move nothing."""
+    """Return a torque as a row of samples; the recursion gives the integer 0 for joints that move no mass."""
     return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
 
 
@@ -201,16 +212,16 @@ def compute_block(
     engine: Engine = NUMPY,
     internal: Mapping[int, InternalMotion] | None = None,
 ) -> Block:
-    """Inverse dynamics (36)-(74) of a block of steps.
+    """Compute the inverse dynamics (36)-(74) of a block of samples.
 
     Args:
-        robot: the robot.
-        motion: commanded motion and stiffness, (samples, joints); the actuators that take no stiffness
-            have a stiffness of their own, or none.
-        near_singular: margin below which a step is near-singular.
-        engine: the backend.
-        internal: what moves inside the transmissions that are damped, by index of the joint; if None, all of
-            them are where their springs carry the joint alone, or where their damper is said to start.
+        robot: Robot whose motion is computed.
+        motion: Commanded motion and stiffness, (samples, joints); actuators without a commanded stiffness
+            have their own, or none.
+        near_singular: Margin below which a sample is near-singular.
+        engine: Backend.
+        internal: Internal motion of the damped transmissions, by index of the joint; if None, each is at the
+            declared start of its damper, or else where its springs carry the joint alone.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal
@@ -229,18 +240,19 @@ def block_of(
     """Return the variables that a kernel of inverse dynamics computes for a block of samples.
 
     Args:
-        kernel: what is computed, and in which block it comes.
-        motion: as of `compute_block`.
-        engine: the backend.
-        integrated: deflections of the joints, if the kernel takes them, (joints, 2, samples); a step where
-            they are NaN is infeasible.
-        internal: what moves inside the joints that the kernel names.
+        kernel: Kernel to run; it names the class of the block.
+        motion: Commanded motion, as for `compute_block`.
+        engine: Backend.
+        integrated: Deflections, (joints, 2, samples), if they are inputs of the kernel; a sample where they
+            are NaN is infeasible.
+        internal: Internal motion of the joints in `kernel.internal`, by index and in that order.
     """
     robot = kernel.robot
     given = {name: array for name, array in motion.variables().items() if robot.has(VARIABLES[name])}
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if integrated is not None:
         rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
+    # All joints' deflections, then all velocities, then all accelerations, as in `arguments`.
     for name, values in zip(INTERNAL, zip(*internal.values(), strict=True), strict=False):
         of_joints = np.concatenate(values) if name == INTERNAL[0] else np.stack(values)
         rows[name] = np.ascontiguousarray(of_joints)
@@ -251,7 +263,7 @@ def block_of(
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
-    """Return the start of motions in damped transmissions, with rates, by index of the joint."""
+    """Return the initial internal motion of damped transmissions, with rates, by index of the joint."""
     damped = {
         index: joint
         for index, joint in enumerate(robot.joints)
@@ -277,7 +289,7 @@ def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
 
 
 def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
-    """tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints); the stiffness plays no part."""
+    """Return tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints)."""
     damping: dict[str, Any] = {
         name: motion.commanded[name] for name in DAMPING.names if name in motion.commanded
     }
@@ -287,11 +299,11 @@ def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
 
 
 def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
-    """Return a trajectory for a robot: the same, with what its devices do that are not commanded.
+    """Return the trajectory with uncommanded dampers of the robot at their minimum, after checks.
 
     Raises:
-        InputError: it has another number of joints than the robot, or lacks a stiffness that one takes.
-        TypeError: one of both is of another type.
+        InputError: The numbers of joints differ, or a stiffness that a joint needs is missing.
+        TypeError: Robot or trajectory is of another type.
     """
     check_robot(robot)
     remedy = "load_trajectory({}, robot) reads one; it comes after the robot"
@@ -315,6 +327,6 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
 
 
 def command_of(index: int, commanded: Mapping[str, FloatArray]) -> Command:
-    """Return the part of one joint in variables by name, each (samples, joints)."""
+    """Return the command of one joint from variables by name, each (samples, joints)."""
     names = (name for name in Command.names(COMMANDED) if name in commanded)
     return Command.of({name: commanded[name][:, index] for name in names})

@@ -1,4 +1,4 @@
-"""The limits of a joint: its own, and those of its actuator."""
+"""Limits of a joint, including those of its actuator, and the flags where they are exceeded."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vsacli.robot.joint import Joint
 
 
 def limit_checks(joint: Joint) -> list[LimitCheck]:
-    """Return the limits that a joint has."""
+    """Return the finite limits of a joint."""
     limits = joint.limits
     checks = [
         LimitCheck(Flag.POSITION_LIMIT, "q", None, limits.position),
@@ -28,9 +28,9 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
 
 
 def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
-    """Return the flags, (samples,), and those of all limits of a joint on variables that are given.
+    """Return `flags`, (samples,), with the bits of all limits on variables that are given.
 
-    Of variables whose standard deviations are given, too, limits count beyond what these allow.
+    Where the standard deviation of a variable is given, its limit is exceeded only beyond the allowance.
     """
     for check in limit_checks(joint):
         if check.variable in of_joint:
@@ -41,7 +41,7 @@ def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
 def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
     """Return the samples at which standard deviations decide whether limits are exceeded, (samples,).
 
-    Something is beyond a limit there, but nothing by more than is allowed at most.
+    A value is beyond a limit there, but none by more than the largest allowance.
     """
     beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=np.uint32)
     for check in limit_checks(joint):

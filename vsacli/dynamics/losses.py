@@ -1,4 +1,4 @@
-"""Losses: power that friction, dampers and windings dissipate, and its quadrature over time."""
+"""Losses: power dissipated by friction, dampers and windings, and its quadrature over time."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from vsacli.robot.model import Robot
 
 
 def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> FloatArray:
-    """Time integral over each interval, by the cubic with the values and rates at its ends; error O(h^5).
+    """Return the time integral over each interval of the cubic with these values and rates; error O(h^5).
 
     Args:
-        intervals: lengths h, (samples - 1,), s.
-        values: of the integrand, (..., samples).
-        rates: its derivative, as above.
+        intervals: Lengths h, (samples - 1,), s.
+        values: Integrand, (..., samples).
+        rates: Derivative of the integrand, (..., samples).
     """
     before, after = ((values[..., part], rates[..., part]) for part in (slice(None, -1), slice(1, None)))
     return integral(intervals, before, after)
@@ -32,7 +32,7 @@ def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> F
 def integral(
     interval: FloatArray, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """Return the same of single intervals, from value and rate before and after each."""
+    """Return `integrals` of single intervals, from value and rate before and after each."""
     (value, rate), (next_value, next_rate) = before, after
     return ((rate - next_rate) * (interval / 6) + next_value + value) * (interval / 2)
 
@@ -40,15 +40,15 @@ def integral(
 def work_on_each_other(
     interval: FloatArray, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """Integral of each motor's velocity times the acceleration of the other over each interval, (2, ...).
+    """Integrate each motor's velocity times the acceleration of the other over each interval, (2, ...).
 
-    By the cubics with the velocities and accelerations at the ends; error O(h^5). The sum of both is the
-    difference of theta_1' theta_2', as it must be.
+    The integrand is that of the cubics with the velocities and accelerations at the ends; error O(h^5). The
+    sum of both integrals is exactly the change of theta_1' theta_2'.
 
     Args:
-        interval: length h, s.
-        before: velocities and accelerations of both motors, each (2, ...).
-        after: the same at the end of the interval.
+        interval: Length h, s.
+        before: Velocities and accelerations of both motors at the beginning, each (2, ...).
+        after: Velocities and accelerations at the end.
     """
     (begin, rise), (end, rise_after) = before, after
     rise, rise_after = interval * rise, interval * rise_after
@@ -64,12 +64,12 @@ def work_on_each_other(
 
 
 def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:
-    """Time integral of the positive part of a power over each interval.
+    """Return the time integral of the positive part of a power over each interval.
 
     Args:
-        intervals: lengths h, (samples - 1,), s.
-        power: (..., samples); where it changes its sign in an interval it is taken for linear, error O(h^3).
-        work: its integral over each interval, (..., samples - 1); no positive part is less.
+        intervals: Lengths h, (samples - 1,), s.
+        power: Power, (..., samples); linear in intervals in which it changes its sign, error O(h^3).
+        work: Integral of the power over each interval, (..., samples - 1), a lower bound of the result.
     """
     return positive_work(np.broadcast_to(intervals, work.shape), power[..., :-1], power[..., 1:], work)
 
@@ -77,7 +77,7 @@ def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) ->
 def positive_work(
     interval: FloatArray, before: FloatArray, after: FloatArray, work: FloatArray
 ) -> FloatArray:
-    """Return the same of single intervals, from the power before and after each; arrays of one shape."""
+    """Return `positive_part` of single intervals, from the power before and after; arrays of one shape."""
     positive = np.maximum(work, 0.0)
     (found,) = where_needed(before * after < 0, _linear, (interval, before, after, positive), (positive,))
     return found
@@ -86,31 +86,31 @@ def positive_work(
 def _linear(
     interval: FloatArray, before: FloatArray, after: FloatArray, positive: FloatArray
 ) -> tuple[FloatArray]:
-    """Return a power that changes its sign, where that exceeds the given one."""
+    """Return the positive work of a linear power that changes its sign, at least the given one."""
     low, high = np.minimum(before, after), np.maximum(before, after)
     return (np.maximum(interval / 2 * high**2 / (high - low), positive),)
 
 
 def trapezoids(intervals: FloatArray, values: FloatArray) -> FloatArray:
-    """Time integral over each interval of what is linear in it; error O(h^3)."""
+    """Return the time integral over each interval of a piecewise linear function; error O(h^3)."""
     integral: FloatArray = intervals / 2 * (values[..., 1:] + values[..., :-1])
     return integral
 
 
 MOTION = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")
-"""Variables that losses follow from."""
+"""Variables from which losses follow."""
 
 DAMPED = ("damping", "ddamping", "dphi")
-"""The same of dampers."""
+"""Variables from which losses in dampers follow."""
 
 
 def dissipated_power(joint: Joint, motion: Mapping[str, Any]) -> FloatArray:
-    """Power that friction and damping of a joint and its motors take, (samples,), W.
+    """Return the power dissipated by friction and damping of a joint and its motors, (samples,), W.
 
     Args:
-        joint: the joint with its actuator.
-        motion: `dq`, (samples,), and `dtheta`, (2, samples), among other variables of the joint; of one with
-            a damper `damping` and `dphi` as well.
+        joint: Joint with its actuator.
+        motion: Variables of the joint by name: `dq`, (samples,), and `dtheta`, (2, samples), among others;
+            for a joint with a damper also `damping` and `dphi`.
     """
     power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion["dq"])
     for velocity in damper_velocities(joint, motion["dq"], motion["dphi"]) if joint.damper else ():
@@ -129,12 +129,12 @@ def _taken(damping: float, friction: FrictionLaws | None, velocity: FloatArray) 
 
 
 class Lost(NamedTuple):
-    """Energy that is lost in intervals between steps, J.
+    """Energy lost in the intervals between samples, J.
 
     Attributes:
-        motor_friction: to dry friction of each motor, (joints, 2, intervals).
-        dissipated: to all friction and damping of each joint, (joints, intervals).
-        copper: to the windings of each motor, (joints, 2, intervals); None if no resistance is given.
+        motor_friction: Energy lost to dry friction of each motor, (joints, 2, intervals).
+        dissipated: Energy lost to all friction and damping of each joint, (joints, intervals).
+        copper: Heat in the windings of each motor, (joints, 2, intervals); None without a resistance.
     """
 
     motor_friction: FloatArray
@@ -142,13 +142,13 @@ class Lost(NamedTuple):
     copper: FloatArray | None
 
     def taken(self, intervals: slice) -> Lost:
-        """Return the same of some of the intervals."""
+        """Return the losses in a slice of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
         return Lost(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
 
 
 class LossMeter:
-    """Finds what is lost between steps; `add` blocks in order."""
+    """Losses between samples, block by block; `add` blocks in order."""
 
     def __init__(self, robot: Robot) -> None:
         sides = [side for joint in robot.joints for side in joint.actuator.sides]
@@ -173,7 +173,7 @@ class LossMeter:
         return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
 
     def between(self, rows: Mapping[str, FloatArray]) -> Lost:
-        """Return the losses from sample to sample, from variables by name, samples last."""
+        """Return the losses from sample to sample, from variables by name with samples on the last axis."""
         intervals = np.diff(rows["time"])
         of_motors = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
         of_joints = [rows[name] for name in ("q", "dq", "ddq")]
@@ -218,7 +218,7 @@ def _friction_work(
     velocity: FloatArray,
     acceleration: FloatArray,
 ) -> FloatArray:
-    """Return the work of friction: integrated for smooth laws, size times path for the sign function."""
+    """Return the work of friction: integrated for smooth laws, torque times path for sharp ones."""
     way = np.diff(position)
     if laws is None:
         return np.zeros_like(way)

@@ -1,7 +1,8 @@
 """The recursion of Buondonno & De Luca (2016), (36)-(60): link torques and their first two derivatives.
 
-Written once, on vectors of arbitrary scalars: floats, NumPy rows of samples, complex numbers, fractions,
-symbols. Given cos and sin of each joint angle (and the offset d of prismatic joints) it is a polynomial.
+`forward` runs (36)-(51) from base to tip, `backward` (52)-(60) from tip to base. Scalars are of any kind:
+floats, NumPy rows of samples, complex numbers, fractions, symbols. Given cos and sin of each joint angle (and
+the offset d of prismatic joints) the recursion is a polynomial in its inputs.
 
 Every quantity of frame k is a derivative taken in the base frame, written in components of frame k.
 """
@@ -46,7 +47,7 @@ class _PointRates(NamedTuple):
 
 
 class _Slide(NamedTuple):
-    """Terms of the sliding of a prismatic joint in p', and in (40), (42), (44)."""
+    """Terms of a prismatic joint's offset d(t) in p', and in (40), (42), (44)."""
 
     dp: Vector
     a: Vector
@@ -58,7 +59,17 @@ _NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
 
 
 class Body(NamedTuple):
-    """Quantities of link k for the backward pass."""
+    """Quantities of link k for the backward pass.
+
+    Attributes:
+        rotation: Rotation between frames k-1 and k.
+        z: Axis z of frame k-1, in frame k.
+        frame: Motion of frame k.
+        p: Vector from origin k-1 to origin k, p', p''.
+        c: Vector from origin k to the center of mass, c', c''.
+        force: Inertial force and its derivatives, (46)-(48).
+        moment: Inertial moment and its derivatives, (49)-(51).
+    """
 
     rotation: Rotation
     z: Vector
@@ -72,7 +83,7 @@ class Body(NamedTuple):
 class _Reaction(NamedTuple):
     """Force f and moment n of link k-1 on link k, with their derivatives f', f'', n', n''.
 
-    Beyond the last link, of that link on the environment.
+    For k = N + 1, force and moment of the last link on the environment.
     """
 
     f: tuple[Vector, Vector, Vector]
@@ -91,10 +102,10 @@ def recursion(
     """Run (36)-(60) once over a chain.
 
     Args:
-        links: constants of each joint and link, base to tip.
-        states: pose and motion of each joint, in the same order.
-        gravity: gravity acceleration in frame 0, m/s^2.
-        tip: load of the end effector on the environment, if any; N and N m per s^k.
+        links: Constants of each joint and link, base to tip.
+        states: Pose and motion of each joint, in the same order.
+        gravity: Acceleration of gravity in frame 0, m/s^2.
+        tip: Load of the end effector on the environment, if any; N and N m per s^k.
 
     Returns:
         tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.
@@ -103,14 +114,15 @@ def recursion(
 
 
 def base_frame(gravity: Vector) -> Frame:
-    """Frame 0, which rises against gravity, so that all bodies bear it."""
+    """Return frame 0 at rest, with the acceleration -g that stands for gravity (IV-A)."""
     return Frame(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
 
 
 def forward(links: Sequence[LinkConstants], states: Sequence[JointState], previous: Frame) -> list[Body]:
-    """Run (36)-(51) over the rest of a chain, beyond a frame whose motion is known."""
+    """Run (36)-(51) from a frame whose motion is known to the tip."""
     bodies = []
     for link, state in zip(links, states, strict=True):
+        # Computes _forward(link, state, previous); `call` lets links of equal structure share one body.
         body: Body = call(state.rates[0], _forward, link, state, previous)
         previous = body.frame
         bodies.append(body)
@@ -120,7 +132,7 @@ def forward(links: Sequence[LinkConstants], states: Sequence[JointState], previo
 def backward(
     links: Sequence[LinkConstants], states: Sequence[JointState], bodies: Sequence[Body], tip: TipLoad | None
 ) -> list[TorqueDerivatives]:
-    """Run (52)-(60) over a whole chain; arguments and result as of `recursion`."""
+    """Run (52)-(60) from tip to base; arguments and result as for `recursion`."""
     torques: list[TorqueDerivatives] = []
     beyond = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
     for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
@@ -153,12 +165,14 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
         frame=frame,
         p=(p, v_p.first + slide.dp, v_p.second + slide.a),
         c=(link.com, v_c.first, v_c.second),
+        # (46)-(51) belong to the paper's backward pass, but do not depend on other links.
         force=(a_c * link.mass, j_c * link.mass, s_c * link.mass),  # (46)-(48)
         moment=_euler(link.inertia, angular),
     )
 
 
 def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _Angular) -> _Angular:
+    # omega to varsigma of frame k-1, theta' z0 to theta'''' z0. `undo` is R^T, from frame k-1 to k.
     w, g, i, s = previous
     t1z, t2z, t3z, t4z = (Z0 * rate for rate in turning)
     w_t1z, g_t1z = cross(w, t1z), cross(g, t1z)
@@ -175,6 +189,7 @@ def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _An
 
 
 def _fixed_point(angular: _Angular, r: Vector) -> _PointRates:
+    # Derivatives of r' = omega x r, each from those before; expanded, the terms of (41), (43), (45).
     w, g, i, s = angular
     first = cross(w, r)
     second = cross(g, r) + cross(w, first)
@@ -209,7 +224,7 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
 
 
 def _tip_reaction(tip: TipLoad, bodies: Sequence[Body]) -> _Reaction:
-    """f+, n+ of the last link and their derivatives, about the origin of frame N."""
+    """Return f_N+1, n_N+1 and their derivatives, about the origin of frame N, in frame N."""
     angular = bodies[-1].frame.angular
     if tip.in_base:
         rotations = [body.rotation for body in bodies]
@@ -234,7 +249,7 @@ def _into_last_frame(rotations: Sequence[Rotation], v: Vector) -> Vector:
 
 
 def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
-    """Derivatives in the base frame of a vector whose components in a turning frame are u(t)."""
+    """Return a vector with components u(t) in a rotating frame, and its derivatives in the base frame."""
     w, g = angular.omega, angular.gamma
     w_u = cross(w, u)
     return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
@@ -243,7 +258,7 @@ def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vec
 def _backward(
     link: LinkConstants, state: JointState, body: Body, beyond: _Reaction, of_base: bool
 ) -> tuple[TorqueDerivatives, _Reaction]:
-    """Return the torque of a joint, and what its link demands of the one before, if that is not the base."""
+    """Return the torque of a joint, and the reaction on its link in frame k-1; zero if that is the base."""
     reaction = _reaction(body, beyond)
     torque = _project(link, state, body, reaction)
     return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)
@@ -254,6 +269,7 @@ def _reaction(body: Body, tip: _Reaction) -> _Reaction:
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
 
+    # `tip` holds the reaction on link k+1, already in frame k.
     f = tip.f[0] + force  # (52)
     df = tip.f[1] + dforce  # (53)
     ddf = tip.f[2] + ddforce  # (54)
@@ -275,6 +291,7 @@ def _project(link: LinkConstants, state: JointState, body: Body, reaction: _Reac
     q1, q2, q3, _ = state.rates
     tau = add(x.dot(z), mul(link.damping, q1))  # (58)
     dtau = add((dx + x_w).dot(z), mul(link.damping, q2))  # (59)
+    # `along=z` drops the components of the products that the inner product with z does not need.
     ddx_turned = ddx + cross(dx, w, along=z) * 2 + cross(x, g, along=z) + cross(x_w, w, along=z)
     ddtau = add(ddx_turned.dot(z), mul(link.damping, q3))  # (60)
     return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))

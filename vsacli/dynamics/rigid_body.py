@@ -1,6 +1,6 @@
-"""The dynamics of the bare chain, solved for motion: M(q), n(q, q'), and the terms of (35) and (60).
+"""The dynamics of the chain of links without drives: M(q), n(q, q'), and the terms of (35) and (60).
 
-Each is a program recorded from the recursion (36)-(60), so that a single sample costs microseconds.
+Each is a program traced from the recursion (36)-(60), so that a single sample takes microseconds.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
 
 SMALLEST_PIVOT = 1e-12
-"""Pivot of M, relative to the diagonal entry, below which there is no mass but only rounding."""
+"""Smallest pivot of M, relative to the diagonal entry; a smaller one is rounding of a missing mass."""
 
 
 class Chain:
-    """Programs of a chain of joints, each recorded when it is first needed; get it from `chain_of`.
+    """Programs of a chain of joints, each traced at first use; use `chain_of` to obtain one.
 
     Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
     made for one.
@@ -61,7 +61,7 @@ class Chain:
         return _torque_program(self._robot, self._frame, "ddtau", orders=4)
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
-        """M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
+        """Return M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
         row, column = self._lower
         entries = self._inertia(q)
         matrix = np.empty_like(q, shape=(*q.shape, q.shape[-1]))
@@ -69,13 +69,13 @@ class Chain:
         return matrix
 
     def bias(self, q: FloatArray, dq: FloatArray, wrench: Wrench | None) -> FloatArray:
-        """n(q, q') of (34): gravity, centrifugal and Coriolis torques, damping, wrench; N m (N)."""
+        """Return n(q, q') of (34): gravity, centrifugal and Coriolis torques, damping, wrench; N m (N)."""
         return self._bias(q, dq, *_derivatives(wrench, 0))
 
     def torque_rate(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray, wrench: Wrench | None
     ) -> FloatArray:
-        """M' q'' + n' of (35): the recursion's tau_e' at q''' = 0."""
+        """Return M' q'' + n' of (35): the recursion's tau_e' at q''' = 0."""
         return self._rate(q, dq, ddq, *_derivatives(wrench, 1))
 
     def torque_acceleration(
@@ -87,18 +87,18 @@ class Chain:
         d4q: FloatArray,
         wrench: Wrench | None,
     ) -> FloatArray:
-        """tau_e'' (60)."""
+        """Return tau_e'' (60)."""
         return self._acceleration(q, dq, ddq, d3q, d4q, *_derivatives(wrench, 2))
 
     def solve(self, matrix: FloatArray, torque: FloatArray) -> FloatArray:
-        """matrix^-1 torque, for M(q) or what rigid drives make of it.
+        """Return matrix^-1 torque, for M(q) or its extension by rigid drives.
 
         Args:
             matrix: ([samples,] joints, joints), symmetric.
             torque: ([samples,] joints).
 
         Raises:
-            InputError: the matrix is not positive definite; names the first joint whose leading minor fails.
+            InputError: The matrix is not positive definite; names the first joint whose leading minor fails.
                 A traced program gives NaN instead.
         """
         if isinstance(matrix, TracedArray):
@@ -132,12 +132,12 @@ def _derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
 
 
 def _solve_positive_definite(matrix: Any, right: Any, smallest_pivot: float) -> Any:
-    """matrix^-1 right, by L D L^T without pivoting; NaN where the matrix is not positive definite.
+    """Return matrix^-1 right, by L D L^T without pivoting; NaN where the matrix is not positive definite.
 
     Args:
         matrix: (n, n), symmetric.
         right: (n,).
-        smallest_pivot: relative to the diagonal entry, below which a pivot of D counts as not positive.
+        smallest_pivot: Relative to the diagonal entry, below which a pivot of D counts as not positive.
     """
     size = len(right)
     lower: dict[tuple[int, int], Any] = {}
@@ -168,7 +168,7 @@ def _subtracted(value: Any, terms: list[Any]) -> Any:
 
 
 def _last_pivot(matrices: FloatArray) -> float:
-    """Smallest last pivot of matrices whose other pivots are positive, relative to their last entry."""
+    """Return the smallest last pivot, relative to the last entry, of matrices with other pivots positive."""
     factors = np.linalg.solve(matrices[..., :-1, :-1], matrices[..., :-1, -1:])
     pivots = matrices[..., -1, -1] - (matrices[..., -1:, :-1] @ factors)[..., 0, 0]
     entries = matrices[..., -1, -1]
@@ -176,17 +176,17 @@ def _last_pivot(matrices: FloatArray) -> float:
 
 
 def chain_of(robot: Robot, frame: str | None = None) -> Chain:
-    """Return the programs of a robot's links and joints; recorded once for equal chains.
+    """Return the programs of a robot's links and joints; equal chains share them.
 
     Args:
-        robot: whose base and tool count, but neither its actuators nor its dampers.
-        frame: of the wrench at the end effector, as in `Wrench`; None if there is none.
+        robot: Robot; its actuators and dampers are ignored.
+        frame: Frame of the wrench at the end effector, as in `Wrench`; None without a wrench.
     """
     return _recorded(bare(robot), frame)
 
 
 def bare(robot: Robot) -> Robot:
-    """Return the links and joints alone, which are equal for robots that differ only in drives."""
+    """Return the robot with a common placeholder for its drives, so that equal chains compare equal."""
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
     return Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints)
@@ -201,7 +201,7 @@ def _recorded(robot: Robot, frame: str | None) -> Chain:
 
 
 def _inertia_program(robot: Robot) -> StateFunction:
-    """Lower triangle of M, row by row; an offset of friction has no part in it."""
+    """Return the program of the lower triangle of M, row by row; friction offsets are left out."""
     robot = replace(robot, joints=tuple(replace(joint, friction=None) for joint in robot.joints))
     tape = Tape()
     q = tape.inputs(len(robot.joints))

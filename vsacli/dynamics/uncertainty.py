@@ -1,9 +1,9 @@
-"""Uncertainty of everything that follows from recorded signals, by propagation to first order.
+"""Uncertainty of result variables that depend on recorded signals, propagated to first order.
 
-Covariances C of recorded signals give what is computed from them the variance g C g', with g its gradient by
-the signals (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives
-of one component are correlated, components are independent of each other. Gradients are differences over one
-standard deviation to both sides, all of them one batch of samples for the kernel that computes the motion.
+With the covariance C of recorded signals, a variable with the gradient g over these has the variance g C g'
+(JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives of one
+component are correlated; components are independent of each other. Gradients are differences over one
+standard deviation to both sides, computed as one batch of samples by the kernel of the run.
 """
 
 from __future__ import annotations
@@ -31,32 +31,32 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
 
 MARGIN = "margin"
-"""Name of the margin of the stiffness, which has a deviation but is no variable of results."""
+"""Name of the margin of the stiffness, which has a deviation but is no result variable."""
 
 PROBES_OF_A_KNOT, FEWEST_PROBES, MOST_PROBES = 4, 2048, 32768
-"""Times at which deviations are computed; each costs some thirty steps of a run with three joints, and
-seventy with seven. Between knots of the fits they change as slowly as the motion does."""
+"""Numbers of times at which deviations are computed. Each costs about thirty samples of a run with three
+joints, and seventy with seven. Between knots of the fits, deviations change as slowly as the motion does."""
 
 
 class Uncertainty:
-    """Standard deviations of what recorded signals have a part in: computed at some times, linear in between.
+    """Standard deviations of variables that depend on recorded signals: computed at some times, else linear.
 
-    Times at which a value does not exist, as the step is infeasible or singular, play no part. The deviation
-    is NaN where the value depends on components of which nothing can be said, or does not exist one deviation
-    away to either side.
+    Times at which a value does not exist, at an infeasible or singular sample, are left out. A deviation is
+    NaN where the value depends on components of unknown deviation, or does not exist one deviation away to
+    either side.
 
     Attributes:
-        unstated: by name of the variable, where it depends on components whose deviation is a mere bound and
-            must not be stated, (joints[, 2]).
+        unstated: Whether a variable, by name, depends on components whose deviation is only a bound and must
+            not be stated, (joints[, 2]).
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> None:
-        """Compute them.
+        """Compute the deviations.
 
         Args:
-            robot: the robot.
-            trajectory: for this robot, with estimated signals.
-            engine: the backend.
+            robot: Robot.
+            trajectory: Trajectory for this robot, with estimated signals.
+            engine: Backend.
         """
         estimates = trajectory.estimates
         self._start, self._elapsed = trajectory.start, probed_times(trajectory)
@@ -88,7 +88,7 @@ class Uncertainty:
 
 
 def probed_times(trajectory: Trajectory) -> FloatArray:
-    """Times at which deviations along a trajectory are computed, equally spaced, from the first step on."""
+    """Return the times at which deviations are computed, equally spaced, from the first sample on."""
     fits = [estimate.fit for estimate in trajectory.estimates.values()]
     knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
     wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
@@ -99,8 +99,8 @@ class Deviations(NamedTuple):
     """Standard deviations at some times, by variable.
 
     Attributes:
-        deviations: (times, joints[, 2]), NaN where there is no value, infinite where nothing can be said.
-        unstated: where they must not be stated, (joints[, 2]).
+        deviations: (times, joints[, 2]), NaN where there is no value, infinite where unknown.
+        unstated: Whether a deviation must not be stated, (joints[, 2]).
     """
 
     deviations: dict[str, FloatArray]
@@ -108,13 +108,13 @@ class Deviations(NamedTuple):
 
 
 class _Shift(NamedTuple):
-    """A change of one function of one component by its standard deviation, (times,).
+    """A change of one component of a signal or of a derivative by its standard deviation.
 
     Attributes:
-        name: of the function.
-        component: its index.
-        stated: whether the deviation may be stated.
-        size: of the deviation.
+        name: Name of the signal or derivative.
+        component: Index of the component.
+        stated: Whether the deviation may be stated.
+        size: Standard deviation, (times,).
     """
 
     name: str
@@ -133,12 +133,13 @@ def deviations(
     """Return the deviations of all variables that depend on recorded signals, along a motion.
 
     Args:
-        robot: the robot.
-        motion: at some times.
-        estimates: the signals that were recorded.
-        covariances: of these at the times, (components, orders, orders, times), as of `SampledProfile`.
-        engine: the backend.
+        robot: Robot.
+        motion: Motion at some times.
+        estimates: Signals that were recorded.
+        covariances: Their covariances, (components, orders, orders, times), as in `SampledProfile`.
+        engine: Backend.
     """
+    # A gradient has a row for each shift: signals in order, then components, then orders.
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
         _Shift(name, component, bool(estimates[signal].stated[component]), row)
@@ -167,7 +168,7 @@ def deviations(
 
 
 def _ignored(robot: Robot, signal: Signal) -> list[int]:
-    """Return the joints that do not take a signal, although there may be a column of it for them."""
+    """Return the joints that ignore a signal, although it may have a column for them."""
     commanded = signal.key in COMMANDED
     return [
         index for index, joint in enumerate(robot.joints) if commanded and signal.key not in joint.commanded
@@ -175,12 +176,12 @@ def _ignored(robot: Robot, signal: Signal) -> list[int]:
 
 
 def _spreads(covariance: FloatArray) -> FloatArray:
-    """Standard deviations, (components, orders, times)."""
+    """Return the standard deviations, (components, orders, times)."""
     return np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=1, axis2=2), -1, 1))
 
 
 def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
-    """Zero of what is given, or not known: gradients by the latter are NaN as far as they count."""
+    """Return correlations from covariances; zero for components that are given or unknown."""
     product = spread[:, :, None] * spread[:, None]
     return np.divide(covariance, product, out=np.zeros_like(covariance), where=product > 0)
 
@@ -188,10 +189,10 @@ def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
 def _values_and_gradients(
     robot: Robot, motion: Motion, shifts: Sequence[_Shift], engine: Engine
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Variables by name, (times, joints[, 2]), and their changes by the shifts, (shifts, times, ...)."""
+    """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
     undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = BalancedDynamics(undamped, frame)  # as that of the run, which is compiled
+    kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
     shifted = block_of(kernel, _shifted(motion, shifts), engine)
     values, gradients = {}, {}
     for name, array in _uncertain(shifted).items():
@@ -206,13 +207,13 @@ def _values_and_gradients(
 def _without_inner_damper(joint: Joint) -> Joint:
     """Return the joint without a damper parallel to its springs.
 
-    With one, motors follow what the links demand later and less: what is found without is more than that.
+    With the damper, motors respond to the links later and less, so deviations without it are upper estimates.
     """
     return replace(joint, damper=joint.damper_at("link"))
 
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
-    """Return the motion, then for each shift the motion with it added, and with it subtracted, in a row."""
+    """Return the motion, followed for each shift by the motion with it added and with it subtracted."""
     given = motion.variables()
     times = given.pop("time")
     copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in given.items()}
@@ -237,8 +238,8 @@ def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:
     """Return the variance of variables that depend on one signal, (times, joints[, 2]).
 
     Args:
-        gradient: changes by one deviation of each component and order, (components * orders, times, ...).
-        correlation: of the orders of each component, (components, orders, orders, times).
+        gradient: Changes by one deviation of each component and order, (components * orders, times, ...).
+        correlation: Correlation of the orders of each component, (components, orders, orders, times).
     """
     components, orders = correlation.shape[:2]
     by_order = gradient.reshape(components, orders, *gradient.shape[1:])

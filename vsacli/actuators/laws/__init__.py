@@ -1,6 +1,6 @@
-"""Spring laws of the transmissions, and what a law of one's own needs.
+"""Spring laws of the transmissions, and the names that a user-defined law needs.
 
-Adding a law is adding a class derived from `SpringLaw` and its line in `LAWS`.
+To add a law, derive a class from `SpringLaw` and add a line to `LAWS`.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ LAWS = LazyRegistry(
         "table": "vsacli.actuators.laws.table:MeasuredSpring",
     }
 )
-"""Laws by the name they have in a robot file."""
+"""Laws by their name in a robot file."""
 
 _EXPORTS = LazyRegistry(
     {
         **{name.title().replace("_", ""): home for name, home in LAWS.homes.items()},
         "Tendon": "vsacli.actuators.laws.tendons:Tendon",
-        "make_pair": "vsacli.actuators.pairs:make_pair",  # pairs know laws; no law knows them
+        "make_pair": "vsacli.actuators.pairs:make_pair",  # lazy: pairs import laws, not the reverse
     }
 )
-"""Names imported at first use; each law by its name in a robot file, written as a class name."""
+"""Names imported at first use; the class of a law has its name in a robot file, in CamelCase."""
 
 __all__ = [
     "CUBIC_STIFFNESS",
@@ -82,7 +82,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a law at its first use, so that a robot's file imports the laws that it names (PEP 562)."""
+    """Import a law at first use (PEP 562), so that a robot file imports only the laws that it names."""
     if name not in _EXPORTS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return _EXPORTS[name]

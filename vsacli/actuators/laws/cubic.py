@@ -1,4 +1,4 @@
-"""The cubic spring of the paper, tau = K phi + Kc phi^3, eqs. (24)-(27)."""
+"""The cubic spring of the paper, (24)-(27), and the closed solution of (14) for two equal ones, (28)-(31)."""
 
 from __future__ import annotations
 
@@ -14,43 +14,43 @@ from vsacli.documents.fields import POSITIVE, number
 
 @dataclass(frozen=True)
 class Cubic(SpringLaw):
-    """tau = k phi + k_c phi^3 (24), Buondonno & De Luca (2016)."""
+    """Cubic spring tau = k phi + k_c phi^3 (24), Buondonno & De Luca (2016)."""
 
     k: float = number(units.STIFFNESS, "linear coefficient K", check=POSITIVE)
     k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
 
     @property
     def polynomial(self) -> tuple[float, ...]:
-        """K and Kc."""
+        """Coefficients of phi, phi^2 and phi^3."""
         return (self.k, 0.0, self.k_c)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair of twins, on the branch of equations (28)-(31)."""
+        """Return the closed solution for two equal cubic springs; None for other laws."""
         return CubicTwins(self) if other == self else None
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Equation (24)."""
+        """Return the torque (24)."""
         return phi * (self.k + self.k_c * phi * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Equation (25)."""
+        """Return the stiffness (25)."""
         return self.k + 3 * self.k_c * phi * phi
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Equation (26)."""
+        """Return the slope of the stiffness (26)."""
         return 6 * self.k_c * phi
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Equation (27)."""
+        """Return the curvature of the stiffness (27)."""
         return np.full_like(phi, 6 * self.k_c)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy K phi^2/2 + Kc phi^4/4."""
+        """Return the energy K phi^2/2 + Kc phi^4/4."""
         squared = phi * phi
         return squared * (self.k / 2 + self.k_c / 4 * squared)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Return the real root of the cubic, by its hyperbolic form, which has no cancellation."""
+        """Return the real root of (24) by the hyperbolic formula, which has no cancellation."""
         scale = np.sqrt(self.k / (3 * self.k_c))
         deflection: FloatArray = 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
         return deflection
@@ -58,7 +58,11 @@ class Cubic(SpringLaw):
 
 @dataclass(frozen=True)
 class CubicTwins(Pair):
-    """Two equal cubic springs, (28)-(31) without the angle: u = phi_1 + phi_2 solves a cubic equation."""
+    """Two equal cubic springs, (28)-(31) without the angle xi.
+
+    With G the stiffness and u = phi_1 + phi_2, w = phi_1 - phi_2, (29) gives w^2 = 2 (G - 2 K)/(3 Kc) - u^2.
+    Inserted into (28), u solves the cubic equation G u/2 - Kc u^3/2 = tau_e.
+    """
 
     spring: Cubic
 
@@ -67,6 +71,7 @@ class CubicTwins(Pair):
         k, k_c = self.spring.k, self.spring.k_c
         lower = self._lowest_stiffness(np.abs(tau_e))
         demand = np.maximum(stiffness, lower)
+        # The root of the cubic in u with the largest phi_1 - phi_2, by the trigonometric formula.
         load = np.clip(3 * np.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
         u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
         spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
@@ -74,7 +79,10 @@ class CubicTwins(Pair):
         return PairSolution.unbounded(lower, (u + spread) / 2, (u - spread) / 2, lower_critical=True)
 
     def _lowest_stiffness(self, load: FloatArray) -> FloatArray:
-        """Outermost critical point: phi_1 = phi_2, or phi_1 phi_2 = K/(3 Kc) beyond its load."""
+        """Return the stiffness at the outermost critical point (det A = 0) under a load |tau_e|.
+
+        It is phi_1 = phi_2; beyond the load where that meets phi_1 phi_2 = K/(3 Kc), it is the latter.
+        """
         k, k_c = self.spring.k, self.spring.k_c
         alike = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
         unlike = np.cbrt((3 * np.sqrt(3 * k_c) * load) ** 2)

@@ -17,14 +17,14 @@ from vsacli.documents.fields import POSITIVE, Check, number
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
 
 STRETCH_MARGIN = 1e-6
-"""Distance from 1 up to which the domain lets C sin(phi/2) come.
+"""Distance of C sin(phi/2) from 1 at the end of the domain.
 
-Beyond, where the torque grows without bound, adjacent doubles of the deflection differ in stiffness by more
-than 1e-10.
+Closer to 1, where the torque grows without bound, adjacent doubles of the deflection differ in stiffness by
+more than 1e-10.
 """
 
 GUESS_NODES = 20
-"""Points of the curve that the first guess of the inverse begins with."""
+"""Number of initial nodes of the first guess of the inverse."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class FourBar(SpringLaw):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Deflections up to the stretched linkage, all but a millionth."""
+        """Deflections up to the stretched linkage, less `STRETCH_MARGIN`."""
         end = 2 * np.arcsin((1 - STRETCH_MARGIN) / self.ratio)
         return (-end, end)
 
@@ -51,41 +51,41 @@ class FourBar(SpringLaw):
         return low, high  # type: ignore[return-value]
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Derivatives of the energy k beta^2/2, which share the angles."""
+        """Return the derivatives of the energy k beta^2/2, which share the angles."""
         return _derivatives(self.k, self._angle(phi, order + 1))
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy and all derivatives, which share the angles."""
+        """Return energy and all derivatives, which share the angles."""
         beta = self._angle(phi, 4)
         return self.k / 2 * beta[0] * beta[0], SpringState(*_derivatives(self.k, beta))
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque k beta beta'."""
+        """Return the torque k beta beta'."""
         return self.derivatives(phi, 0)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness k (beta'^2 + beta beta'')."""
+        """Return the stiffness k (beta'^2 + beta beta'')."""
         return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope k (3 beta' beta'' + beta beta''')."""
+        """Return the slope k (3 beta' beta'' + beta beta''')."""
         return self.derivatives(phi, 2)[2]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
+        """Return the curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
         return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy k beta^2/2."""
+        """Return the energy k beta^2/2."""
         (beta,) = self._angle(phi, 0)
         return self.k / 2 * beta * beta
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse by safeguarded iteration within the domain."""
+        """Return the inverse, by safeguarded iteration within the domain."""
         return self.deflection_and_state(torque)[0]
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and state by one iteration."""
+        """Return deflection and state by one iteration."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
         start = np.minimum(self._first_guess(load), high)
@@ -98,7 +98,7 @@ class FourBar(SpringLaw):
         return FirstGuess(self, 2 * np.arcsin((1 - STRETCH_MARGIN) * np.sin(psi) / self.ratio))
 
     def _angle(self, phi: FloatArray, order: int) -> list[FloatArray]:
-        """Angle beta of the linear spring, and its derivatives up to an order, 4 at most.
+        """Return the angle beta of the linear spring, and its derivatives up to an order, 4 at most.
 
         With psi = asin(C sin(phi/2)) and beta = psi - phi/2, written by
         C cos(phi/2) - cos psi = (C^2 - 1)/(C cos(phi/2) + cos psi), so that nothing cancels. The higher
@@ -128,7 +128,7 @@ class FourBar(SpringLaw):
 
 
 def _derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
-    """Derivatives of k beta^2/2 from beta and its derivatives: as many as there are of these."""
+    """Return the derivatives of k beta^2/2 from beta and its derivatives, one fewer than these."""
     k_beta, k_rate = k * beta[0], k * beta[1]
     derivatives = [k_beta * beta[1]]
     if len(beta) > 2:

@@ -1,4 +1,4 @@
-"""Inverse of a spring law without a closed one: Halley's method in a shrinking bracket, a cubic guess."""
+"""Numerical inverse of a spring law: Halley's method within a shrinking bracket, from a cubic guess."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ def hermite(
 
 
 def in_single(values: FloatArray) -> FloatArray:
-    """Values with the digits of single precision, which do for a guess; beyond its range as they are."""
+    """Return values rounded to single precision, enough for a guess; unchanged beyond its range."""
     with np.errstate(all="ignore"):
         rounded = values.astype(np.float32).astype(float)
     return np.where(np.isfinite(rounded) & ((rounded == 0) == (values == 0)), rounded, values)
 
 
 MAX_HALLEY_STEPS = 200
-"""More than bisection alone needs for all digits of a double."""
+"""Largest number of steps, more than bisection alone needs for all digits of a double."""
 
 HALLEY_RTOL = 2e-6
-"""Relative error of the torque from which one more step leaves rounding only: it takes the third power."""
+"""Relative error of the torque from which one more step converges to rounding: it takes the third power."""
 
 GUESS_RTOL = 1e-6
-"""Relative error of the torque with which a first guess is content."""
+"""Largest relative error of the torque in a first guess."""
 
 MAX_HALVINGS = 20
-"""Times that cells between the nodes of a first guess are halved; next to slack the deflection is a root of
-the torque, which no cubic comes close to."""
+"""Largest number of halvings of the cells of a first guess. Next to slack the deflection is a root of the
+torque, which no cubic approximates."""
 
 
 def inverse(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, SpringState]:
-    """Deflection at which a law has a torque, and the state of the spring there; arrays (samples,).
+    """Return the deflection at which a law has a torque, and the state of the spring there; (samples,).
 
     The last step is so short that the state before it gives the state after it.
 
     Args:
-        law: the spring.
-        torque: torque of the spring, N m (N).
-        low: deflection that is not above the one sought, rad (m).
-        high: deflection that is not below the one sought.
-        start: first guess; next to the solution one step does, without a loop.
+        law: Spring.
+        torque: Torque of the spring, N m (N).
+        low: Lower bound of the deflection, rad (m).
+        high: Upper bound of the deflection.
+        start: First guess; if it is close, one step suffices, without a loop.
     """
-    with np.errstate(all="ignore"):  # without stiffness at rest, a step leads nowhere
+    with np.errstate(all="ignore"):  # division by zero without stiffness at rest
         phi, error, state = _halley_step(law, torque, start)
         converged = _converges(torque, error) & (phi >= low) & (phi <= high)
         phi, *values = where_needed(
@@ -67,10 +67,8 @@ def inverse(
 def _halley_step(
     law: SpringLaw, torque: FloatArray, phi: FloatArray
 ) -> tuple[FloatArray, FloatArray, SpringState]:
-    """Return the deflection after a step, and the error of the torque and the state of the spring before it.
-
-    Halley's correction of the Newton step is kept between one half and two.
-    """
+    """Return the deflection after a step; also the error of the torque and the spring's state before it."""
+    # Halley's correction of the Newton step is kept between one half and two.
     state = state_of(law, phi)
     error = state.tau - torque
     newton = error / state.sigma
@@ -79,7 +77,7 @@ def _halley_step(
 
 
 def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
-    """Return whether a step from such an error of the torque leaves rounding only."""
+    """Return whether one more step converges to rounding, from the error of the torque."""
     converges: BoolArray = np.abs(error) <= HALLEY_RTOL * np.abs(torque)
     return converges
 
@@ -87,7 +85,7 @@ def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
 def _safeguarded(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> Values:
-    """`inverse` from a start that is far away: Halley's steps within the bracket, else bisection."""
+    """Compute `inverse` from a distant start: Halley steps within the bracket, else bisection."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi, low, high, *_), (torque,) = state, constants
@@ -96,7 +94,7 @@ def _safeguarded(
         inside, middle = (halley >= low) & (halley <= high), (low + high) / 2
         next_phi = np.where(inside, halley, middle)
         converged = inside & _converges(torque, error)
-        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # that numbers can be
+        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # no double lies between
         return (next_phi, low, high, *spring.after(next_phi - phi)), converged | best
 
     low = np.where(np.isfinite(torque), low, np.nan)
@@ -105,16 +103,16 @@ def _safeguarded(
 
 
 def with_sign_of(torque: FloatArray, phi: FloatArray, state: SpringState) -> tuple[FloatArray, SpringState]:
-    """Deflection and state of an odd law under a torque, from those under the size of the torque."""
+    """Return deflection and state of an odd law at a torque, from those at its absolute value."""
     tau, zeta = np.copysign(state.tau, torque), np.copysign(state.zeta, torque)
     return np.copysign(phi, torque), state._replace(tau=tau, zeta=zeta)
 
 
 class FirstGuess:
-    """Deflection over the torque by Hermite's cubics between nodes of a law that are computed once."""
+    """Deflection over the torque by Hermite cubics, between nodes of a law that are computed once."""
 
     def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
-        """Begin with ascending nodes, and halve the cells that are too wide for a cubic."""
+        """Begin with ascending nodes, and halve cells until cubics are accurate."""
         self._interpolate(law, nodes)
         for _ in range(MAX_HALVINGS):
             middle = (nodes[:-1] + nodes[1:]) / 2
@@ -132,7 +130,7 @@ class FirstGuess:
         self._nodes = torque, nodes, in_single(compliance)
 
     def __call__(self, torque: FloatArray) -> FloatArray:
-        """Return the deflection under torques within those of the nodes."""
+        """Return the deflection at torques between those of the nodes."""
         cell = np.searchsorted(self._nodes[0][1:-1], torque, side="right")
         low, start, first = look_up(self._nodes, cell)
         high, end, last = look_up(self._nodes, cell + 1)

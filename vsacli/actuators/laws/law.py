@@ -1,7 +1,8 @@
-"""Spring laws: torque over deflection, three derivatives, energy, the inverse; pairs and rows of springs.
+"""Interface of spring laws, and the records and bases that all laws share.
 
-A `SpringState` is a spring at a deflection. A `Pair` says what solving (14) means for two springs on
-one link, whatever the laws are. Springs of several joints that obey one law are evaluated at a time.
+`SpringLaw` has torque over deflection, three derivatives, energy and the inverse; `SpringState` is a spring
+at a deflection. `Pair` and `PairSolution` define the solution of (14) for two springs on one link, whatever
+their laws. `SpringRows` evaluates the springs of several joints, one evaluation per distinct law.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ class SpringState(NamedTuple):
     """Torque, stiffness, slope and curvature of springs, (62)-(64), (66); arrays of one shape.
 
     Attributes:
-        tau: torque, N m (N).
-        sigma: stiffness, the first derivative of the torque over the deflection.
-        zeta: slope of the stiffness, the second derivative.
-        eta: curvature of the stiffness, the third derivative.
+        tau: Torque, N m (N).
+        sigma: Stiffness, the first derivative of the torque over the deflection.
+        zeta: Slope of the stiffness, the second derivative.
+        eta: Curvature of the stiffness, the third derivative.
     """
 
     tau: FloatArray
@@ -37,11 +38,11 @@ class SpringState(NamedTuple):
     eta: FloatArray
 
     def take(self, members: IndexArray) -> SpringState:
-        """Return the state of some of the springs, which are on the last axis."""
+        """Return the state of a selection of the springs, which are on the last axis."""
         return SpringState(*(values[..., members] for values in self))
 
     def after(self, step: FloatArray) -> SpringState:
-        """Return the state after a short step of the deflection, by Taylor's formula."""
+        """Return the state after a short step of the deflection, by Taylor expansion."""
         return SpringState(
             self.tau + step * self.sigma + self.linearization_error(step),
             self.sigma + step * (self.zeta + step / 2 * self.eta),
@@ -50,21 +51,21 @@ class SpringState(NamedTuple):
         )
 
     def linearization_error(self, step: FloatArray) -> FloatArray:
-        """Torque after a short step less what its tangent gives, to the third order of the step."""
+        """Return the torque after a short step minus its linear prediction, to third order."""
         return step * step / 2 * (self.zeta + step / 3 * self.eta)
 
 
 class PairSolution(NamedTuple):
-    """Reachable stiffness on the branch, and the deflections for the demanded one; arrays (samples,).
+    """Attainable range of the stiffness on the branch, and deflections for the demanded one; (samples,).
 
     Attributes:
-        lower: smallest reachable stiffness, N m/rad (N/m); NaN where the torque cannot be carried at all.
-        upper: largest reachable stiffness; +inf where nothing bounds it.
-        lower_critical: whether `lower` is a critical point, where A is singular (else the end of a domain).
-        upper_critical: the same for `upper`.
-        slack_below: whether a side that only pulls goes slack below `lower`.
-        phi_1: deflection of side 1 for the stiffness clipped into [lower, upper], rad (m).
-        phi_2: deflection of side 2.
+        lower: Minimum stiffness, N m/rad (N/m); NaN where the torque cannot be carried at all.
+        upper: Maximum stiffness; +inf where nothing bounds it.
+        lower_critical: Whether `lower` is a critical point, where A is singular (else the end of a domain).
+        upper_critical: Whether `upper` is a critical point.
+        slack_below: Whether a tendon goes slack below `lower`.
+        phi_1: Deflection of side 1 for the stiffness clipped to [lower, upper], rad (m).
+        phi_2: Deflection of side 2.
     """
 
     lower: FloatArray
@@ -79,9 +80,9 @@ class PairSolution(NamedTuple):
     def unbounded(
         cls, lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray, *, lower_critical: bool
     ) -> PairSolution:
-        """Return a solution without upper end.
+        """Return a solution without maximum stiffness.
 
-        The lower end is a critical point, or where a tendon goes slack.
+        Its minimum is a critical point if `lower_critical`, else the stiffness at which a tendon goes slack.
         """
         return cls(
             lower=lower,
@@ -99,16 +100,16 @@ class PairSolution(NamedTuple):
         return np.stack((self.phi_1, self.phi_2))
 
     def exchanged(self) -> PairSolution:
-        """Return the same with the two sides exchanged."""
+        """Return the solution with sides 1 and 2 exchanged."""
         return self._replace(phi_1=self.phi_2, phi_2=self.phi_1)
 
 
 class Pair(ABC):
     """Two springs on the branch of the largest preload: phi_1 up, phi_2 down.
 
-    Along a given tau_e the joint stiffness G is a function of the preload; its critical points are the
+    At a given tau_e the joint stiffness G is a function of the preload. Its critical points are the
     singularities of the decoupling matrix, its monotone pieces the branches of solutions. The branch used is
-    the piece that reaches the largest preload; it needs no memory of the previous step.
+    the piece that extends to the largest preload, so that no sample depends on the previous one.
     """
 
     @abstractmethod
@@ -116,27 +117,27 @@ class Pair(ABC):
         """Solve (14) for each sample.
 
         Args:
-            tau_e: elastic torque, (samples,), N m (N).
-            stiffness: demanded joint stiffness, (samples,), N m/rad (N/m).
+            tau_e: Elastic torque, (samples,), N m (N).
+            stiffness: Demanded joint stiffness, (samples,), N m/rad (N/m).
         """
 
 
 def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> PairSolution:
-    """Solution of two tendons, which is singular nowhere.
+    """Return the solution of a pair of tendons, which is never singular.
 
-    Deflections that rounding has made those of a tendon that pushes are zero.
+    Deflections at which a tendon would push, by rounding, are set to zero.
     """
     return PairSolution.unbounded(lower, np.maximum(phi_1, 0), np.minimum(phi_2, 0), lower_critical=False)
 
 
 def same_number(number: float, other: float) -> bool:
-    """Return whether two numbers of springs are one, also where it is a symbol, known when a program runs."""
+    """Return whether two parameters are equal; symbols of a traced program, if they are the same object."""
     return number is other or number == other
 
 
 @dataclass(frozen=True)
 class SpringLaw(ABC):
-    """Torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.
+    """A torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.
 
     So sigma > 0 on the domain, and zeta has the sign of phi. The methods take and return arrays of any one
     shape; phi in rad (m), torque in N m (N).
@@ -155,7 +156,7 @@ class SpringLaw(ABC):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Deflections for which the law holds."""
+        """Smallest and largest deflection for which the law holds."""
         return (-math.inf, math.inf)
 
     @property
@@ -170,7 +171,7 @@ class SpringLaw(ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on the distance of the law from the spring it describes."""
+        """Warnings, as sentences, that the law deviates from the spring it describes."""
         return ()
 
     @property
@@ -185,7 +186,7 @@ class SpringLaw(ABC):
 
     @property
     def polynomial(self) -> tuple[float, ...] | None:
-        """Coefficients of phi, phi^2, ... if the torque is a polynomial on the domain, else None."""
+        """Coefficients of phi, phi^2, ... if the torque is a polynomial on the domain; None otherwise."""
         return None
 
     def as_second(self) -> SpringLaw:
@@ -193,83 +194,83 @@ class SpringLaw(ABC):
         return self
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:  # noqa: ARG002
-        """Return the pair of this law (side 1) with another (side 2) if (14) has a closed solution."""
+        """Return the pair of this law (side 1) and another if (14) has a closed solution, else None."""
         return None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Relative hardening rho = zeta/sigma."""
+        """Return the relative hardening rho = zeta/sigma."""
         return self.slope(phi) / self.stiffness(phi)
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Torque and its derivatives up to an order, 3 at most; for laws in which they share work."""
+        """Return torque and derivatives up to an order, at most 3; laws override it to share work."""
         methods = (self.torque, self.stiffness, self.slope, self.curvature)
         return tuple(method(phi) for method in methods[: order + 1])
 
     def state(self, phi: FloatArray) -> SpringState:
-        """State of the spring at deflections."""
+        """Return the state of the spring at deflections."""
         return SpringState(*self.derivatives(phi, 3))
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection under a torque and the state there; for laws whose iteration finds both."""
+        """Return the deflection at a torque and the state there; laws that iterate for both override it."""
         phi = self.deflection(torque)
         return phi, self.state(phi)
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy and state at deflections; for laws in which they share work."""
+        """Return energy and state at deflections; laws override it to share work."""
         return self.energy(phi), self.state(phi)
 
     @abstractmethod
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque tau(phi), (62)."""
+        """Return the torque tau(phi), (62)."""
 
     @abstractmethod
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness sigma = dtau/dphi, (63)."""
+        """Return the stiffness sigma = dtau/dphi, (63)."""
 
     @abstractmethod
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope zeta = dsigma/dphi, (64)."""
+        """Return the slope of the stiffness zeta = dsigma/dphi, (64)."""
 
     @abstractmethod
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature eta = dzeta/dphi, (66)."""
+        """Return the curvature of the stiffness eta = dzeta/dphi, (66)."""
 
     @abstractmethod
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Elastic energy stored from zero deflection on, J."""
+        """Return the elastic energy, J, zero at zero deflection."""
 
     @abstractmethod
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Deflection phi with tau(phi) = torque: the inverse of `torque`."""
+        """Return the deflection phi with tau(phi) = torque, the inverse of `torque`."""
 
 
 def state_of(law: SpringLaw, phi: FloatArray) -> SpringState:
-    """State of a spring, which code that must be short has once."""
+    """Return the state of a spring, as a subroutine of compiled code."""
     return SpringState(*subroutine(law.state, (phi,)))
 
 
 class SpringRows:
-    """Equally many springs at each joint; deflections and their functions are (..., joints, springs)."""
+    """Springs of several joints, the same number at each; deflections and results (..., joints, springs)."""
 
     def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
         self._alike = list(_alike([law for of_joint in laws for law in of_joint]))
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque of each spring."""
+        """Return the torque of each spring."""
         return self._each(phi, lambda law, part: (law.torque(part),))[0]
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy of each spring."""
+        """Return the energy of each spring."""
         return self._each(phi, lambda law, part: (law.energy(part),))[0]
 
     def state(self, phi: FloatArray) -> SpringState:
-        """State of each spring."""
+        """Return the state of each spring."""
         return SpringState(*self._each(phi, lambda law, part: law.state(part)))
 
     def _each(
         self, phi: FloatArray, values: Callable[[SpringLaw, FloatArray], Sequence[FloatArray]]
     ) -> Sequence[FloatArray]:
-        """Return the values of both springs' laws at their deflections."""
+        """Return arrays computed from each spring's law at its deflections; one call per distinct law."""
         if len(self._alike) == 1:
             return values(self._alike[0][0], phi)
         flat = phi.reshape(*phi.shape[:-2], -1)
@@ -282,7 +283,7 @@ class SpringRows:
 
 
 def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
-    """Yield each distinct law, with the springs that obey it."""
+    """Yield each distinct law, with the indices of its springs."""
     distinct: list[SpringLaw] = []
     for law in laws:
         if law not in distinct:

@@ -18,7 +18,7 @@ from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
 
 @dataclass(frozen=True)
 class Polynomial(SpringLaw):
-    """tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone it is a linear spring."""
+    """Spring tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone, a linear spring."""
 
     c1: float = number(units.STIFFNESS, "linear coefficient", check=POSITIVE)
     c3: float = number(units.CUBIC_STIFFNESS, "cubic coefficient", check=NON_NEGATIVE, default=0.0)
@@ -39,42 +39,42 @@ class Polynomial(SpringLaw):
 
     @property
     def polynomial(self) -> tuple[float, ...]:
-        """The coefficients, with zeros for even powers."""
+        """Coefficients with zeros for even powers."""
         return tuple(term for each in self._coefficients for term in (each, 0.0))[:-1]
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Derivatives as power series, odd and even in turn, which share the square."""
+        """Return derivatives as power series, alternately odd and even, which share the square."""
         squared = phi * phi
         even = [self._derivative(each, squared) for each in range(order + 1)]
         return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque c1 phi + c3 phi^3 + ..."""
+        """Return the torque c1 phi + c3 phi^3 + ..."""
         return phi * self._derivative(0, phi * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness, the first derivative."""
+        """Return the stiffness."""
         return self._derivative(1, phi * phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope, the second derivative."""
+        """Return the slope."""
         return phi * self._derivative(2, phi * phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature, the third derivative."""
+        """Return the curvature."""
         return self._derivative(3, phi * phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy, the integral of the torque."""
+        """Return the energy, the integral of the torque."""
         squared = phi * phi
         return squared * _series([each / (2 * n + 2) for n, each in enumerate(self._coefficients)], squared)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse by safeguarded iteration from the bound that each term alone sets."""
+        """Return the inverse, by safeguarded iteration from the least deflection of any term alone."""
         return self.deflection_and_state(torque)[0]
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and state by one iteration."""
+        """Return deflection and state by one iteration."""
         load = np.abs(torque)
         bounds = [
             (load / coefficient) ** (1 / (2 * index + 1))
@@ -85,7 +85,7 @@ class Polynomial(SpringLaw):
         return with_sign_of(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
 
     def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
-        """Derivative of the torque, without the factor phi that those of even order have."""
+        """Return a derivative of the torque without the factor phi that those of even order have."""
         return _series(self._factors[order], squared)
 
     @cached_property
@@ -98,7 +98,7 @@ class Polynomial(SpringLaw):
 
 
 def _series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
-    """Power series from the constant on."""
+    """Return the power series with coefficients from the constant on."""
     if not coefficients:
         return np.zeros_like(x)
     *lower, highest = coefficients

@@ -14,17 +14,17 @@ from vsacli.documents.fields import POSITIVE, number
 
 @dataclass(frozen=True)
 class Sinh(SpringLaw):
-    """tau = k sinh(a phi), the qbmove and VSA-CubeBot family; qbmove Advanced manual (April 2021), 3.2.2."""
+    """Spring tau = k sinh(a phi) of qbmove and VSA-CubeBot; qbmove Advanced manual (April 2021), 3.2.2."""
 
     k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair of two springs of the same a."""
+        """Return the closed solution for two springs of equal a; None for other laws."""
         return SinhPair(self, other) if isinstance(other, Sinh) and same_number(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Torque and stiffness from one exponential function, and a^2 times either."""
+        """Return torque and stiffness from one exponential function, and a^2 times each."""
         grown = np.expm1(np.abs(self.a * phi))
         shrunk = 1 / (1 + grown)
         half = self.k / 2 * grown
@@ -33,33 +33,33 @@ class Sinh(SpringLaw):
         return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque k sinh(a phi)."""
+        """Return the torque k sinh(a phi)."""
         return self.derivatives(phi, 0)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness k a cosh(a phi)."""
+        """Return the stiffness k a cosh(a phi)."""
         return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope a^2 tau."""
+        """Return the slope a^2 tau."""
         return self.a**2 * self.torque(phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature a^2 sigma."""
+        """Return the curvature a^2 sigma."""
         return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy k (cosh(a phi) - 1)/a, without cancellation near zero."""
+        """Return the energy k (cosh(a phi) - 1)/a, without cancellation near zero."""
         return 2 * self.k / self.a * np.sinh(self.a * phi / 2) ** 2
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse asinh(tau/k)/a."""
+        """Return the inverse asinh(tau/k)/a."""
         return np.arcsinh(torque / self.k) / self.a
 
 
 @dataclass(frozen=True)
 class SinhPair(Pair):
-    """Two sinh springs of the same a, from their sum and difference.
+    """Two sinh springs of equal a, solved for the sum and the difference of their deflections.
 
     With h = a(phi_1 - phi_2)/2, m = a(phi_1 + phi_2)/2 and x = sigma/a:
     x^2 - tau_e^2 = (k_1 + k_2)^2 + 4 k_1 k_2 sinh(h)^2 = R^2, and
@@ -79,7 +79,7 @@ class SinhPair(Pair):
         mean = np.arcsinh(tau_e / radius) - np.arcsinh((k_1 - k_2) / radius * sinh)
         half_spread = np.arcsinh(sinh)
         phi_1, phi_2 = (mean + half_spread) / a, (mean - half_spread) / a
-        # The weaker spring takes up what rounding leaves of the balance of the torques.
+        # The weaker spring absorbs the rounding error of the torque balance.
         if k_1 < k_2:
             phi_1 = self.first.deflection(tau_e - self.second.torque(phi_2))
         elif k_2 < k_1:

@@ -1,7 +1,7 @@
-"""Smooth curves on either side of zero: potentials that are polynomials in pieces, made from a B-spline.
+"""Smooth curves on either side of zero: piecewise polynomial potentials, integrated from a B-spline.
 
-The spline g stands for what must not change its sign: a slope over the deflection, say. Whoever makes a curve
-says how the potential follows from it by integration.
+The spline g is a function that must not change its sign, such as a slope over the deflection. The caller of
+`spline_curve` gives the integration from g to the potential.
 """
 
 from __future__ import annotations
@@ -21,19 +21,18 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 Integrate = Callable[["PPoly"], "PPoly"]
-"""The potential over the size of the deflection from the spline over that."""
+"""Function from the spline to the potential, both over the absolute value of the deflection."""
 
 
 @dataclass(frozen=True)
 class SplineCurve:
-    """A potential made of a half on either side of zero, over the size of the deflection.
+    """A potential of two halves, on either side of zero, over the absolute value of the deflection.
 
     Attributes:
-        domain: deflections at the ends.
-        pieces: how many polynomials there are below zero, and above; in either half equally wide.
-        origins: sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
-            nothing cancels there.
-        coefficients: of the potential, from the constant on, (powers, pieces).
+        domain: Deflections at the ends.
+        pieces: Number of polynomials below zero and above; in either half of equal width.
+        origins: Origins of the polynomials, (pieces,); zero next to zero, so that nothing cancels there.
+        coefficients: Coefficients of the potential, from the constant on, (powers, pieces).
     """
 
     domain: tuple[float, float]
@@ -42,17 +41,14 @@ class SplineCurve:
     coefficients: FloatArray
 
     def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
-        """Derivatives of the potential from one order, 0 or 1, to another, 4 at most."""
+        """Return the derivatives of the potential from order `first`, 0 or 1, to order `last`, at most 4."""
         origin, *coefficients = look_up(self._tables[first], self._piece(phi))
         sizes = _with_derivatives(coefficients, np.abs(phi) - origin, last - first)
         side = np.copysign(1.0, phi)
         return tuple(side * size if order % 2 else size for order, size in enumerate(sizes, first))
 
     def _piece(self, phi: FloatArray) -> IndexArray:
-        """Return the polynomial of the interval.
-
-        At an edge rounding may choose its neighbour, which is as good there.
-        """
+        """Return the index of the polynomial; at an edge, rounding may choose the neighbor, equal there."""
         (low, high), (below, above) = self.domain, self.pieces
         position = phi * (above / high)
         if below:
@@ -66,7 +62,7 @@ class SplineCurve:
         return (self.origins, *self._derivative(0)), (self.origins, *self._derivative(1))
 
     def _derivative(self, order: int) -> FloatArray:
-        """Coefficients of a derivative of the potential, from the constant on, (powers, pieces)."""
+        """Return the coefficients of a derivative of the potential, ascending, (powers, pieces)."""
         powers = range(order, len(self.coefficients))
         factors = np.array([math.perm(power, order) for power in powers], dtype=float)
         return factors[:, None] * self.coefficients[order:]
@@ -87,7 +83,7 @@ def _with_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: 
 
 
 def spline_knots(low: float, high: float, pieces: int, degree: int) -> FloatArray:
-    """Knots of a spline from `low` at or below zero to `high` above, one of them at zero."""
+    """Return the knots of a spline from `low` at or below zero to `high` above, with a knot at zero."""
     above = max(1, round(pieces * high / (high - low)))
     below = max(1, pieces - above) if low < 0 else 0
     breaks = np.concatenate((np.linspace(low, 0, below, endpoint=False), np.linspace(0, high, above + 1)))
@@ -113,7 +109,7 @@ def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate:
 def _half(
     knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate
 ) -> tuple[FloatArray, FloatArray]:
-    """Origins of the potential's polynomials above zero, and their coefficients from the constant on."""
+    """Return the origins of the potential's polynomials above zero, and their coefficients, ascending."""
     potential = integrate(_above_zero(knots, weights, degree))
     return potential.x[:-1], potential.c[::-1]
 

@@ -1,4 +1,4 @@
-"""A spring given by its measured torque-deflection curve: smooth, with the shape of a hardening spring."""
+"""A spring given by a measured torque-deflection curve, fitted by a smooth curve that hardens."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 DEGREE = 3
 MAX_PIECES = 24
-"""Knot spans of g; a spring has no finer features than a few dozen measured points can show."""
+"""Largest number of knot spans of g: a few dozen measured points show no finer features of a spring."""
 
 REST_STIFFNESS_SHARE = 1e-3
-"""Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
+"""Smallest stiffness at rest of a spring that pushes and pulls, as a share of the mean: sigma must be > 0."""
 
 LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
-"""Stands for the size of a shape that lies between two measured deflections and is zero at both."""
+"""Size of a shape that is zero at all measured deflections, to avoid 0/0."""
 
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
@@ -62,21 +62,22 @@ def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> 
 
 MIN_ROWS = 6
 GUESS_NODES = 25
-"""Points of the curve on either side that the first guess of the inverse begins with."""
+"""Number of initial nodes on either side of the first guess of the inverse."""
 
 SHAPE_TOLERANCE = 1e-3
-"""Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
+"""Violation of the shape that counts as measurement noise, as a share of the torque range; for example, of a
+point above its chord."""
 
 NO_MISFIT, POOR_MISFIT = 1e-6, 0.01
-"""Shares of the range by which a curve misses points: no bench measures the one, a smooth device keeps the
-other, of which a kink in 20 to 120 points makes 1 to 6 %."""
+"""Misfits of points, as shares of the range: below the first, no test bench could measure it; smooth devices
+stay below the second, while a kink in 20 to 120 points causes 1 to 6 %."""
 
 
 @dataclass(frozen=True)
 class MeasuredSpring(SpringLaw):
-    """Torques measured over deflections, with a smooth hardening curve fitted through them; no extrapolation.
+    """Torques measured over deflections, fitted by a smooth hardening curve, without extrapolation.
 
-    A table that begins at zero deflection is a spring that only pulls.
+    A table that begins at zero deflection describes a tendon.
     """
 
     file: Table = value(
@@ -122,49 +123,49 @@ class MeasuredSpring(SpringLaw):
         return self.domain[0] == 0
 
     def as_second(self) -> SpringLaw:
-        """Turned around if it only pulls."""
+        """Return the mirrored law if it only pulls."""
         return Mirrored(law=self) if self.pulls_only else self
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
+        """Return the relative hardening, infinite where a spring without stiffness at rest goes slack."""
         state = self.state(phi)
         slack = state.sigma == 0
         return np.where(slack, np.inf, state.zeta / np.where(slack, 1.0, state.sigma))
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Derivatives of the fitted curve, whose piece is looked up once."""
+        """Return the derivatives of the fitted curve, whose piece is looked up once."""
         return self._curve(phi, 1, order + 1)
 
     def state(self, phi: FloatArray) -> SpringState:
-        """State of the fitted curve, which code that must be short has once."""
+        """Return the state of the fitted curve, as a subroutine of compiled code."""
         return SpringState(*subroutine(lambda phi: self.derivatives(phi, 3), (phi,)))
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque of the fitted curve."""
+        """Return the torque of the fitted curve."""
         return self._curve(phi, 1, 1)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness of the fitted curve."""
+        """Return the stiffness of the fitted curve."""
         return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope of the fitted curve."""
+        """Return the slope of the fitted curve."""
         return self.derivatives(phi, 2)[2]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature of the fitted curve."""
+        """Return the curvature of the fitted curve."""
         return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy of the fitted curve."""
+        """Return the energy of the fitted curve."""
         return self._curve(phi, 0, 0)[0]
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse by safeguarded iteration within the measured range."""
+        """Return the inverse, by safeguarded iteration within the measured range."""
         return self.deflection_and_state(torque)[0]
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and state by one iteration."""
+        """Return deflection and state by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
         least, largest = self.torque_range
         carried = np.minimum(np.maximum(torque, least), largest)
@@ -179,7 +180,7 @@ class MeasuredSpring(SpringLaw):
 
 
 def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
-    """Return warnings of the distance of a curve from the points of a table, (rows,)."""
+    """Return warnings if the misfit of a curve at the points of a table, (rows,), is large."""
     row, share = worst_misfit(table, misfit)
     if share < NO_MISFIT:
         return ()
@@ -193,13 +194,13 @@ def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
 
 
 def worst_misfit(table: Table, misfit: FloatArray) -> tuple[int, float]:
-    """Return the row that a curve misses most, and by which share of the range."""
+    """Return the row with the largest misfit, and the misfit as a share of the range."""
     row = int(np.abs(misfit).argmax())
     return row, float(abs(misfit[row]) / np.ptp(table.values[:, 1]))
 
 
 def wrong_rows(table: Table) -> Iterator[Problem]:
-    """Why the rows are none of a curve over the deflection: too few, out of bounds or out of order."""
+    """Yield why the rows are no curve over the deflection: too few, out of bounds or out of order."""
     deflection, path = table.values[:, 0], table.source.path
     if len(deflection) < MIN_ROWS:
         yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
@@ -211,7 +212,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
 
 
 def _problems(table: Table) -> Iterator[Problem]:
-    """Why the rows are no hardening spring, with the lines."""
+    """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path
 
@@ -233,7 +234,7 @@ def _problems(table: Table) -> Iterator[Problem]:
 
 
 def _wrong_sizes(table: Table) -> Iterator[Problem]:
-    """Rows with numbers too large, or with an end of the curve too near to zero, as in declared fields."""
+    """Yield rows with values too large, or an end of the curve too near to zero, as in declared fields."""
     for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
             yield Problem(
@@ -246,7 +247,7 @@ def _wrong_sizes(table: Table) -> Iterator[Problem]:
 
 
 def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
-    """Rows where the torque is not convex for positive, or not concave for negative deflections."""
+    """Yield rows where the torque is not convex for positive, or not concave for negative deflections."""
     left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
     share = (middle - left) / (right - left)
     chord = (1 - share) * torque[:-2] + share * torque[2:]

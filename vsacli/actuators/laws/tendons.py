@@ -1,4 +1,4 @@
-"""Springs that only pull, slack at zero deflection, mirrored on side 2: quadratic and exponential tendons."""
+"""Tendons: springs that only pull, slack at zero deflection, mirrored on side 2: quadratic, exponential."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Mirrored(SpringLaw):
 
     @property
     def polynomial(self) -> tuple[float, ...] | None:
-        """Terms of odd power are the law's, those of even power their opposites."""
+        """Coefficients of the law, with those of even powers negated."""
         terms = self.law.polynomial
         return terms and tuple(term if power % 2 else -term for power, term in enumerate(terms, 1))
 
@@ -81,7 +81,7 @@ class Mirrored(SpringLaw):
         return tuple(value if each % 2 else -value for each, value in enumerate(values))
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Both are those of the law under the opposite torque, mirrored."""
+        """Return deflection and state of the law at the opposite torque, mirrored."""
         phi, state = self.law.deflection_and_state(-torque)
         return -phi, _mirrored_state(state)
 
@@ -127,7 +127,7 @@ def _mirrored_interval(interval: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Quadratic(Tendon):
-    """tau = k phi^2 for phi >= 0; a pair of them behaves as an elastic joint of any chosen stiffness."""
+    """Tendon tau = k phi^2 for phi >= 0; a pair behaves as an elastic joint with a stiffness of choice."""
 
     k: float = number(units.QUADRATIC_STIFFNESS, "quadratic coefficient k", check=POSITIVE)
 
@@ -137,36 +137,36 @@ class Quadratic(Tendon):
         return (0.0, self.k)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair of twins."""
+        """Return the closed solution for two equal tendons; None for other laws."""
         return QuadraticTwins(self) if other == self.as_second() else None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Hardening 1/phi, infinite where the tendon goes slack."""
+        """Return the hardening 1/phi, infinite where the tendon goes slack."""
         with np.errstate(divide="ignore"):
             return 1 / np.abs(phi)
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque k phi^2."""
+        """Return the torque k phi^2."""
         return self.k * phi * phi
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness 2 k phi."""
+        """Return the stiffness 2 k phi."""
         return 2 * self.k * phi
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope 2 k."""
+        """Return the slope 2 k."""
         return np.where(np.isnan(phi), np.nan, 2 * self.k)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature zero."""
+        """Return the curvature, zero."""
         return np.zeros_like(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy k phi^3/3."""
+        """Return the energy k phi^3/3."""
         return self.k * phi * phi * phi / 3
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse sqrt(tau/k)."""
+        """Return the inverse sqrt(tau/k)."""
         return np.sqrt(np.maximum(torque, 0) / self.k)
 
 
@@ -186,52 +186,52 @@ class QuadraticTwins(Pair):
 
 @dataclass(frozen=True)
 class Exponential(Tendon):
-    """tau = c (exp(a phi) - 1) for phi >= 0, so that sigma = a (tau + c)."""
+    """Tendon tau = c (exp(a phi) - 1) for phi >= 0, so that sigma = a (tau + c)."""
 
     c: float = number(units.TORQUE, "torque scale c", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Return the closed pair with a tendon of the same a on side 2."""
+        """Return the closed solution with a tendon of equal a on side 2; None for other laws."""
         second = other.law if isinstance(other, Mirrored) else None
         if isinstance(second, Exponential) and same_number(second.a, self.a):
             return ExponentialPair(self, second)
         return None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Torque and stiffness, and the others each a times the one before."""
+        """Return torque and stiffness, and the slope and curvature, each a times the one before."""
         torque = self.torque(phi)
         stiffness = self.a * (torque + self.c)
         return (torque, stiffness, self.a * stiffness, self.a**2 * stiffness)[: order + 1]
 
     def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque c (exp(a phi) - 1)."""
+        """Return the torque c (exp(a phi) - 1)."""
         return self.c * np.expm1(self.a * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness a (tau + c)."""
+        """Return the stiffness a (tau + c)."""
         return self.a * (self.torque(phi) + self.c)
 
     def slope(self, phi: FloatArray) -> FloatArray:
-        """Slope a sigma."""
+        """Return the slope a sigma."""
         return self.a * self.stiffness(phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """Curvature a^2 sigma."""
+        """Return the curvature a^2 sigma."""
         return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
-        """Energy tau/a - c phi."""
+        """Return the energy tau/a - c phi."""
         return self.torque(phi) / self.a - self.c * phi
 
     def deflection(self, torque: FloatArray) -> FloatArray:
-        """Inverse ln(1 + tau/c)/a."""
+        """Return the inverse ln(1 + tau/c)/a."""
         return np.log1p(np.maximum(torque, 0) / self.c) / self.a
 
 
 @dataclass(frozen=True)
 class ExponentialPair(Pair):
-    """Two exponential tendons of the same a: sigma/a = tau_1 + |tau_2| + c_1 + c_2; never singular."""
+    """Two exponential tendons of equal a: sigma/a = tau_1 + |tau_2| + c_1 + c_2; never singular."""
 
     first: Exponential
     second: Exponential

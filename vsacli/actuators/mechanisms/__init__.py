@@ -1,6 +1,6 @@
-"""Mechanisms of serial actuators, and what a mechanism of one's own needs.
+"""Mechanisms of serial actuators, and the names that a user-defined mechanism needs.
 
-Adding a mechanism is adding a class derived from `Mechanism` and its line in `MECHANISMS`.
+To add a mechanism, derive a class from `Mechanism` and add a line to `MECHANISMS`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MECHANISMS = LazyRegistry(
         "shifted_cams": "vsacli.actuators.mechanisms.shifted_cams:ShiftedCams",
     }
 )
-"""Mechanisms by the name they have in a robot file."""
+"""Mechanisms by their name in a robot file."""
 
 __all__ = [
     "DIMENSIONLESS",

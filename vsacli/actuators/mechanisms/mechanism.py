@@ -18,15 +18,15 @@ from vsacli.documents.source import Source
 
 
 class Partials(NamedTuple):
-    """The potential U(phi, s) and its partial derivatives at deflections and settings, arrays of one shape.
+    """Potential U(phi, s) and its partial derivatives at deflections and settings, arrays of one shape.
 
     Subscripts of the torque T = U_phi: p for phi, s for the setting theta_2.
 
     Attributes:
         energy: U.
-        setting_torque: U_s, what the springs exert against motor 2.
+        setting_torque: U_s, the torque of the springs against motor 2.
         setting_stiffness: U_ss.
-        T, T_p, T_s, T_pp, T_ps, T_ss, T_ppp, T_pps, T_pss: the torque and its derivatives.
+        T, T_p, T_s, T_pp, T_ps, T_ss, T_ppp, T_pps, T_pss: Torque and its derivatives.
     """
 
     energy: FloatArray
@@ -57,7 +57,7 @@ class DecouplingRows(NamedTuple):
         return self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
 
     def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A^-1 times a right-hand side; NaN where A is singular."""
+        """Return A^-1 times a right-hand side; NaN where A is singular."""
         determinant = self.determinant
         divisor = np.where(determinant == 0, np.nan, determinant)
         return (
@@ -67,7 +67,7 @@ class DecouplingRows(NamedTuple):
 
 
 class MechanismState(ElasticState):
-    """The springs of a serial actuator at coordinates, for the inverse and for the forward dynamics."""
+    """State of a serial actuator's springs at coordinates, for inverse and forward dynamics."""
 
     @property
     @abstractmethod
@@ -81,14 +81,14 @@ class MechanismState(ElasticState):
 
     @abstractmethod
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
-        """Rates of the coordinates that give torque and stiffness these rates, (68); NaN if A is singular."""
+        """Return the coordinates' rates for rates of torque and stiffness, (68); NaN where A is singular."""
 
     @abstractmethod
     def spring_rates(self, rates: FloatArray) -> FloatArray:
-        """Rates of the torques against the motors, (..., 2), from those of the coordinates."""
+        """Return the rates of the torques against the motors, (..., 2), from rates of the coordinates."""
 
     def determinant(self) -> FloatArray:
-        """Det A."""
+        """Return det A."""
         return self.rows.determinant
 
 
@@ -125,34 +125,34 @@ class DeflectionState(MechanismState):
         return DecouplingRows(p.T_p, p.T_s, p.T_pp, p.T_ps)
 
     def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """T_p phi' + T_s s'."""
+        """Return T_p phi' + T_s s'."""
         p = self._partials
         return p.T_p * rates[..., 0] + p.T_s * rates[..., 1]
 
     def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """T_pp phi' + T_ps s'."""
+        """Return T_pp phi' + T_ps s'."""
         p = self._partials
         return p.T_pp * rates[..., 0] + p.T_ps * rates[..., 1]
 
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """T_ppp phi'^2 + 2 T_pps phi' s' + T_pss s'^2."""
+        """Return T_ppp phi'^2 + 2 T_pps phi' s' + T_pss s'^2."""
         p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
         return p.T_ppp * dphi * dphi + 2 * p.T_pps * dphi * ds + p.T_pss * ds * ds
 
     def spring_rates(self, rates: FloatArray) -> FloatArray:
-        """Rates of T and U_s."""
+        """Return the rates of T and U_s."""
         p = self._partials
         of_setting = p.T_s * rates[..., 0] + p.setting_stiffness * rates[..., 1]
         return np.stack((self.torque_rate(rates), of_setting), axis=-1)
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
-        """A^-1 (tau_e', sigma')."""
+        """Return A^-1 (tau_e', sigma')."""
         return np.stack((*self.rows.solve(dtau_e, dstiffness), dq), axis=-1)
 
     def motor_accelerations(
         self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """A^-1 (tau_e'', sigma'') less what is quadratic in the rates; theta_1'' = phi'' + q''."""
+        """Return A^-1 of (tau_e'', sigma'') minus terms quadratic in the rates; theta_1'' = phi'' + q''."""
         p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
         squared, mixed, of_setting = dphi * dphi, 2 * dphi * ds, ds * ds
         ddphi, dds = self.rows.solve(
@@ -167,13 +167,13 @@ Range: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True)
 class Mechanism(ABC):
-    """Springs between motor 1, the link, and motor 2, which sets them; a frozen dataclass of declared fields.
+    """Springs between motor 1 and the link that motor 2 adjusts; a frozen dataclass of declared fields.
 
-    Equal mechanisms are the same for all that is computed. What depends on phi = theta_1 - q and the setting
-    s = theta_2 alone gives `partials`; else it overrides `state`. Positions in rad (m), torques in N m (N).
+    Equal mechanisms must compute the same. If the potential depends only on phi = theta_1 - q and the setting
+    s = theta_2, override `partials`, else `state`. Positions in rad (m), torques in N m (N).
 
     Attributes:
-        joint_types: of the joints that it can drive; a lever that turns drives no prismatic one.
+        joint_types: Types of joints that it can drive; a rotating lever drives no prismatic one.
     """
 
     joint_types: ClassVar[tuple[str, ...]] = ("revolute", "prismatic")
@@ -184,17 +184,17 @@ class Mechanism(ABC):
     @classmethod
     @abstractmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Plausible values of its fields, as a new robot file shows them."""
+        """Return plausible values of the fields, for a new robot file."""
 
     @property
     def deflection_range(self) -> tuple[float, float]:
-        """Phi for which the mechanism works."""
+        """Range of phi in which the mechanism works."""
         return (-math.inf, math.inf)
 
     @property
     @abstractmethod
     def setting_range(self) -> tuple[float, float]:
-        """theta_2 for which it works."""
+        """Range of theta_2 in which the mechanism works."""
 
     @property
     def ranges(self) -> tuple[Range, Range]:
@@ -207,12 +207,12 @@ class Mechanism(ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on the distance of the mechanism from the device it describes."""
+        """Warnings, as sentences, that the mechanism deviates from the device it describes."""
         return ()
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Files that it was read from."""
+        """Files that the mechanism was read from."""
         return ()
 
     @property
@@ -227,25 +227,25 @@ class Mechanism(ABC):
 
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Return the corridor of the stiffness at an elastic torque, and where the demanded one is reached.
+        """Return the attainable range of the stiffness at an elastic torque, and phi, s for the demanded one.
 
         Args:
-            tau_e: elastic torque, (samples,), N m (N).
-            stiffness: demanded joint stiffness, (samples,), N m/rad (N/m).
-            q: position of the joint, (samples,); counts only if the potential depends on it beside phi.
+            tau_e: Elastic torque, (samples,), N m (N).
+            stiffness: Demanded joint stiffness, (samples,), N m/rad (N/m).
+            q: Position of the joint, (samples,); ignored if the potential depends on phi and s alone.
 
         Returns:
-            phi_1 is phi and phi_2 is theta_2, for the stiffness clipped into the corridor. An end is critical
-            where A is singular; the torque's maximum and the ends of ranges are not.
+            A solution with phi as phi_1 and theta_2 as phi_2, for the stiffness clipped to the range. An end
+            is critical where A is singular; the maximum of the torque and the ends of ranges are not.
         """
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other word that its field `preload` may hold; None if there is none."""
+        """The other value of the field `preload`; None if there is no other branch."""
         return None
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where the other branch of the mechanism would attain the stiffness."""
+        """Return where the stiffness is attainable on the other branch of the mechanism, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:

@@ -1,4 +1,4 @@
-"""Two cams that motor 2 turns against each other, as in the floating spring joint of the DLR."""
+"""Two cams that motor 2 rotates relative to each other, as in the floating spring joint of the DLR."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from vsacli.documents.source import Source
 
 @dataclass(frozen=True)
 class ShiftedCams(Mechanism):
-    """Two cams, turned against each other by s = theta_2: U = U_1(phi + s) + U_2(phi - s).
+    """Two cams, rotated in opposite directions by s = theta_2: U = U_1(phi + s) + U_2(phi - s).
 
     The form of the floating spring joint (Wolf, Eiberger & Hirzinger, ICRA 2011) and of the bidirectional
     antagonism BAVS (Petit, Friedl, Hoeppner & Grebenstein, IEEE/ASME Transactions on Mechatronics 2015).
-    Torque and stiffness are those of an antagonistic pair (14) with phi_1 = phi + s and phi_2 = phi - s, and
-    so are branch and corridor.
+    Torque, stiffness, branch and attainable range are those of an antagonistic pair (14) with
+    phi_1 = phi + s and phi_2 = phi - s.
     """
 
     spring: tuple[SpringLaw, SpringLaw] = value(
@@ -41,7 +41,7 @@ class ShiftedCams(Mechanism):
         check_fields(self, *self._cams.problems(), *self._limit_problems())
 
     def _limit_problems(self) -> Iterator[FieldProblem]:
-        """Yield the problem of a limited rotation: the rotation of a cam is no flagged variable."""
+        """Yield a problem if the rotation of a cam is limited: it is no result variable to flag."""
         for side, law in enumerate(self.spring):
             if math.isfinite(law.max_deflection):
                 reason = "is not known of a cam, whose turn is no variable of results; leave it out"
@@ -53,26 +53,26 @@ class ShiftedCams(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Cams alike, whose torque grows with the cube of the turn."""
+        """Return equal cams, whose torque grows with the cube of the rotation."""
         revolute = joint_type == "revolute"
         constants = {"k": 200, "k_c": 8000} if revolute else {"k": 2000, "k_c": 500000}
         return {"spring": {"type": "cubic", **constants}}
 
     @property
     def deflection_range(self) -> Range:
-        """Phi at which both cams can hold."""
+        """Range of phi in which both cams' laws hold for some theta_2."""
         (low_1, high_1), (low_2, high_2) = self.ranges
         return (low_1 + low_2) / 2, (high_1 + high_2) / 2
 
     @property
     def setting_range(self) -> Range:
-        """theta_2 at which both can."""
+        """Range of theta_2 in which both cams' laws hold for some phi."""
         (low_1, high_1), (low_2, high_2) = self.ranges
         return (low_1 - high_2) / 2, (high_1 - low_2) / 2
 
     @property
     def ranges(self) -> tuple[Range, Range]:
-        """The ranges of either cam's law."""
+        """Domains of both cams' laws."""
         first, second = self._cams.laws
         return first.domain, second.domain
 
@@ -82,7 +82,7 @@ class ShiftedCams(Mechanism):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of the cams, once if both are equal."""
+        """Warnings of the cams, without repetition if one law serves both."""
         return tuple(warning for law in self._cams.distinct for warning in law.warnings)
 
     @property
@@ -97,14 +97,14 @@ class ShiftedCams(Mechanism):
         return (SpringElement(first, -1.0, (1.0, 1.0)), SpringElement(second, -1.0, (1.0, -1.0)))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """Deflection and setting from the solution of the pair."""
+        """Return deflection and setting from the solution of the pair."""
         with np.errstate(all="ignore"):  # a torque may be infinite
             found = self._cams.solve(tau_e, stiffness)
         return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other sign of theta_2, unless the cams are alike and it makes no difference."""
+        """The other sign of theta_2; None if the cams are equal and it makes no difference."""
         first, second = self._cams.laws
         return None if first == second else self._cams.opposite
 
@@ -113,7 +113,7 @@ class ShiftedCams(Mechanism):
         return self._cams.opposite_reaches(tau_e, stiffness)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
-        """Sums and differences of those of both cams; det A is -2 times that of the pair."""
+        """Return sums and differences of both cams' derivatives; det A is -2 times that of the pair."""
         first, second = self._cams.laws
         (energy_1, one), (energy_2, two) = first.energy_and_state(phi + s), second.energy_and_state(phi - s)
         return Partials(

@@ -1,4 +1,9 @@
-"""Pairs of springs that drive a joint: (14) solved, and which stiffness can be reached."""
+"""Pairs of springs that drive a joint: solution of (14), and the attainable range of the stiffness.
+
+Equal cubic springs and tendons have closed solutions, in the file of their law. For all others: `balance` has
+the equations and steps, `critical_points` and `folds` the singularities that end a branch, `corridor` the
+attainable range, `solver` the iteration on it. `joints` has the decoupling matrix A of solved pairs.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +15,13 @@ __all__ = ["make_pair"]
 
 
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
-    """Return the solver of (14) for two laws, side 1 preloaded upward: closed if possible, else iterated."""
+    """Return the solver of (14) for two laws with phi_1 up: closed if the laws have one, else iterated."""
     return first.closed_pair(second) or _iterated(first, second)
 
 
 @lru_cache(maxsize=1024)
 def _iterated(first: SpringLaw, second: SpringLaw) -> Pair:
-    """Equal laws get the same pair, which keeps what it has found out about them."""
+    # Cached, since a pair maps its folds once: equal laws share the map.
     from vsacli.actuators.pairs.solver import IteratedPair
 
     return IteratedPair(first, second)

@@ -1,4 +1,8 @@
-"""Two springs that share an elastic torque: states over the preload, first guesses and steps of (14)."""
+"""Two springs that share an elastic torque: states over the preload torque, and steps to the root of (14).
+
+A step of (14) is split in two: a shift of both sides by the same amount restores the torque, and a spread of
+phi_1 - phi_2 along the curve of equal tau_e attains the stiffness, which is a parabola over the spread.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +28,14 @@ class PairState(NamedTuple):
 
     @classmethod
     def of(cls, values: Values) -> PairState:
-        """Return the state whose `values` these are."""
+        """Return the state from its `values`."""
         phi_1, phi_2, *springs = values
         count = len(SpringState._fields)
         return cls(phi_1, phi_2, SpringState(*springs[:count]), SpringState(*springs[count:]))
 
     @property
     def values(self) -> Values:
-        """All arrays in a row, as loops and branches take them."""
+        """All arrays as one tuple, the form that `repeat` and `where_needed` pass on."""
         return self.phi_1, self.phi_2, *self.one, *self.two
 
     @property
@@ -46,11 +50,11 @@ class PairState(NamedTuple):
 
     @property
     def rho(self) -> Sides:
-        """Relative hardening rho = zeta/sigma of either spring."""
+        """Relative hardening rho = zeta/sigma of each spring."""
         return self.one.zeta / self.one.sigma, self.two.zeta / self.two.sigma
 
     def regularized(self) -> PairState:
-        """Return the balance with a stiffness of one where both springs are slack, to divide by it."""
+        """Return the state with both stiffnesses set to 1 where both springs are slack, to avoid 0/0."""
         slack = self.stiffness == 0
         one, two = (
             spring._replace(sigma=np.where(slack, 1.0, spring.sigma)) for spring in (self.one, self.two)
@@ -58,7 +62,7 @@ class PairState(NamedTuple):
         return self._replace(one=one, two=two)
 
     def linearization_error(self, step_1: FloatArray, step_2: FloatArray) -> FloatArray:
-        """Elastic torque after short steps less what its tangent gives, to the third order of the steps."""
+        """Return the elastic torque after short steps minus its linear prediction, to third order."""
         return self.one.linearization_error(step_1) + self.two.linearization_error(step_2)
 
     def after(self, step_1: FloatArray, step_2: FloatArray) -> PairState:
@@ -69,7 +73,7 @@ class PairState(NamedTuple):
 
 
 def under(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-    """Deflection and state of a spring under a torque, which code that must be short has once."""
+    """Return deflection and state of a spring under a torque, as a subroutine of compiled code."""
 
     def found(torque: FloatArray) -> Values:
         phi, state = law.deflection_and_state(torque)
@@ -81,7 +85,7 @@ def under(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
 
 @dataclass(frozen=True)
 class Balance:
-    """Two springs, and the preload torque t between them: tau_1 = tau_e/2 + t and tau_2 = tau_e/2 - t.
+    """Two springs with the preload torque t between them: tau_1 = tau_e/2 + t and tau_2 = tau_e/2 - t.
 
     The joint stiffness G = sigma_1 + sigma_2 has the slope dG/dt = rho_1 - rho_2 with the relative hardening
     rho_k = zeta_k/sigma_k, and det A = -sigma_1 sigma_2 dG/dt. Arrays of any one shape.
@@ -92,14 +96,14 @@ class Balance:
 
     @cached_property
     def domain_ends(self) -> tuple[tuple[SpringState, ...], ...]:
-        """State of each spring at the two ends of its domain; scalars, unknown where there is no end."""
+        """State of each spring at the two ends of its domain; scalars, undefined if an end is infinite."""
         with np.errstate(all="ignore"):
             return tuple(
                 tuple(law.state(np.array(phi)) for phi in law.domain) for law in (self.first, self.second)
             )
 
     def preload_range(self, tau_e: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Smallest and largest t for which both laws hold; smallest > largest if there is none."""
+        """Return the smallest and the largest t for which both laws hold; smallest > largest if none is."""
         (low_1, high_1), (low_2, high_2) = self.first.torque_range, self.second.torque_range
         return (
             np.maximum(low_1 - tau_e / 2, tau_e / 2 - high_2),
@@ -107,29 +111,29 @@ class Balance:
         )
 
     def deflections_at(self, tau_e: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """phi_1 and phi_2 at a preload torque."""
+        """Return phi_1 and phi_2 at a preload torque t."""
         return self.deflections(tau_e / 2 + t, tau_e / 2 - t)
 
     def deflections(self, tau_1: FloatArray, tau_2: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """phi_1 and phi_2 under the torques of the two springs."""
+        """Return phi_1 and phi_2 at the torques of the two springs."""
         state = self.state_under(tau_1, tau_2)
         return state.phi_1, state.phi_2
 
     def state_under(self, tau_1: FloatArray, tau_2: FloatArray) -> PairState:
-        """State of both springs under their torques."""
+        """Return the state of both springs at their torques."""
         (phi_1, one), (phi_2, two) = under(self.first, tau_1), under(self.second, tau_2)
         return PairState(phi_1, phi_2, one, two)
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
-        """State of both springs at deflections."""
+        """Return the state of both springs at their deflections."""
         return PairState(phi_1, phi_2, state_of(self.first, phi_1), state_of(self.second, phi_2))
 
     def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
-        """G at deflections."""
+        """Return G at deflections."""
         return self.first.stiffness(phi_1) + self.second.stiffness(phi_2)
 
     def stiffness_slope(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
-        """dG/dt at deflections."""
+        """Return dG/dt at deflections."""
         return self.first.hardening(phi_1) - self.second.hardening(phi_2)
 
     def is_slack(self, tau_e: FloatArray, t: FloatArray) -> BoolArray:
@@ -143,30 +147,31 @@ class Balance:
 
 
 MAX_CORRECTION_SHARE = 0.25
-"""Largest share of the spread by which the curve of equal tau_e is taken to leave its tangent.
+"""Largest correction of a step for the bend of the curve of equal tau_e, as a share of the spread.
 
-By trial with pairs of every law: between a tenth and a half the number of steps is about the same, and with
-more of it more samples end in bracketing."""
+Found by trial with pairs of every law: between 0.1 and 0.5 the number of steps is about the same; with larger
+values more samples end in bracketing."""
 
 QUARTIC_COEFFICIENT, MAX_SQUARED_ARGUMENT = 0.025, 3.0
-"""Coefficient and bound of the quartic that makes springs stiffen faster than cosh.
+"""Coefficient and bound of the quartic term in the first guess, for springs that stiffen faster than cosh.
 
-By trial with pairs of every law: without it, more steps are taken and more samples end in bracketing."""
+Found by trial with pairs of every law: without it, more steps are needed, and more samples end in
+bracketing."""
 
 MIN_SCALE_SHARE = 1e-4
-"""Share of the demand below which the stiffness at the inner end is no scale for it."""
+"""Smallest scale of the stiffness in the first guess, as a share of the demand."""
 
 
 class StiffnessParabola(NamedTuple):
-    """The stiffness along the curve of equal tau_e, over the spread phi_1 - phi_2; arrays (samples,).
+    """Parabola of the stiffness along the curve of equal tau_e, over the spread phi_1 - phi_2; (samples,).
 
     Attributes:
-        stiffness: the stiffness itself.
-        shift_slope: its relative slope where both sides move up alike.
-        share_1: of the spread, what side 1 moves up.
-        share_2: what side 2 moves down.
-        slope: first derivative of the stiffness.
-        curvature: second derivative.
+        stiffness: Stiffness at the point of contact.
+        shift_slope: Derivative of the stiffness by a shift of both sides, relative to the stiffness.
+        share_1: Share of the spread by which side 1 moves up.
+        share_2: Share of the spread by which side 2 moves down.
+        slope: First derivative of the stiffness over the spread.
+        curvature: Second derivative.
     """
 
     stiffness: FloatArray
@@ -178,7 +183,7 @@ class StiffnessParabola(NamedTuple):
 
     @classmethod
     def of(cls, state: PairState) -> StiffnessParabola:
-        """Return the parabola that touches the stiffness at deflections."""
+        """Return the parabola with value, slope and curvature of the stiffness at a state."""
         one, two = state.one, state.two
         stiffness = state.stiffness
         share_1, share_2 = two.sigma / stiffness, one.sigma / stiffness
@@ -194,21 +199,22 @@ class StiffnessParabola(NamedTuple):
         )
 
     def slope_sum(self, growth: FloatArray, sign: FloatArray) -> FloatArray:
-        """Sum of the slopes before and after a growth of the stiffness, which is half of it times the spread.
+        """Return the sum of the slopes before and after a growth of the stiffness; `sign` is their sign.
 
-        The sign is that of the slopes.
+        On a parabola growth = spread * sum / 2. Solved for the spread, this form of the root of a quadratic
+        equation has no cancellation.
         """
         squared = self.slope * self.slope + 2 * self.curvature * growth
         return self.slope + sign * np.sqrt(np.maximum(squared, 0))
 
 
 def first_guess(inner: PairState, inner_stiffness: FloatArray, demand: FloatArray, sign: FloatArray) -> Sides:
-    """Deflections for a demand, as the stiffness grows from the inner end on.
+    """Return approximate deflections for a demanded stiffness, extrapolated from the inner end of the branch.
 
     Args:
-        inner: springs at the inner end.
-        inner_stiffness: joint stiffness there, NaN where tau_e cannot be carried.
-        demand: joint stiffness demanded.
+        inner: Springs at the inner end.
+        inner_stiffness: Joint stiffness there, NaN where tau_e cannot be carried.
+        demand: Demanded joint stiffness.
         sign: 1 where the stiffness increases with the preload, else -1.
     """
     inner = inner.regularized()
@@ -222,9 +228,10 @@ def first_guess(inner: PairState, inner_stiffness: FloatArray, demand: FloatArra
 
 
 def _quadratic_part(excess: FloatArray) -> FloatArray:
-    """Return the part of an excess of stiffness, relative to the inner end, that the curvature there makes.
+    """Return the excess of stiffness that the parabola at the inner end has where the stiffness has `excess`.
 
-    If the stiffness grows as cosh it is acosh(1 + excess)^2/2; many springs stiffen still faster.
+    Both relative to the stiffness there. For a stiffness that grows as cosh it is acosh(1 + excess)^2/2; many
+    springs stiffen still faster.
     """
     excess = np.maximum(excess, 0)
     argument = np.log1p(excess + np.sqrt(excess * (excess + 2)))
@@ -236,7 +243,7 @@ def _quadratic_part(excess: FloatArray) -> FloatArray:
 def third_order_step(
     state: PairState, tau_e: FloatArray, demand: FloatArray, sign: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Steps of phi_1 and phi_2 to tau_e and to the demand, and the relative error that they leave."""
+    """Return steps of phi_1 and phi_2 towards tau_e and the demand, and the relative error after them."""
     parabola = StiffnessParabola.of(state)
     missing, unbalanced = demand - parabola.stiffness, tau_e - state.torque
     shift, growth = unbalanced / parabola.stiffness, missing - parabola.shift_slope * unbalanced
@@ -256,6 +263,6 @@ def third_order_step(
 def _correction(
     state: PairState, step_1: FloatArray, step_2: FloatArray, spread: FloatArray, stiffness: FloatArray
 ) -> FloatArray:
-    """Return a further step of both sides alike, from the tangent to the curve of equal tau_e."""
+    """Return a further shift of both sides, from the tangent back to the curve of equal tau_e."""
     most = MAX_CORRECTION_SHARE * np.abs(spread)
     return np.minimum(np.maximum(-state.linearization_error(step_1, step_2) / stiffness, -most), most)

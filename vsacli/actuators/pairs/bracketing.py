@@ -14,13 +14,14 @@ Function = Callable[..., FloatArray]
 """f(x, *constants) on arrays of one shape."""
 
 MAX_STEPS = 120
-"""Twice what bisection needs between neighbouring powers of two; more only if an end lies at zero."""
+"""Largest number of steps: twice as many as bisection needs between adjacent powers of two. Brackets with an
+end at zero may need more."""
 
 ROOT_RTOL = OfRounding(2 * np.finfo(float).eps)
 """Relative width of a bracket that cannot be halved any more."""
 
 ROOT_ATOL = 1e-300
-"""The same of a bracket at zero."""
+"""Absolute width of such a bracket at zero."""
 
 
 def bracketed_root(
@@ -28,7 +29,7 @@ def bracketed_root(
 ) -> FloatArray:
     """Return a root between `low` and `high`, where the function has opposite signs, to rounding.
 
-    If they have one sign, the end at which the function is nearer to zero.
+    If the signs are equal, return the end at which the function is nearer to zero.
 
     T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm for finding the zero of a nonlinear
     function without using derivatives, Advances in Engineering Software 28 (1997). Arrays (samples,).
@@ -63,7 +64,10 @@ def bracketed_root(
 def _next_share(
     x_1: FloatArray, f_1: FloatArray, x_2: FloatArray, f_2: FloatArray, x_3: FloatArray, f_3: FloatArray
 ) -> FloatArray:
-    """Return the next point between x_1 and x_2: by the parabola through three points if it is monotone."""
+    """Return the next point, as a share of the way from x_1 to x_2.
+
+    Inverse quadratic interpolation if the parabola through the three points is monotone, else bisection.
+    """
     with np.errstate(all="ignore"):
         xi, phi = (x_1 - x_2) / (x_3 - x_2), (f_1 - f_2) / (f_3 - f_2)
         monotone = (phi * phi < xi) & ((1 - phi) * (1 - phi) < 1 - xi)

@@ -1,8 +1,8 @@
-"""The branch of (14): the outermost monotone piece of the joint stiffness over the preload.
+"""The branch of (14) and its attainable range: the outermost monotone piece of the stiffness over preload.
 
-Where the two torques have opposite signs, rho_1 > 0 > rho_2 (the springs harden away from zero), so that
-the joint stiffness has critical points only where they have one sign. Towards larger preload from the
-outermost of them, the piece is monotone to the end of the laws' domain.
+Where the two torques have opposite signs, rho_1 > 0 > rho_2, since the springs harden away from zero. So the
+joint stiffness has critical points only where the torques have the same sign. From the outermost of these
+points to the end of the laws' domain the stiffness is monotone over the preload: this piece is the branch.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
 
 SMALLEST_PRELOAD, LARGEST_PRELOAD = 0, 1
-"""The two ends of the preload torque: side 1 at that end of its domain, or side 2 at the opposite one."""
+"""Ends of the preload torque: side 1 is at this end of its domain, or side 2 at the opposite end of its."""
 
 
 class End(NamedTuple):
     """Deflections at an end of the piece, and the joint stiffness there; arrays (samples,).
 
-    Where the piece has no end, an infinite stiffness at the deflections that the laws come close to.
+    Where nothing ends the piece, the stiffness is infinite and the deflections are their limits.
     """
 
     phi_1: FloatArray
@@ -38,12 +38,12 @@ class Corridor(NamedTuple):
     """The piece between its ends; arrays (samples,).
 
     Attributes:
-        inner: its end at the smaller preload; the stiffness is NaN where tau_e cannot be carried.
-        outer: its end at the larger preload, as above.
-        rising: whether the stiffness increases with the preload.
-        critical: whether the inner end is a critical point (else the end of a law's domain).
-        slack: whether a side that only pulls carries no torque at the inner end.
-        state: both springs at the inner end.
+        inner: End at the smaller preload; its stiffness is NaN where tau_e cannot be carried.
+        outer: End at the larger preload, as above.
+        rising: Whether the stiffness increases with the preload.
+        critical: Whether the inner end is a critical point (else the end of a law's domain).
+        slack: Whether a tendon carries no torque at the inner end.
+        state: Both springs at the inner end.
     """
 
     inner: End
@@ -55,7 +55,7 @@ class Corridor(NamedTuple):
 
 
 def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
-    """Return the piece of the joint stiffness that reaches the largest preload, for each tau_e (samples,)."""
+    """Return the monotone piece that extends to the largest preload, for each tau_e (samples,)."""
     least, largest = balance.preload_range(tau_e)
     carried = least <= largest
     exists, fold = outermost_fold(balance, folds, tau_e)
@@ -81,7 +81,7 @@ def _end(state: PairState) -> End:
 
 
 def _endless(balance: Balance, tau_e: FloatArray) -> End:
-    """Return the limit of the springs for a preload that grows without end."""
+    """Return the limit of the springs for a preload that grows without bound."""
     phi_1 = balance.first.domain[LARGEST_PRELOAD]
     phi_2 = balance.second.domain[1 - LARGEST_PRELOAD]
     return End(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
@@ -99,15 +99,15 @@ def _at_end(
     otherwise: Values,
     wanted: Callable[[PairState], Values],
 ) -> Values:
-    """Return values of the springs at the end of the preload; arrays (samples,).
+    """Return values of the springs at an end of the preload; arrays (samples,).
 
     Args:
-        balance: the springs.
+        balance: Springs.
         end: `SMALLEST_PRELOAD` or `LARGEST_PRELOAD`.
-        tau_e: elastic torque.
-        chosen: where to compute that.
-        otherwise: what holds elsewhere, and where the preload has no end.
-        wanted: arrays to return, as many as there are otherwise.
+        tau_e: Elastic torque.
+        chosen: Samples at which to compute the values.
+        otherwise: Values elsewhere, and where the preload has no end.
+        wanted: Function from the state at the end to the values, as many as in `otherwise`.
     """
     first, second = balance.first, balance.second
     tau_1, tau_2 = first.torque_range[end], second.torque_range[1 - end]

@@ -1,4 +1,8 @@
-"""Critical points of the joint stiffness: at one elastic torque, and as curves of equal hardening."""
+"""Critical points of the joint stiffness over the preload, at which rho_1 = rho_2 and A is singular.
+
+They lie on curves of equal relative hardening. `critical_curves` samples these for a pair of springs;
+`newton_step` and `bracketed_in_box` find the point at one elastic torque.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.compute.control_flow import Values
 
 SAMPLED_TORQUES = np.concatenate((np.geomspace(1e-14, 1e14, 281), np.geomspace(1e15, 1e120, 106)))
-"""Torques, N m, at which a spring without an end is sampled: ten a decade where springs have features."""
+"""Torques, N m, at which a spring with unbounded domain is sampled: ten per decade where it has features."""
 
 SAMPLED_SHARES = np.concatenate(
     (
@@ -28,19 +32,19 @@ SAMPLED_SHARES = np.concatenate(
         [1.0],
     )
 )
-"""Shares of the largest deflection at which one with an end is sampled; a measured curve has some dozen
-features."""
+"""Shares of the largest deflection at which a spring with bounded domain is sampled; a measured curve has
+some dozen features."""
 
 PEAK_SHARES = np.geomspace(1e-4, 0.5, 16)
-"""Shares of the way to the neighbouring nodes at which it is sampled next to a peak."""
+"""Further samples next to a peak, as shares of the distance to the adjacent nodes."""
 
 PEAK_RTOL = 1e-13
-"""Relative change of the hardening, over a doubling of the deflection, that may be rounding."""
+"""Largest relative change of the hardening, over a doubling of the deflection, that may be rounding."""
 
 CUSP_RTOL = 1e-11
-"""Relative change of tau_e between neighbouring points of a curve that rounding next to a peak does not make.
+"""Smallest relative change of tau_e between adjacent points of a curve that is not rounding next to a peak.
 
-Folds born closer together differ in stiffness by rounding only, which is of fourth order in their distance.
+Two folds that are closer than that differ in stiffness, to the fourth order of their distance, by rounding.
 """
 
 
@@ -49,10 +53,10 @@ class Hardening:
     """Relative hardening rho = zeta/sigma of a spring over positive torques; arrays (nodes,), ascending.
 
     Attributes:
-        law: the spring.
-        phi: deflections, rad (m).
-        rho: relative hardening.
-        peaks: indices where rho turns around.
+        law: Spring law.
+        phi: Deflections, rad (m).
+        rho: Relative hardening.
+        peaks: Indices of the local extrema of rho.
     """
 
     law: SpringLaw
@@ -61,7 +65,7 @@ class Hardening:
     peaks: IndexArray
 
     def pieces(self) -> Iterator[slice]:
-        """Nodes of each monotone piece; neighbours share the node at the peak."""
+        """Yield the nodes of each monotone piece; adjacent pieces share the node at the peak."""
         bounds = [0, *self.peaks.tolist(), len(self.phi) - 1]
         for first, last in pairwise(bounds):
             yield slice(first, last + 1)
@@ -91,12 +95,12 @@ class CriticalCurve(NamedTuple):
         return (self.tau_1 - self.tau_2) / 2
 
     def take(self, chosen: slice | IndexArray) -> CriticalCurve:
-        """Return some of the points."""
+        """Return a selection of the points."""
         return CriticalCurve(*(values[chosen] for values in self))
 
 
 class _Matches(NamedTuple):
-    """Nodes of one spring, and deflections of the other between which it has the same hardening; (nodes,)."""
+    """Nodes of one spring, and deflections between which the other has the same hardening; (nodes,)."""
 
     phi: FloatArray
     rho: FloatArray
@@ -105,7 +109,7 @@ class _Matches(NamedTuple):
 
 
 def sample_hardening(law: SpringLaw) -> Hardening | None:
-    """Sample the hardening of a law; None if it carries no positive torque."""
+    """Sample the hardening of a law; return None if it carries no positive torque."""
     end = law.torque_range[1]
     if end <= 0:
         return None
@@ -123,7 +127,7 @@ def sample_hardening(law: SpringLaw) -> Hardening | None:
 
 
 def _around(peak: float, phi: FloatArray) -> FloatArray:
-    """Deflections on either side of a peak, denser towards it."""
+    """Return deflections on either side of a peak, denser towards it."""
     above = int(np.searchsorted(phi, peak, side="right"))
     below = int(np.searchsorted(phi, peak)) - 1
     return np.concatenate(
@@ -132,7 +136,7 @@ def _around(peak: float, phi: FloatArray) -> FloatArray:
 
 
 def _peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
-    """Deflections strictly between nodes at which eta sigma - zeta^2 changes its sign."""
+    """Return deflections at which the slope of rho, eta sigma - zeta^2 over sigma^2, changes its sign."""
 
     def slope(phi: FloatArray) -> FloatArray:
         _, sigma, zeta, eta = law.derivatives(phi, 3)
@@ -166,10 +170,10 @@ def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCur
 
 
 def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
-    """Yield the curve of each pair of pieces of hardening, if there are two points on it.
+    """Yield the curve of each pair of monotone pieces of hardening, if it has at least two points.
 
-    Along it both torques increase together if the pieces both rise or both fall, else one against the other.
-    Where a hardening has become constant but for rounding, so has the torque of the other spring.
+    Along it both torques increase if both pieces rise or both fall; otherwise one increases while the other
+    decreases. Where one hardening is constant to rounding, so is the torque of the other spring.
     """
     pieces = list(product(one.pieces(), two.pieces()))
     of_one = [_matches(one, first, two, second) for first, second in pieces]
@@ -191,7 +195,7 @@ def _joined(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[FloatArray]:
 
 
 def _matches(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Matches:
-    """Nodes of a piece whose hardening a piece of the other spring has too, between two of its nodes."""
+    """Return the nodes of a piece whose hardening occurs in a piece of the other spring, and where."""
     direction = 1 if among.rises(other) else -1
     ascending = np.maximum.accumulate(among.rho[other][::direction])
     phi, rho = of.phi[piece], of.rho[piece]
@@ -202,19 +206,19 @@ def _matches(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Ma
 
 
 def _points(first: SpringLaw, second: SpringLaw, of_one: _Matches, of_two: _Matches) -> CriticalCurve:
-    """Nodes of each spring with the deflections of the other at the same hardening."""
+    """Return critical points at the nodes of each spring, with the other at the same hardening."""
     phi_1 = np.concatenate((of_one.phi, _equal_hardening(first, *of_two[1:])))
     phi_2 = np.concatenate((_equal_hardening(second, *of_one[1:]), of_two.phi))
     return CriticalCurve(phi_1, phi_2, first.torque(phi_1), second.torque(phi_2))
 
 
 def _equal_hardening(law: SpringLaw, rho: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Deflections between two others at which a spring has a hardening."""
+    """Return deflections between `low` and `high` at which a spring has the hardening rho."""
     return bracketed_root(lambda phi, wanted: law.hardening(phi) - wanted, low, high, (rho,))
 
 
 def _cusp_brackets(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
-    """Points of a curve between which tau_e turns around."""
+    """Return pairs of points of a curve between which tau_e has a local extremum, by index."""
     change = np.diff(tau_e)
     noticed = np.flatnonzero(np.abs(change) > CUSP_RTOL * tau_e[1:])
     turns = np.flatnonzero(np.diff(np.sign(change[noticed])))
@@ -222,7 +226,7 @@ def _cusp_brackets(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
 
 
 def _cusps(first: SpringLaw, second: SpringLaw, low: CriticalCurve, high: CriticalCurve) -> CriticalCurve:
-    """Return the points between two others of a curve at which tau_e is stationary along it."""
+    """Return the points between `low` and `high` at which tau_e is stationary along the curve."""
 
     def partner(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         return _equal_hardening(second, first.hardening(phi), low, high)
@@ -237,7 +241,7 @@ def _cusps(first: SpringLaw, second: SpringLaw, low: CriticalCurve, high: Critic
 
 
 def _hardening_slope(law: SpringLaw, phi: FloatArray) -> FloatArray:
-    """Derivative of the hardening over the torque."""
+    """Return the derivative of the hardening over the torque."""
     _, sigma, zeta, eta = law.derivatives(phi, 3)
     return (eta / sigma - (zeta / sigma) ** 2) / sigma
 
@@ -245,7 +249,7 @@ def _hardening_slope(law: SpringLaw, phi: FloatArray) -> FloatArray:
 def _split(
     curve: CriticalCurve, low: IndexArray, high: IndexArray, cusps: CriticalCurve
 ) -> Iterator[CriticalCurve]:
-    """Yield a curve split at its cusps, each between two of its points, in parts of ascending tau_e."""
+    """Yield a curve in parts of ascending tau_e, split at its cusps, each of which is between two points."""
     starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
         around = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
@@ -255,16 +259,17 @@ def _split(
 
 
 SHORT_RTOL = 2e-5
-"""Relative distance to a critical point of which one step leaves rounding only.
+"""Relative distance to a critical point from which one Newton step is exact to rounding.
 
-It squares the distance along the curve of equal tau_e, of which the stiffness has the square again; of the
-torque balance it leaves the fourth power. The stiffness after the step lacks the third power, a hundredth or
-so of it: with measured springs, the worst by trial, 1e-14 from this distance, 2e-13 from 5e-5.
+The step squares the distance along the curve of equal tau_e. The stiffness is stationary there, so its error
+is of fourth order, and so is that of the torque. The stiffness extrapolated to the end of the step lacks
+about a hundredth of the third power: for measured springs, the worst by trial, 1e-14 from this distance,
+2e-13 from 5e-5.
 """
 
 
 def along_critical_curve(state: PairState, rho: Sides) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Derivatives of phi_1 and phi_2 over tau_e where rho_1 - rho_2 is kept, and their common divisor."""
+    """Return the derivatives of phi_1 and phi_2 over tau_e at constant rho_1 - rho_2, and their divisor."""
     one, two = state.one, state.two
     rho_1, rho_2 = rho
     slope_1, slope_2 = one.eta / one.sigma - rho_1 * rho_1, two.eta / two.sigma - rho_2 * rho_2
@@ -273,9 +278,10 @@ def along_critical_curve(state: PairState, rho: Sides) -> tuple[FloatArray, Floa
 
 
 def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
-    """Return a Newton step on tau_1 + tau_2 = tau_e, rho_1 = rho_2, which keeps the first to the third order.
+    """Return a Newton step on tau_1 + tau_2 = tau_e, rho_1 = rho_2; the torque is kept to third order.
 
-    Both sides alike make up for the bend of the springs, since next to a cusp the critical curve does not.
+    The curvature of the springs is compensated by a shift of both sides: next to a cusp, a step along the
+    critical curve cannot do it.
     """
     one, two = state.one, state.two
     (rho_1, rho_2), (along_1, along_2, divisor) = rho, along_critical_curve(state, rho)
@@ -287,7 +293,7 @@ def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
 
 
 def is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
-    """Return whether a step is so short that the next would be rounding."""
+    """Return whether a step is so short that the next would be rounding; see `SHORT_RTOL`."""
     (rho_1, rho_2), (size_1, size_2) = rho, map(np.abs, steps)
     hardened = np.abs(rho_1) * size_1 + np.abs(rho_2) * size_2
     short: BoolArray = (hardened <= SHORT_RTOL) & (
@@ -300,9 +306,9 @@ def bracketed_in_box(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> V
     """Return the critical point within a box by bracketing the preload torque.
 
     Args:
-        balance: the springs.
-        tau_e: elastic torque.
-        *box: smallest and largest phi_1, smallest and largest phi_2, between which there is one.
+        balance: Springs.
+        tau_e: Elastic torque.
+        *box: Smallest and largest phi_1, smallest and largest phi_2; the box contains one critical point.
     """
     low_1, high_1, low_2, high_2 = box
     at_least, at_most = balance.state(low_1, high_2), balance.state(high_1, low_2)

@@ -1,6 +1,7 @@
 """The outermost fold of a pair of springs: the critical point of the joint stiffness at the largest preload.
 
-A map of it over the elastic torque is made once: few nodes, between which Hermite's cubics guess it.
+`map_folds` maps it over the elastic torque once per pair: nodes, between which Hermite cubics are a guess
+that one Newton step corrects. `outermost_fold` evaluates the map at the elastic torques of samples.
 """
 
 from __future__ import annotations
@@ -26,24 +27,24 @@ from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 from vsacli.compute.rounding import OfRounding
 
 CUSP_SLOPE_RATIO = 30.0
-"""Smallest ratio of the slope at the end of a stretch to its mean at a cusp.
+"""Ratio of the slope at the end of a stretch to its mean slope, above which the end is a cusp.
 
-It does a billion times or more, or some thousand times where rounding hides how the curve begins."""
+At cusps the ratio is a billion or more, or some thousand where rounding hides the beginning of the curve."""
 
 NONE = -1
-"""Stands for the number of a curve where there is no fold."""
+"""Number of the curve where there is no fold."""
 
 
 class FoldPoints(NamedTuple):
     """Critical points of the outermost curves; arrays (points,).
 
     Attributes:
-        tau_e: elastic torque.
-        phi: deflections, (2, points).
-        slope: their derivatives along the curve, (2, points).
-        rho: relative hardening there, (2, points).
-        last: index of the last point in the same stretch of a curve.
-        cusp: 1 at the ends of a stretch where the curve turns around, else 0.
+        tau_e: Elastic torque.
+        phi: Deflections, (2, points).
+        slope: Derivatives of the deflections over tau_e, (2, points).
+        rho: Relative hardening, (2, points).
+        last: Index of the last point in the same stretch of a curve.
+        cusp: 1 at the ends of a stretch at which the curve has a cusp, else 0.
     """
 
     tau_e: FloatArray
@@ -55,12 +56,12 @@ class FoldPoints(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """Between neighbouring critical points of the curve that is the outermost there.
+    """Cells of tau_e, each between adjacent critical points of the curve that is outermost there.
 
     Attributes:
-        edges: torques between the cells, (cells + 1,), ascending.
+        edges: Torques between the cells, (cells + 1,), ascending.
         corners: tau_e, phi_1 and phi_2 at either end, (3, 2, cells).
-        curve: number of the curve, (cells,), or `NONE`.
+        curve: Number of the curve, (cells,), or `NONE`.
     """
 
     edges: FloatArray
@@ -69,12 +70,12 @@ class _Cells(NamedTuple):
 
 
 def outermost_folds(balance: Balance) -> FoldPoints:
-    """Return points of a pair over all elastic torques, dense enough for each feature of the springs."""
+    """Return the outermost critical points over all elastic torques, dense enough for all spring features."""
     return _row(balance, _cut(balance, _cells(balance.first, balance.second)))
 
 
 def _cells(first: SpringLaw, second: SpringLaw) -> _Cells:
-    """Return the cells of negative torques, from the pair turned around, and of positive ones."""
+    """Return the cells of negative torques, from the mirrored pair, followed by those of positive ones."""
     above = _positive_cells(first, second)
     below = _positive_cells(Mirrored(law=second), Mirrored(law=first))
     turned = np.where(below.curve == NONE, NONE, below.curve + above.curve.max() + 1)
@@ -111,7 +112,7 @@ def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:
 
 
 def _cut(balance: Balance, cells: _Cells) -> _Cells:
-    """Return the curve with corners on the edges, also where another curve takes over between points."""
+    """Return the cells with corners moved to their edges, where another curve becomes the outermost."""
     corners = cells.corners.copy()
     low, high = np.sort(cells.corners, axis=1).swapaxes(0, 1)
     for side, edges in enumerate((cells.edges[:-1], cells.edges[1:])):
@@ -122,7 +123,7 @@ def _cut(balance: Balance, cells: _Cells) -> _Cells:
 
 
 def _row(balance: Balance, cells: _Cells) -> FoldPoints:
-    """Return the corners in a row, one where there is no fold, and one at infinity."""
+    """Return the corners of all cells as points, one for cells without a fold, and one at infinity."""
     ends = np.append(np.flatnonzero(np.diff(cells.curve)) + 1, cells.curve.size)
     rows: list[FloatArray] = []
     last: list[int] = []
@@ -144,7 +145,7 @@ def _row(balance: Balance, cells: _Cells) -> FoldPoints:
 
 
 def _cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
-    """Return 1 where a stretch begins or ends with a slope far above its mean, else 0."""
+    """Return 1 at the ends of stretches whose slope is far above the mean slope, else 0."""
     ends = np.unique(last)
     begins = np.append(0, ends[:-1] + 1)
     chord = (phi[:, ends] - phi[:, begins]) / (tau_e[ends] - tau_e[begins])
@@ -156,37 +157,37 @@ def _cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArr
 
 
 MONOTONE_SLOPE_RATIO = 3.0
-"""Most by which the slopes at the ends of a cubic exceed the mean so that it is monotone for sure."""
+"""Largest ratio of the slopes at the ends of a cubic to its mean slope that ensures that it is monotone."""
 
 GUESS_RTOL = 0.9 * SHORT_RTOL
-"""Relative distance to a fold that cubics between the nodes may have, so that one step is enough.
+"""Largest relative distance of a cubic between nodes from the fold, so that one Newton step is enough.
 
-It is seen to at `TESTED` points of a cubic, between which it may be a little more."""
+Below `SHORT_RTOL`, since it is checked at the points `TESTED` only and may be a little larger elsewhere."""
 
 TESTED = np.linspace(0, 1, 10)[1:-1]
 """Shares of the critical points between two nodes at which the cubic is compared with them."""
 
 SAME_SLOPE_RTOL = 1e-6
-"""Relative change of the slopes where a curve ends and the next goes on, of which one node is enough."""
+"""Relative change of the slopes below which a curve and its successor share one node."""
 
 MIDDLE_ROOT = 0.5
-"""Root of the share, counted from a cusp, at which the cubic meets the curve."""
+"""Square root of the share of a cell, counted from a cusp, at which the cubic passes through the curve."""
 
 
 class FoldMap(NamedTuple):
-    """Nodes of the outermost fold, of which two of the same torque are where it jumps; arrays (nodes,).
+    """Nodes of the outermost fold; two nodes of the same torque are a jump; arrays (nodes,).
 
-    Between two nodes the fold moves from one corner of a box to the other; there is none if either of them
-    has no deflections.
+    Between two nodes the fold moves from one corner of a box to the other; there is none if either node has
+    no deflections.
 
     Attributes:
-        tau_e: elastic torques, ascending from minus infinity to infinity.
-        phi_1: deflections of side 1, NaN beyond the ends and at the beginning of a gap.
-        phi_2: deflections of side 2, as above.
-        slope_1: derivatives of phi_1 over tau_e, with the digits of single precision; at a cusp over the root
-            of the share of the cell, divided by its width.
-        slope_2: the same of phi_2.
-        cusp: 1 where the curve turns around, so that the fold moves there as the root of tau_e, else 0.
+        tau_e: Elastic torques, ascending from minus infinity to infinity.
+        phi_1: Deflections of side 1, NaN beyond the ends and at the beginning of a gap.
+        phi_2: Deflections of side 2, as above.
+        slope_1: Derivatives of phi_1 over tau_e, to single precision; at a cusp over the square root of the
+            share of the cell, divided by its width.
+        slope_2: Derivatives of phi_2, as above.
+        cusp: 1 at a cusp of the curve, where the fold varies as the square root of tau_e, else 0.
     """
 
     tau_e: FloatArray
@@ -197,7 +198,7 @@ class FoldMap(NamedTuple):
     cusp: FloatArray
 
     def guess(self, tau_e: FloatArray) -> tuple[BoolArray, Values, Values]:
-        """Return whether there is a fold, phi_1 and phi_2 near it, and those of adjacent nodes."""
+        """Return whether there is a fold, approximate phi_1 and phi_2, and those of the adjacent nodes."""
         cell = np.searchsorted(self.tau_e[1:-1], tau_e, side="right")
         low, low_1, low_2, *of_low = look_up(self, cell)
         high, high_1, high_2, *of_high = look_up(self, cell + 1)
@@ -208,12 +209,12 @@ class FoldMap(NamedTuple):
 
 
 class _Cubic(NamedTuple):
-    """Arguments of Hermite's cubics in a cell.
+    """Arguments of Hermite cubics in a cell.
 
     Attributes:
-        x: share of the cell, or its root, counted from the cusp, if an end is one.
-        start: derivative of the share over x at the beginning of the cell, times its width.
-        end: the same at its end; at a cusp itself it is the width, with which slopes there are kept.
+        x: Share of the cell, or its square root, counted from the cusp, if an end is a cusp.
+        start: Derivative of the share over x at the beginning of the cell, times its width.
+        end: Derivative at its end, as above; at a cusp itself the width, by which slopes there are divided.
     """
 
     x: FloatArray
@@ -222,27 +223,27 @@ class _Cubic(NamedTuple):
 
     @classmethod
     def of(cls, share: FloatArray, width: FloatArray, cusps: Values) -> _Cubic:
-        """Return the place of a share of a cell; one end at most is a cusp."""
+        """Return the arguments for a share of a cell, at most one end of which is a cusp."""
         first, last = cusps
         root = np.sqrt(np.where(last > 0, 1 - share, share))
         x = np.where(first > 0, root, np.where(last > 0, 1 - root, share))
         return cls(x, width * (1 + last), width * (1 + first))
 
     def __call__(self, low: FloatArray, high: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
-        """Return the cubic from values and slopes at both ends."""
+        """Evaluate the cubic from values and slopes at both ends."""
         return hermite(self.x, low, high, first * self.start, last * self.end)
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
     """Return the outermost folds of a pair over all elastic torques."""
     balance = Balance(first, second)
-    with np.errstate(all="ignore"):  # vertical at a cusp, unknown without stiffness, and far away
+    with np.errstate(all="ignore"):  # infinite slopes at cusps, 0/0 without stiffness, overflow far away
         points = outermost_folds(balance)
         return _map(points, _kept(points))
 
 
 def _kept(points: FoldPoints) -> IndexArray:
-    """Return the fewest points between which cubics are close to the others."""
+    """Return the fewest points between which cubics are close to all other points, greedily, by index."""
     farthest = _farthest(points).tolist()
     kept = [0]
     while kept[-1] + 1 < len(farthest):
@@ -251,7 +252,7 @@ def _kept(points: FoldPoints) -> IndexArray:
 
 
 def _farthest(points: FoldPoints) -> IndexArray:
-    """Return how far a cubic from each point may extend, for all at once by halved steps."""
+    """Return the farthest point to which a cubic from each point may extend, by bisection for all at once."""
     start = np.arange(points.tau_e.size)
     reached = np.minimum(start + 1, points.last)
     step = 1 << int((points.last - start).max()).bit_length()
@@ -261,13 +262,14 @@ def _farthest(points: FoldPoints) -> IndexArray:
         good = possible[_is_close(points, start[possible], further[possible])]
         reached[good] = further[good]
     going = np.flatnonzero(points.last > start)
-    to_end = going[_is_close(points, going, points.last[going])]  # from further away if that is a cusp
+    # The end of a stretch, if a cusp, may be attainable from points at which shorter cubics fail.
+    to_end = going[_is_close(points, going, points.last[going])]
     reached[to_end] = points.last[to_end]
     return reached
 
 
 def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
-    """Return whether cubics from points to others are close to the critical points between them."""
+    """Return whether the cubics from points `start` to points `end` are close to all points between."""
     between = start + np.rint(TESTED[:, None] * (end - start)).astype(int)
     cubic = _cubic(points, start, end, between)
     error, hardened, size = (np.zeros(between.shape) for _ in range(3))
@@ -282,9 +284,9 @@ def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArr
 
 
 def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -> Values:
-    """Slopes of one deflection in cells from points to others.
+    """Return the slopes of one deflection at both ends of cells.
 
-    At a cusp it is that of the cubic through a point near the middle.
+    At a cusp, it is the slope with which the cubic passes through a point near the middle.
     """
     tau_e, phi = points.tau_e, points.phi[side]
     first_cusp, last_cusp = points.cusp[start] > 0, points.cusp[end] > 0
@@ -307,14 +309,14 @@ def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -
 
 
 def _cubic(points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray) -> _Cubic:
-    """Return the places of further points in cells from points to others."""
+    """Return the arguments of the cubics at the points `at` in cells from `start` to `end`."""
     width = points.tau_e[end] - points.tau_e[start]
     share = (points.tau_e[at] - points.tau_e[start]) / width
     return _Cubic.of(share, width, (points.cusp[start], points.cusp[end]))
 
 
 def _limited(slope: FloatArray, chord: FloatArray) -> FloatArray:
-    """Return a slope with which a cubic of that chord is monotone."""
+    """Return the slope, limited so that a cubic with that chord is monotone."""
     ratio = np.nan_to_num(slope / chord, nan=1.0, posinf=MONOTONE_SLOPE_RATIO, neginf=0.0)
     return chord * np.clip(ratio, 0, MONOTONE_SLOPE_RATIO)
 
@@ -335,10 +337,10 @@ def _map(points: FoldPoints, kept: IndexArray) -> FoldMap:
 
 
 MAX_NEWTON_STEPS = 12
-"""Newton steps to a fold to which the map does not lead; three or four do."""
+"""Largest number of Newton steps to a fold where the map is not close enough; three or four suffice."""
 
 NEWTON_RTOL = OfRounding(1e-9, power=0.5)
-"""Relative size of a step after which the next would be rounding."""
+"""Relative size of a Newton step below which the next would be rounding."""
 
 
 def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple[BoolArray, PairState]:
@@ -362,9 +364,10 @@ def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple
 
 
 def _within(box: Values, near: Values, steps: Values) -> Values:
-    """Steps that do not leave the box.
+    """Return the steps, clipped to the box.
 
-    Rounding of the elastic torque would, where one spring is stretched 1e16 times farther than the other.
+    By rounding of the elastic torque they would leave it if one spring were stretched 1e16 times farther than
+    the other.
     """
     low_1, high_1, low_2, high_2 = box
     (near_1, near_2), (step_1, step_2) = near, steps

@@ -1,4 +1,7 @@
-"""Pairs of springs of several joints, with their decoupling matrices A: (67)-(68), (70)-(72)."""
+"""The decoupling matrix A of a pair of springs, (67)-(68) and (70)-(72), and the pairs of several joints.
+
+The inverse dynamics uses the functions; forward dynamics and controllers use the classes.
+"""
 
 from __future__ import annotations
 
@@ -11,20 +14,25 @@ from vsacli.actuators.laws.law import SpringLaw, SpringRows, SpringState
 from vsacli.base.arrays import FloatArray
 
 Sides = tuple[FloatArray, FloatArray]
-"""A quantity of side 1, its motor or its spring, and of side 2."""
+"""A quantity of sides 1 and 2, each a motor with its spring."""
 
 
 def determinant(one: SpringState, two: SpringState) -> FloatArray:
-    """Det A (67); zero where A is singular."""
+    """Return det A (67); zero where A is singular."""
     return one.sigma * two.zeta - two.sigma * one.zeta
 
 
 def solve(
     one: SpringState, two: SpringState, divisor: FloatArray, torque_row: FloatArray, stiffness_row: FloatArray
 ) -> Sides:
-    """A^-1 times a right-hand side, as (68) and (72) need.
+    """Return A^-1 times a right-hand side, as in (68) and (72).
 
-    The divisor is det A, or NaN where there is no solution.
+    Args:
+        one: State of spring 1.
+        two: State of spring 2.
+        divisor: Det A, or NaN where the result is to be NaN.
+        torque_row: Right-hand side of the first row of A, (17) or (21).
+        stiffness_row: Right-hand side of the second row, (18) or (22).
     """
     return (
         (two.zeta * torque_row - two.sigma * stiffness_row) / divisor,
@@ -40,7 +48,7 @@ def beta(
     ddstiffness: FloatArray,
     ddq: FloatArray,
 ) -> Sides:
-    """Right-hand side of (72), with the sums (11) and (65)."""
+    """Return the right-hand side of (72), with the sums (11) and (65)."""
     squared_1, squared_2 = dphi[0] * dphi[0], dphi[1] * dphi[1]
     return (
         ddtau_e - (one.zeta * squared_1 + two.zeta * squared_2) + (one.sigma + two.sigma) * ddq,  # (70)
@@ -49,13 +57,13 @@ def beta(
 
 
 class PairElasticity(Elasticity):
-    """Two springs at each joint, between either motor and the link; phi are their deflections."""
+    """Two springs at each joint, each between a motor and the link; phi are their deflections."""
 
     def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]]) -> None:
         self._springs = SpringRows(pairs)
 
     def torques(self, phi: FloatArray) -> Torques:
-        """Return the torques: each spring pulls the link and its motor equally."""
+        """Return the torques; each spring exerts the same torque on the link as against its motor."""
         tau = self._springs.torque(phi)
         return Torques(tau[..., 0] + tau[..., 1], tau)
 
@@ -65,12 +73,12 @@ class PairElasticity(Elasticity):
         return energy[..., 0] + energy[..., 1]
 
     def state(self, phi: FloatArray) -> ElasticState:
-        """Both springs with their derivatives."""
+        """Return both springs with their derivatives."""
         return _PairStates(self._springs.state(phi))
 
 
 class CoupledPairs(PairElasticity):
-    """The same with a spring between the motors of each joint, whose deflection is theta_1 - theta_2."""
+    """Pairs with a third spring, between the motors of each joint, whose deflection is theta_1 - theta_2."""
 
     def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]], coupling: SpringLaw) -> None:
         super().__init__(pairs)
@@ -86,17 +94,17 @@ class CoupledPairs(PairElasticity):
         return super().energy(phi) + self._coupling.energy(phi[..., 0] - phi[..., 1])
 
     def state(self, phi: FloatArray) -> ElasticState:
-        """Both springs with their derivatives, and what the coupling adds."""
+        """Return both springs with their derivatives, and the torques of the coupling."""
         return _PairStates(self._springs.state(phi), self._between(phi))
 
     def _between(self, phi: FloatArray) -> FloatArray:
-        """Torque of the coupling against each motor."""
+        """Return the torque of the coupling against each motor."""
         torque = self._coupling.torque(phi[..., 0] - phi[..., 1])
         return np.stack((torque, -torque), axis=-1)
 
 
 class _PairStates(ElasticState):
-    """Both springs of each joint, arrays (..., joints, 2), and what a coupling exerts against the motors."""
+    """States of both springs of each joint, (..., joints, 2), and coupling torques against the motors."""
 
     def __init__(self, springs: SpringState, coupling: FloatArray | None = None) -> None:
         self._springs, self._coupling = springs, coupling
@@ -118,24 +126,24 @@ class _PairStates(ElasticState):
         return self._springs.tau if self._coupling is None else self._springs.tau + self._coupling
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """Sum of sigma_k phi_k'."""
+        """Return the sum of sigma_k phi_k' (17)."""
         rates = self._springs.sigma * dphi
         return rates[..., 0] + rates[..., 1]
 
     def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """Sum of zeta_k phi_k'."""
+        """Return the sum of zeta_k phi_k' (18)."""
         rates = self._springs.zeta * dphi
         return rates[..., 0] + rates[..., 1]
 
     def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
-        """Sum of eta_k phi_k'^2."""
+        """Return the sum of eta_k phi_k'^2, of (22)."""
         bent = self._springs.eta * dphi * dphi
         return bent[..., 0] + bent[..., 1]
 
     def motor_accelerations(
         self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """A^-1 beta, (70)-(72)."""
+        """Return A^-1 beta, (70)-(72)."""
         det_a = self.determinant()
         divisor = np.where(det_a == 0, np.nan, det_a)
         sides = dphi[..., 0], dphi[..., 1]
@@ -145,5 +153,5 @@ class _PairStates(ElasticState):
         return ddtheta
 
     def determinant(self) -> FloatArray:
-        """Det A (67)."""
+        """Return det A (67)."""
         return determinant(self._one, self._two)

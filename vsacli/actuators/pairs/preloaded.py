@@ -1,4 +1,4 @@
-"""Two springs as a robot file gives them, on the branch that a preload names."""
+"""Two springs as a robot file declares them, on the solution branch that the preload selects."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class PreloadedPair:
     """Springs 1 and 2, and the branch of their deflections.
 
     Attributes:
-        spring: as written.
-        preload: one of `PRELOADS`; positive has phi_1 up and phi_2 down.
+        spring: Laws as written in the robot file; `laws` has them as they act on each side.
+        preload: One of `PRELOADS`; positive has phi_1 up and phi_2 down.
     """
 
     spring: tuple[SpringLaw, SpringLaw]
@@ -37,11 +37,11 @@ class PreloadedPair:
 
     @property
     def distinct(self) -> tuple[SpringLaw, ...]:
-        """The springs, once if both are one."""
+        """Springs without repetition, if one object serves both sides."""
         return tuple({id(law): law for law in self.spring}.values())
 
     def problems(self) -> Iterator[FieldProblem]:
-        """Why they cannot set a stiffness, in the fields `spring` and `preload`."""
+        """Yield the reasons why the springs cannot set a stiffness, in the fields `spring` and `preload`."""
         if all(spring.is_linear for spring in self.spring):
             reason = (
                 "both are linear: no motion of the motors changes the stiffness (A is singular everywhere)"
@@ -53,24 +53,25 @@ class PreloadedPair:
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Solve (14) on the branch, arrays (samples,)."""
         first, second = self.laws
+        # Pairs have side 1 up; a negative preload is the pair with its sides exchanged.
         if self.preload == "negative":
             return make_pair(second, first).solve(tau_e, stiffness).exchanged()
         return make_pair(first, second).solve(tau_e, stiffness)
 
     def states(self, phi_1: FloatArray, phi_2: FloatArray) -> tuple[SpringState, SpringState]:
-        """States of both springs at their deflections."""
+        """Return the states of both springs at their deflections."""
         first, second = self.laws
         return first.state(phi_1), second.state(phi_2)
 
     @property
     def opposite(self) -> str | None:
-        """The other preload, unless the springs only pull."""
+        """The other preload; None if a spring only pulls."""
         if any(law.pulls_only for law in self.laws):
             return None
         return next(word for word in PRELOADS if word != self.preload)
 
     def opposite_reaches(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
-        """Return where the other preload attains a stiffness, (samples,)."""
+        """Return where the stiffness is attainable with the other preload, (samples,)."""
         if self.opposite is None:
             return np.zeros(tau_e.shape, dtype=bool)
         other = replace(self, preload=self.opposite)

@@ -1,4 +1,9 @@
-"""Any two spring laws: (14) solved by steps of third order on the outermost branch, guarded by bracketing."""
+"""Solution of (14) for any two spring laws, on the outermost branch.
+
+`corridor` finds the two ends of the branch. The stiffness is clipped to the range between them. An iteration
+of third order, kept in the box between the ends, starts from a guess at the inner end. Samples at which it
+does not converge are solved by bracketing.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +23,18 @@ from vsacli.compute.control_flow import Values, repeat, where_needed
 from vsacli.compute.rounding import OfRounding
 
 MAX_STEPS = 30
-"""Three or four do, except next to a cusp or far beyond what the springs are made for."""
+"""Largest number of steps. Three or four suffice, except next to a cusp or at extreme loads."""
 
 ERROR_RTOL = OfRounding(1e-17)
-"""Relative error after a step that changes nothing: the estimate may be some hundred times too small."""
+"""Estimated relative error at which the iteration ends; the estimate may be some hundred times too small."""
 
 MAX_DOUBLINGS = 1000
-"""Doublings of a preload, from about the demand on: its torque leaves the range of doubles before."""
+"""Largest number of doublings of a preload torque; its torque overflows before."""
 
 
 @dataclass(frozen=True)
 class IteratedPair(Pair):
-    """Two laws without a closed solution."""
+    """Two laws without a closed solution, solved by iteration."""
 
     first: SpringLaw
     second: SpringLaw
@@ -45,7 +50,7 @@ class IteratedPair(Pair):
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Solve (14) for each sample; see `Pair.solve`."""
         balance, folds = self._balance, self._folds
-        with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
+        with np.errstate(all="ignore"):  # trial steps may leave the domain; they are rejected
             piece = corridor(balance, folds, tau_e)
             lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
             upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
@@ -63,14 +68,14 @@ class IteratedPair(Pair):
 
 
 class _Box(NamedTuple):
-    """Deflections between the ends of the piece, where the solution lies; arrays (samples,).
+    """Box of the deflections between the ends of the piece, which contains the solution; arrays (samples,).
 
     Attributes:
-        inner_1: phi_1 at the inner end, its smallest.
-        outer_1: phi_1 at the outer end, its largest.
-        inner_2: phi_2 at the inner end, its largest.
-        outer_2: phi_2 at the outer end, its smallest.
-        outer_near: 1 where the stiffness at the outer end is less than twice the demand, else 0.
+        inner_1: Smallest phi_1, at the inner end.
+        outer_1: Largest phi_1, at the outer end.
+        inner_2: Largest phi_2, at the inner end.
+        outer_2: Smallest phi_2, at the outer end.
+        outer_near: 1 where the stiffness at the outer end is positive and less than twice the demand, else 0.
     """
 
     inner_1: FloatArray
@@ -87,7 +92,7 @@ class _Box(NamedTuple):
         return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
 
     def holds(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
-        """Return whether deflections lie between the ends, and not at the outer one."""
+        """Return whether deflections lie in the box, its outer sides excluded."""
         inside: BoolArray = (
             (self.inner_1 <= phi_1)
             & (phi_1 < self.outer_1)
@@ -99,7 +104,7 @@ class _Box(NamedTuple):
     def confined(
         self, phi_1: FloatArray, phi_2: FloatArray, target_1: FloatArray, target_2: FloatArray
     ) -> Values:
-        """Targets of a step from deflections in the box, moved back into it."""
+        """Return the targets of a step from deflections in the box, moved back into it."""
         return (
             _short_of(phi_1, _not_below(phi_1, target_1, self.inner_1), self.outer_1, self.outer_near > 0),
             -_short_of(
@@ -109,20 +114,17 @@ class _Box(NamedTuple):
 
 
 def _not_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> FloatArray:
-    """Return the target, or half way to the inner end if it lies on the other side of that."""
+    """Return the target; if it lies below the inner end, the point half way to that."""
     return np.where(target < inner, (start + inner) / 2, target)
 
 
 def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
-    """Return the target, not beyond the outer end.
-
-    Half way to it if the demand is far from the stiffness there.
-    """
+    """Return the target; if it lies beyond the outer end, that end, or half way there if it is not near."""
     return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
 
 
 def _deflections(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: FloatArray) -> Values:
-    """phi_1 and phi_2 where the piece has a stiffness, which lies within its ends; arrays (samples,)."""
+    """Return phi_1 and phi_2 at which the piece has a stiffness between those at its ends; (samples,)."""
     sign = np.where(piece.rising, 1.0, -1.0)
     inner = piece.inner
     box = _Box.of(piece, demand)
@@ -148,7 +150,7 @@ def _deflections(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: F
 
 
 def _step(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
-    """Return a step of third order on (14) that stays in the box, and whether it was the last."""
+    """Return the state after a step of third order on (14), kept in the box, and whether it has converged."""
     phi_1, phi_2, _ = state
     tau_e, demand, sign, inner_stiffness, *bounds = constants
     step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
@@ -172,14 +174,14 @@ def _confined_step(
     target_2: FloatArray,
     *bounds: FloatArray,
 ) -> Values:
-    """Return a step moved back into the box; zero, without error, if the demand is that of the inner end."""
+    """Return a step moved back into the box, or no step if the demand is the stiffness at the inner end."""
     confined_1, confined_2 = _Box(*bounds).confined(phi_1, phi_2, target_1, target_2)
     met = demand == inner_stiffness
     return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)
 
 
 def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
-    """phi_1 and phi_2 by bracketing the torque x that the preload gains from the inner end on."""
+    """Return phi_1 and phi_2 by bracketing the preload torque x in excess of that at the inner end."""
     tau_1 = state_of(balance.first, inner_1).tau
     tau_2 = tau_e - tau_1
 

@@ -1,4 +1,4 @@
-"""Compiled libraries in the user's cache folder: nobody else's, whole, unchanged since they were built."""
+"""Cache of compiled libraries in a folder of the user; files of other users, or changed ones, are refused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LIBRARY = "program.so"
 CHECKSUM = "program.sha256"
 
 MOST_BYTES = 100_000_000
-"""Bytes of all libraries together, those of some hundred robots; the longest unused ones go first."""
+"""Largest size of all libraries, in bytes, enough for some hundred robots; least recently used go first."""
 
 
 class CacheError(VsacliError):
@@ -27,7 +27,7 @@ class CacheError(VsacliError):
 
 
 class Entry(NamedTuple):
-    """A stored library: when it was last used, s since 1970, its bytes, and its key."""
+    """A stored library: time of its last use, s since 1970, size in bytes, and key."""
 
     used: float
     size: int
@@ -38,8 +38,8 @@ class Entry(NamedTuple):
 class Cache:
     """Libraries in a folder; get it from `open_cache`.
 
-    Several processes may use it at a time. A library gets its place, and leaves it, by renaming its folder:
-    it is there whole or not at all, and one that is loaded stays so whoever removes it.
+    Several processes may use it at the same time. A library is added and removed by renaming its folder, so
+    that it is there completely or not at all; a loaded library stays loaded when another process removes it.
     """
 
     folder: Path
@@ -48,7 +48,7 @@ class Cache:
         """Return the library of a key, if there is one.
 
         Raises:
-            CacheError: there is, but its content has changed; it is removed.
+            CacheError: Its content has changed; it is removed.
         """
         library = self.folder / key / LIBRARY
         if not library.parent.exists():
@@ -65,12 +65,12 @@ class Cache:
         raise CacheError(f"{library} was damaged; it is removed")
 
     def store(self, key: str, library: Path) -> None:
-        """Copy a library to its place, whole or not at all; of two processes at it, the first one's stays.
+        """Copy a library to its place, completely or not at all; the first of two processes wins.
 
-        Others that were not used for long make room for it.
+        The least recently used libraries are removed to make room for it.
 
         Raises:
-            CacheError: there is no room or no permission.
+            CacheError: There is no room or no permission.
         """
         try:
             with self._staged() as folder:
@@ -84,7 +84,7 @@ class Cache:
             raise CacheError(f"the cache folder {self.folder} cannot be written: {error.strerror}") from None
 
     def entries(self) -> list[Entry]:
-        """Return all libraries, that which was not used for the longest time first; not other folders."""
+        """Return all libraries, the least recently used first; other folders are ignored."""
         found = []
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError):  # removed meanwhile
@@ -96,14 +96,14 @@ class Cache:
         """Remove all libraries.
 
         Raises:
-            CacheError: no permission.
+            CacheError: No permission.
         """
         sweep(self.folder)
         for entry in self.entries():
             self._remove(entry.key)
 
     def _make_room(self, new: str) -> None:
-        """Remove the longest unused ones until the rest is within bounds; a new one stays."""
+        """Remove the least recently used libraries until all are within `MOST_BYTES`; keep the new one."""
         entries = self.entries()
         excess = sum(entry.size for entry in entries) - MOST_BYTES
         for entry in entries:
@@ -112,22 +112,22 @@ class Cache:
                 excess -= entry.size
 
     def _remove(self, key: str) -> None:
-        """Out of the way of others at once, then for good.
+        """Remove a folder: rename it first, so that it vanishes for other processes at once.
 
         Raises:
-            CacheError: no permission.
+            CacheError: No permission.
         """
         try:
             with self._staged() as folder:
                 (self.folder / key).rename(folder)
-        except FileNotFoundError:  # somebody else was faster
+        except FileNotFoundError:  # another process has removed it
             pass
         except OSError as error:
             raise CacheError(f"{self.folder / key} cannot be removed: {error.strerror}") from None
 
     @contextmanager
     def _staged(self) -> Iterator[Path]:
-        """A name for a folder of this process, which goes; those of processes that were killed go as well."""
+        """Yield a folder name of this process; remove it at the end, and those of killed processes."""
         sweep(self.folder)
         staged = self.folder / staging_name()
         try:
@@ -137,10 +137,10 @@ class Cache:
 
 
 def open_cache() -> Cache:
-    """Return the cache of the user, made if need be.
+    """Return the cache of the user; create it if necessary.
 
     Raises:
-        CacheError: it cannot be made, is not the user's, or others may write to it.
+        CacheError: The folder cannot be created, is not the user's, or is writable by others.
     """
     try:
         folder = _cache_folder()
@@ -158,13 +158,13 @@ def open_cache() -> Cache:
 
 
 def _cache_folder() -> Path:
-    """Return the folder of the XDG base directory specification; a relative path there does not count."""
+    """Return the folder of the XDG base directory specification, which ignores relative paths."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (base if base.is_absolute() else Path.home() / ".cache") / "vsacli"
 
 
 def key_of(*parts: str) -> str:
-    """Return the key of a library: a digest of all that it depends on."""
+    """Return the key of a library: a digest of everything it depends on."""
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
@@ -178,7 +178,7 @@ def _checksum(path: Path) -> str:
 
 
 def _move(entry: Path, target: Path) -> None:
-    """Rename a folder, unless the target is there: a folder with files in it is not replaced."""
+    """Rename a folder, unless the target exists: a folder with files in it is not replaced."""
     try:
         entry.rename(target)
     except OSError:

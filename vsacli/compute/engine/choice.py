@@ -1,4 +1,7 @@
-"""The choice of the backend."""
+"""The choice of the backend: `choose` for a run, `settle` for many runs that must agree.
+
+"auto" compares the time of NumPy with that of compiling, by estimates measured on the bundled robots.
+"""
 
 from __future__ import annotations
 
@@ -23,35 +26,35 @@ if TYPE_CHECKING:
     from vsacli.compute.engine.libraries import Code
 
 NAMES = ("numpy", "c", "auto")
-"""Engines that may be asked for."""
+"""Names of engines."""
 
 NUMPY_SECONDS = 0.3e-9
-"""Seconds of NumPy for an operation on a sample: 0.22 to 0.31 ns in traced programs of the bundled robots,
-more where loops run until the last sample is done."""
+"""Time of NumPy for one operation on one sample, s: 0.22 to 0.31 ns in traced programs of the bundled robots,
+more for loops, which run until the last sample is done."""
 
 NUMPY_CALL_SAMPLES = 3_000
-"""Samples in whose time NumPy sees to a call: 0.9 us, which counts in the short blocks of long chains."""
+"""Overhead of a NumPy call, 0.9 us, as a number of samples; it matters in the short blocks of long chains."""
 
 LOOK_FROM = 50_000
-"""Samples, in blocks of the usual size, with which it is busy for longer than it takes to see if there is
-compiled code: recording and asking the compiler for its version take 50 to 110 ms, which is what NumPy takes
-for 50,000 to 130,000."""
+"""Number of samples, in blocks of the usual size, from which on compiled code is looked for. Tracing and
+calling the compiler for its version take 50 to 110 ms, the time of NumPy for 50,000 to 130,000 samples."""
 
 TRACE_FROM = 100_000
-"""The same from which on NumPy saves more time with a traced program than tracing takes: 83,000 to 158,000
-for robots of one to seven joints, 47,000 with 50, and 23,000 with 1000: those are 1,200 in shorter blocks."""
+"""Number of samples from which on a traced program saves NumPy more time than tracing takes: 83,000 to
+158,000 for robots of one to seven joints, 47,000 with 50, and 23,000 with 1000, that is 1,200 in their short
+blocks."""
 
 NUMPY: Engine = NumPyEngine()
 
 
 class Choice(NamedTuple):
-    """An engine, and why it is this one.
+    """The chosen engine and the reason.
 
     Attributes:
-        engine: the engine chosen.
-        reason: the backend, and why; a clause.
-        compiler: of the code, empty without one.
-        threads: of compiled code.
+        engine: Engine.
+        reason: Backend and reason, a clause.
+        compiler: Compiler of the code; empty without one.
+        threads: Number of threads of compiled code.
     """
 
     engine: Engine
@@ -61,7 +64,7 @@ class Choice(NamedTuple):
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Values that tell how it was computed: `engine`, `compiler`, `threads`."""
+        """Attributes of a result: `engine`, `compiler`, `threads`."""
         name = "c" if self.compiler else "numpy"
         return {"engine": name, "compiler": self.compiler, "threads": str(self.threads)}
 
@@ -78,16 +81,16 @@ def choose(
     """Return the engine for a computation.
 
     Args:
-        name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: to be computed.
-        samples: over how many samples.
-        threads: of compiled code; as many as there are processors if None.
-        tell: receives problems on the way, and announcements of long work.
-        busy: how many of the threads do something else meanwhile, as long as one is left.
+        name: One of `NAMES`; "auto" chooses compiled code where that saves time.
+        kernel: Kernel to compute.
+        samples: Number of samples.
+        threads: Number of threads of compiled code; by default the number of CPU cores.
+        tell: Receives problems on the way, and announcements of long work.
+        busy: Number of threads that are occupied otherwise; at least one is left.
 
     Raises:
-        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
-            nothing that it could compile.
+        InputError: The engine is unknown; or it is "c", and there is no working C compiler, or the kernel
+            cannot be compiled.
     """
     check_engine(name)
     usual = in_usual_blocks(samples, kernel.inputs)
@@ -115,24 +118,24 @@ def choose(
 
 
 class Settled(NamedTuple):
-    """An engine by its name, "numpy" or "c", and what compiles its code, empty if nothing does."""
+    """An engine by its name, "numpy" or "c", and its compiler, empty for NumPy."""
 
     name: str
     compiler: str = ""
 
 
 def settle(name: str, kernel: Kernel, samples: int) -> Settled:
-    """Return the engine for many computations that are to agree, whoever carries out each of them, and when.
+    """Return the engine for many computations that must agree, whichever process runs them, and when.
 
-    So it does not depend on what was compiled before.
+    So the choice does not depend on the cache of compiled code.
 
     Args:
-        name: one of `NAMES`; "auto" takes compiled code where that saves time.
-        kernel: of most of them.
-        samples: over how many samples all of them compute it.
+        name: One of `NAMES`; "auto" chooses compiled code where that saves time.
+        kernel: Kernel of most runs.
+        samples: Number of samples of all runs together.
 
     Raises:
-        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
+        InputError: The engine is unknown; or it is "c", and there is no working C compiler.
     """
     check_engine(name)
     usual = in_usual_blocks(samples, kernel.inputs)
@@ -152,10 +155,10 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
 
 
 def check_engine(name: str) -> None:
-    """Refuse the name of no engine.
+    """Raise an error for the name of an unknown engine.
 
     Raises:
-        InputError: naming the nearest one that there is.
+        InputError: The engine is unknown; the message suggests the nearest name.
     """
     if name not in NAMES:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
@@ -163,10 +166,10 @@ def check_engine(name: str) -> None:
 
 @contextmanager
 def compiled_as_asked() -> Iterator[None]:
-    """Around what compiles for the engine "c", where no other will do.
+    """Convert errors of the compiler into input errors, for code that requires the engine "c".
 
     Raises:
-        InputError: there is no C compiler that works, or nothing that it could compile.
+        InputError: There is no working C compiler, or the code cannot be compiled.
     """
     from vsacli.compute.engine.compiler import CompilerError
 
@@ -179,13 +182,13 @@ def compiled_as_asked() -> Iterator[None]:
 
 
 def in_usual_blocks(samples: int, inputs: int) -> float:
-    """Return the samples that would take NumPy as long in the blocks of few inputs."""
+    """Return the number of samples in blocks of the usual size that would take NumPy the same time."""
     calls, fewest = (NUMPY_CALL_SAMPLES / size for size in (samples_per_pass(inputs), SAMPLES_PER_PASS))
     return samples * (1 + calls) / (1 + fewest)
 
 
 def _repays(code: Code, samples: float) -> bool:
-    """Return whether NumPy would be busy for longer than the compiler, which is done in time."""
+    """Return whether NumPy would take longer than the compiler, and the compiler not too long."""
     repays = code.operations * samples * NUMPY_SECONDS > code.compiling_seconds
     return repays and not code.takes_too_long
 
@@ -199,5 +202,5 @@ def _counted(threads: int) -> str:
 
 
 def processors() -> int:
-    """Return the number of processors that this process may use."""
+    """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -15,16 +15,16 @@ from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.program import NESTED
 
 USUAL_ITERATIONS = 5
-"""Usual iterations of a loop."""
+"""Usual number of iterations of a loop, for estimates of time."""
 
 
 class CompiledEngine:
-    """Machine code, compiled for each kernel when it is first needed.
+    """Machine code, compiled for each kernel at first use.
 
     Args:
-        compiler: to be used.
-        threads: how many run at once.
-        tell: receives problems with the cache of compiled code, and announcements of long work.
+        compiler: Compiler to use.
+        threads: Number of threads that run at once.
+        tell: Receives problems with the cache of compiled code, and announcements of long work.
     """
 
     def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
@@ -34,10 +34,10 @@ class CompiledEngine:
         self._loaded: dict[Kernel, Loaded[Library]] = {}
 
     def prepare(self, kernel: Kernel, worthwhile: Worthwhile = lambda _code: True) -> Loaded[Library] | None:
-        """Load a kernel's code, compiled if need be and if that is worthwhile; None if there is no such code.
+        """Load a kernel's code; compile it if it is not cached and compiling is worthwhile, else return None.
 
         Raises:
-            CompilerError: it cannot be compiled.
+            CompilerError: The code cannot be compiled.
         """
         if kernel not in self._loaded:
             opened = partial(Library, outputs=kernel.outputs)
@@ -55,10 +55,10 @@ class CompiledEngine:
 
 @lru_cache(maxsize=32)
 def kernel_code(kernel: Kernel) -> Code:
-    """Return the code of a kernel to be compiled.
+    """Return the C code of a kernel.
 
     Raises:
-        NotImplementedError: it cannot be recorded.
+        NotImplementedError: The kernel cannot be traced.
     """
     program = kernel_program(kernel)
     calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
@@ -69,7 +69,7 @@ def kernel_code(kernel: Kernel) -> Code:
 
 
 def operation_count(program: Program, iterations: int = 1) -> int:
-    """Return the operations of a program, those of loops once for each iteration."""
+    """Return the number of operations of a program; those of a loop count once per iteration."""
     return sum(_weight(symbol, iterations) for symbol in program.operations)
 
 

@@ -1,4 +1,4 @@
-"""The C compiler, of the system or of a package, and the libraries that it makes, loaded."""
+"""The C compiler of the system or of a package, and the shared libraries that it builds."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 NATIVE = "-march=native"
 
 FLAGS = ("-std=gnu11", "-O2", NATIVE, "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
-"""None of those that let the compiler assume away NaN, or that change the arithmetic of the whole process."""
+"""Options, without those that ignore NaN (-ffast-math) or change the arithmetic of the whole process."""
 
 ZIG_COMPILER = (sys.executable, "-m", "ziglang", "cc")
-"""Clang with headers and linker, in a package that pip installs."""
+"""Clang with headers and linker, from the package ziglang."""
 
 TIMEOUT = 120.0
-"""Seconds that a compiler may take."""
+"""Largest time of the compiler, s."""
 
 LIES = ("__FINITE_MATH_ONLY__ 1", "__FAST_MATH__ 1", "__ASSOCIATIVE_MATH__ 1", "__RECIPROCAL_MATH__ 1")
-"""Macros of options with which NaN goes unnoticed, or arithmetic is no longer what is written."""
+"""Macros set by options that ignore NaN or reorder arithmetic; a compiler with one of them is refused."""
 
 SAMPLES_PER_THREAD = 2048
-"""Fewer are not worth a thread."""
+"""Smallest number of samples per thread; fewer are not worth a thread."""
 
 DOUBLES_PER_VECTOR = LINE // np.dtype(np.float64).itemsize
 """Samples in the longest vector."""
 
 
 class CompilerError(VsacliError):
-    """There is no C compiler, or it does not do its work; the message says which."""
+    """There is no C compiler, or it fails; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class Compiler:
     """A C compiler.
 
     Attributes:
-        command: how it is called.
-        identity: all that decides on its code: version, processor, C library, flags.
+        command: Command that calls it.
+        identity: Everything that its code depends on: version, processor, C library, flags.
     """
 
     command: tuple[str, ...]
@@ -63,7 +63,7 @@ class Compiler:
 
     @property
     def name(self) -> str:
-        """Command and version, for the record."""
+        """Command and version, for the provenance of results."""
         found = re.search(r'^#define __VERSION__ "(.*)"$', self.identity, re.MULTILINE)
         return " ".join([_spoken(self.command), *([found[1]] if found else [])])
 
@@ -71,7 +71,7 @@ class Compiler:
         """Compile a source file to a shared library.
 
         Raises:
-            CompilerError: it could not be done.
+            CompilerError: The compiler fails.
         """
         _output(self.command, *FLAGS, "-o", str(library), str(source), "-lm", kept=library.parent)
         if not library.exists():
@@ -82,7 +82,7 @@ def system_compiler() -> Compiler:
     """Return the compiler that CC names; else `cc`, else that of the package ziglang.
 
     Raises:
-        CompilerError: there is none, or it does not work.
+        CompilerError: There is no compiler, or it does not work.
     """
     path = os.environ.get("PATH", "")
     if wanted := os.environ.get("CC"):
@@ -113,12 +113,12 @@ def _examined(command: tuple[str, ...], _path: str) -> Compiler:
 
 
 def _spoken(command: tuple[str, ...]) -> str:
-    """Return a command in messages and for the record, where it does not matter which folder Python is in."""
+    """Return a command for messages and provenance, without the folder of Python."""
     return shlex.join("python" if part == sys.executable else part for part in command)
 
 
 def _output(compiler: tuple[str, ...], *arguments: str, kept: Path | None = None) -> str:
-    """Return the output of a compiler; files it caches, as zig does, go into the folder `kept`."""
+    """Return the output of a compiler; its own cache, such as zig's, is placed in the folder `kept`."""
     environment = None if kept is None else {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(kept)}
     name = f"C compiler {_spoken(compiler)!r}"
     try:
@@ -147,11 +147,11 @@ class Library:
     """A compiled program.
 
     Args:
-        path: of the shared library; it may be removed once loaded.
-        outputs: rows that the program computes.
+        path: Path of the shared library; it may be removed once loaded.
+        outputs: Number of output rows.
 
     Raises:
-        CompilerError: it cannot be loaded.
+        CompilerError: The library cannot be loaded.
     """
 
     def __init__(self, path: Path, outputs: int) -> None:
@@ -165,7 +165,7 @@ class Library:
         self._run.restype = None
 
     def __call__(self, rows: Sequence[FloatArray], threads: int) -> FloatArray:
-        """Run on rows (samples,) of doubles, contiguous; the outputs, (rows, samples)."""
+        """Run on contiguous rows (samples,) of doubles; return the outputs, (rows, samples)."""
         samples = len(rows[0])
         outputs = aligned_rows(self._outputs, samples)
         sources = np.array([address(row) for row in rows], dtype=np.uintp)
@@ -182,14 +182,14 @@ class Library:
 
 @cache
 def _load_vector_functions() -> None:
-    """Load those of glibc, to which compilers with a C library of their own do not link."""
+    """Load the vector functions of glibc, to which compilers with their own C library do not link."""
     with suppress(OSError):
         ctypes.CDLL("libmvec.so.1", mode=ctypes.RTLD_GLOBAL)
 
 
 @lru_cache(maxsize=1)
 def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads beside the calling one; they last as long as the process."""
+    """Return the threads in addition to the calling one; they last as long as the process."""
     return ThreadPoolExecutor(threads)
 
 
@@ -198,6 +198,6 @@ if hasattr(os, "register_at_fork"):
 
 
 def _parts(samples: int, count: int) -> list[tuple[int, int]]:
-    """Return start and end of the part of each thread; whole vectors, but for the last."""
+    """Return start and end of the samples of each thread; whole vectors, except for the last."""
     ends = [DOUBLES_PER_VECTOR * (samples * number // count // DOUBLES_PER_VECTOR) for number in range(count)]
     return list(pairwise([*ends, samples]))

@@ -17,25 +17,26 @@ if TYPE_CHECKING:
     from vsacli.compute.tracing.row_functions import CallingRowFunction, RowFunction, RowSpace
 
 SAMPLES_PER_PASS = 12288
-"""Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
+"""Samples per pass of NumPy: fewer waste time in the interpreter, more leave the caches."""
 
 INPUTS_PER_PASS = 9 * 2**17
-"""Bound on a kernel's inputs times samples at a time: the recursion keeps about 60 bytes for each, and two
-blocks some 40 each. So a run of any chain stays below 300 MB; with twice as many it took 420 MB."""
+"""Bound on a kernel's inputs times samples per pass: for each, the recursion keeps about 60 bytes, and two
+blocks about 40 bytes each. So a run of any chain stays below 300 MB; with twice the bound it took 420 MB."""
 
 KEPT_MEMORY = 31 * 2**20
-"""Bytes: glibc then keeps twice that, more than a pass takes in arrays; from 32 MiB on it learns nothing."""
+"""Size of the block freed once, in bytes: glibc then keeps twice that, more than the arrays of a pass need;
+it does not adjust to blocks from 32 MiB on."""
 
 KEPT_PROGRAMS = 8
-"""Programs of kernels that are kept for the next call."""
+"""Number of kernels whose programs are kept for the next call."""
 
 MOST_UNROLLED = 8_000
-"""Operations of the longest programs that are written out, those of ten joints with cubic springs. Longer
-ones consist of calls, which is 6 to 9 % slower in C, and compiled in a fraction of the time."""
+"""Largest number of operations of a program without calls, that of ten joints with cubic springs. Longer ones
+consist of calls, which are 6 to 9 % slower in C, but compiled in a fraction of the time."""
 
 
 class Kernel(Hashable, Protocol):
-    """A function of rows of samples, computed by NumPy or traced; equal ones compute the same."""
+    """A function of rows of samples, run by NumPy or traced; equal kernels compute the same."""
 
     @property
     def inputs(self) -> int:
@@ -46,14 +47,14 @@ class Kernel(Hashable, Protocol):
         """Number of output rows."""
 
     def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
-        """Rows of results, (samples,), or constants in their place.
+        """Return rows of results, (samples,), or constants in their place.
 
-        Every sample is computed on its own, without a branch on its values.
+        Every sample is computed independently, without a conditional on values.
         """
 
 
 def samples_per_pass(inputs: int) -> int:
-    """Samples that NumPy takes at a time of a kernel with this many inputs."""
+    """Return the number of samples per pass of NumPy, for a kernel with this many inputs."""
     return max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // inputs))
 
 
@@ -72,7 +73,7 @@ class Engine(Protocol):
 
 
 class NumPyEngine:
-    """The kernel itself, on a number of samples at a time."""
+    """NumPy on the kernel itself, pass by pass."""
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """See `Engine.run`."""
@@ -87,20 +88,20 @@ class NumPyEngine:
 
 @cache
 def keep_freed_memory() -> None:
-    """Have the C library use the memory again that arrays have left.
+    """Make the C library reuse the memory of freed arrays.
 
-    That of glibc gives blocks back to the system from a size on that it adjusts to the largest block freed so
-    far, mallopt(3), and the system clears them page by page when they are asked for again. The one freed here
-    is never touched, so it takes no memory itself. Other libraries do as they like.
+    glibc returns blocks above a threshold to the system, which clears them page by page when they are
+    allocated again. It raises the threshold to the largest block freed so far, mallopt(3), so a large block
+    is freed here; it is never touched and needs no memory. Other C libraries are not affected.
     """
     np.empty(KEPT_MEMORY, dtype=np.uint8)
 
 
 class TracedEngine:
-    """NumPy on the program of each kernel, traced when it is first needed; a kernel with loops runs as it is.
+    """NumPy on the program of each kernel, traced at first use; a kernel with loops runs untraced.
 
-    Tracing is repaid from many samples on. The numbers are those of `NumPyEngine`, to the last bit but for
-    powers: exponents of 3, 4 and 1.5 are traced as products. Not for several threads at a time.
+    Tracing pays off for many samples. Results equal those of `NumPyEngine` to the last bit, except for
+    powers: exponents 3, 4 and 1.5 are traced as products. Not thread-safe.
     """
 
     def __init__(self) -> None:
@@ -122,7 +123,7 @@ class TracedEngine:
 
 @lru_cache(maxsize=KEPT_PROGRAMS)
 def _row_function(kernel: Kernel) -> RowFunction | CallingRowFunction | None:
-    """Return the program of a kernel on rows; None if it has loops or tables."""
+    """Return the program of a kernel on rows of samples; None if it has loops or tables."""
     from vsacli.compute.tracing import is_of_calls
     from vsacli.compute.tracing.row_functions import CallingRowFunction, RowFunction
 
@@ -137,7 +138,7 @@ def kernel_program(kernel: Kernel) -> Program:
     """Return the program of a kernel for one sample, with calls if it is long.
 
     Raises:
-        NotImplementedError: as of `trace`.
+        NotImplementedError: See `trace`.
     """
     from vsacli.compute.tracing import Kind, trace_by_size
 

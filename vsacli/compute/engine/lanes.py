@@ -1,4 +1,4 @@
-"""C for a program that computes several samples at once, one a lane of a vector register."""
+"""C code of a program for several samples at once, one in each lane of a vector register."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def batch_source(program: Program) -> str:
 
 
 def _group(program: Program) -> Iterator[str]:
-    """Yield the function that computes one sample a lane."""
+    """Yield the function that computes one sample in each lane."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
     writer = Writer(VECTORS, tables)
@@ -73,7 +73,7 @@ def _group(program: Program) -> Iterator[str]:
 
 
 def _calling_group(program: Program) -> Iterator[str]:
-    """Yield the same for a program of calls: loops copy between the rows and the workspace."""
+    """Yield the function for a program of calls: loops copy between the rows and the workspace."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
     code = CallingCode("part", program, Writer(VECTORS, tables))
@@ -97,7 +97,7 @@ def _calling_group(program: Program) -> Iterator[str]:
 
 
 def _stores(type_: str, name: str, entries: list[tuple[int, Any]], value: str) -> Iterator[str]:
-    """Yield a loop that stores values to rows, both of which follow from a table."""
+    """Yield a loop that stores values to rows; a table has the indices of both."""
     if not entries:
         return
     pairs = ", ".join(f"{{{row}, {entry}}}" for row, entry in entries)

@@ -1,4 +1,4 @@
-"""Libraries from C text: loaded from the cache, or compiled now."""
+"""Shared libraries of C code: loaded from the cache, or compiled."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ gcc 12 takes 0.3 s for 1,700 in one function, 0.8 s for 4,700, 1.4 s for 7,000, 
 """
 
 LONG_SECONDS = 5.0
-"""Seconds from which on the user is told before."""
+"""Estimated time of the compiler, s, from which on it is announced to the user."""
 
 _Opened = TypeVar("_Opened")
 
 
 class Code(NamedTuple):
-    """C text, and its cost.
+    """C code, and its cost.
 
     Attributes:
-        text: the text.
-        operations: that are carried out for a sample.
-        functions: operations of each function that is compiled.
+        text: Source text.
+        operations: Number of operations per sample.
+        functions: Number of operations of each function.
     """
 
     text: str
@@ -41,19 +41,19 @@ class Code(NamedTuple):
 
     @property
     def compiling_seconds(self) -> float:
-        """Estimated seconds of the compiler."""
+        """Estimated time of the compiler, s."""
         linear, squares = sum(self.functions), sum(count**2 for count in self.functions)
         needed = COMPILER_SECONDS_PER_OPERATION * linear + COMPILER_SECONDS_PER_SQUARE * squares
         return COMPILER_START_SECONDS + needed
 
     @property
     def takes_too_long(self) -> bool:
-        """Whether the compiler would not be done in time."""
+        """Whether the compiler would exceed `TIMEOUT`."""
         return self.compiling_seconds > TIMEOUT
 
 
 Worthwhile = Callable[[Code], bool]
-"""Whether code shall be compiled."""
+"""Predicate: whether compiling code pays off."""
 
 
 class Loaded(NamedTuple, Generic[_Opened]):
@@ -70,17 +70,17 @@ def load(
     tell: Tell,
     worthwhile: Worthwhile = lambda _code: True,
 ) -> Loaded[_Opened] | None:
-    """Return the library of some code; None if it is not there and not worth compiling.
+    """Return the library of some code; None if it is not cached and not worth compiling.
 
     Args:
-        code: to be compiled.
-        opened: loads a library, the same way wherever the text is the same; it may be removed once loaded.
-        compiler: to be used.
-        tell: learns what is wrong with the cache, which is no reason to fail, and what will take long.
-        worthwhile: whether to compile it if it is not in the cache.
+        code: Code to compile.
+        opened: Function that loads a library, equal for equal code; the file may be removed once loaded.
+        compiler: Compiler to use.
+        tell: Callback for problems with the cache, which are no errors, and announcements of long work.
+        worthwhile: Whether to compile code that is not in the cache.
 
     Raises:
-        CompilerError: it cannot be compiled or loaded.
+        CompilerError: The code cannot be compiled or loaded.
     """
     key = key_of(code.text, compiler.identity)
     if key not in _loaded:
@@ -95,10 +95,10 @@ def load(
 
 
 def _announce(code: Code, tell: Tell) -> None:
-    """Say that it takes long, if it does.
+    """Announce a compilation that takes long.
 
     Raises:
-        CompilerError: it takes too long.
+        CompilerError: It takes too long.
     """
     seconds = code.compiling_seconds
     if code.takes_too_long:
@@ -128,7 +128,7 @@ def _found(cache: Cache, key: str, opened: Callable[[Path], _Opened], tell: Tell
         return None if path is None else opened(path)
     except CacheError as error:
         tell(str(error))
-    except CompilerError as error:  # as in a folder from which nothing may be run
+    except CompilerError as error:  # such as a folder mounted noexec
         tell(f"{error}; it is compiled anew")
     return None
 

@@ -1,4 +1,8 @@
-"""Tracing: run on symbols, the text that NumPy runs leaves a program, which becomes Python or C."""
+"""Tracing: a kernel that runs on symbols instead of numbers records a program, which becomes Python or C.
+
+`array` has the symbols' arrays, `tape` and `program` the recorded operations, `simplification` the passes on
+them. `python_functions`, `row_functions` and `c_code` translate programs.
+"""
 
 from vsacli.compute.tracing import traced_control_flow  # noqa: F401  (registers the control flow of symbols)
 from vsacli.compute.tracing.array import TracedArray, cells_of, trace, trace_by_size

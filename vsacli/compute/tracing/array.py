@@ -1,4 +1,4 @@
-"""Arrays of symbols and constants that NumPy's functions accept, so that one text computes and is traced."""
+"""Arrays of symbols and constants that NumPy's functions accept, so that a kernel is traced as it is."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Cells = npt.NDArray[np.object_]
 def apply_ufunc(
     tape: Tape, ufunc: np.ufunc, method: str, operands: Sequence[Cells], options: Mapping[str, Any]
 ) -> Any:
-    """Return the symbols and constants of `ufunc(*operands)`, or of `ufunc.reduce(operand, axis=...)`."""
+    """Return the entries of `ufunc(*operands)`, or of `ufunc.reduce(operand, axis=...)`."""
     if ufunc is np.matmul:
         return _matmul(tape, *operands)
     if method == "reduce":
@@ -32,7 +32,7 @@ def apply_ufunc(
 
 
 def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
-    """Return a function on each entry."""
+    """Return a ufunc of arrays, entry by entry."""
     if all(cells.size == 1 for cells in operands):
         single = np.empty(max((cells.shape for cells in operands), key=len), dtype=object)
         single[...] = _one(tape, ufunc, *(cells.item() for cells in operands))
@@ -41,7 +41,7 @@ def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
 
 
 def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
-    """Return a function of single entries on all of some arrays."""
+    """Return a function of scalars, applied to each entry of arrays."""
     spread = np.broadcast_arrays(*(np.asarray(cells, dtype=object) for cells in operands))
     result = np.empty(spread[0].size, dtype=object)
     result[:] = [function(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)]
@@ -49,7 +49,7 @@ def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
 
 
 def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
-    """Return a function of symbols or constants."""
+    """Return a ufunc of symbols or constants."""
     if not any(isinstance(operand, Symbol) for operand in operands):
         with np.errstate(all="ignore"):
             number: Operand = ufunc(*operands).item()
@@ -72,7 +72,7 @@ def _any_truth(operands: Sequence[Operand]) -> bool:
 
 
 def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
-    """Return a truth value as integer, times a constant."""
+    """Return `bits` times a factor, as `bits` with the scaled mask; None for other operands."""
     for symbol, factor in (operands, operands[::-1]):
         if isinstance(symbol, Symbol) and symbol.operation == "bits":
             truth, mask = symbol.operands
@@ -81,7 +81,7 @@ def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
 
 
 def _power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
-    """Return a power, by products where the exponent is a small whole number, or 1.5."""
+    """Return a power, as products if the exponent is a small integer or 1.5."""
     if exponent == 1.5:
         return tape.emit("multiply", base, tape.emit("sqrt", base))
     if exponent not in (2, 3, 4):
@@ -110,11 +110,11 @@ _COMPOSED: dict[str, Callable[..., Operand]] = {
     "isfinite": _isfinite,
     "isinf": _isinf,
 }
-"""Functions that are recorded by means of others."""
+"""Functions that are recorded as several operations."""
 
 
 def _matmul(tape: Tape, a: Cells, b: Cells) -> Cells:
-    """Matrix product; zeros of a constant matrix are taken as the absence of a term."""
+    """Return the matrix product; zeros of a constant matrix add no term."""
 
     def dot(row: Cells, column: Cells) -> Operand:
         pairs = [pair for pair in zip(row, column, strict=True) if 0 not in pair]
@@ -132,7 +132,7 @@ ARRANGING: frozenset[Callable[..., Any]] = frozenset(
         *(np.diag, np.diagonal, np.copy),
     }
 )
-"""Functions that only arrange entries, whatever these are."""
+"""Functions that only rearrange entries."""
 
 
 def _where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
@@ -168,17 +168,17 @@ FUNCTIONS: dict[Callable[..., Any], Callable[..., Cells]] = {
     np.clip: _clip,
     np.searchsorted: _searchsorted,
 }
-"""Functions of entries."""
+"""Functions that compute entries."""
 
 
 class TracedArray(NDArrayOperatorsMixin):
     """An array whose entries are symbols or constants, by the protocols of NumPy (NEP 13 and 18).
 
-    A row of samples is an array (1,): what NumPy broadcasts along samples is broadcast along the one.
+    A row of samples is an array (1,): broadcasting along samples becomes broadcasting along this axis.
 
     Attributes:
-        tape: where operations go.
-        cells: the entries.
+        tape: Tape that records the operations.
+        cells: Entries.
     """
 
     def __init__(self, tape: Tape, cells: Any) -> None:
@@ -257,7 +257,7 @@ class TracedArray(NDArrayOperatorsMixin):
         return TracedArray(self.tape, self.cells.T)
 
     def astype(self, dtype: npt.DTypeLike) -> TracedArray:
-        """Return the array with another type; truth values become the lowest bit of an unsigned integer."""
+        """Return the array with another type; a Boolean becomes the lowest bit of an unsigned integer."""
         wanted = np.dtype(dtype).kind
         return TracedArray(
             self.tape, np.vectorize(lambda cell: self._cast(cell, wanted), otypes=[object])(self.cells)
@@ -293,14 +293,14 @@ _CASTS: dict[str, Callable[[float], Operand]] = {"u": int, "f": float, "b": bool
 
 
 def cells_of(array: Any) -> Cells:
-    """Return the entries of an array, traced or not, as symbols and Python's numbers."""
+    """Return the entries of an array, traced or not, as symbols and Python numbers."""
     if isinstance(array, TracedArray):
         return array.cells
     return np.asarray(array, dtype=object)
 
 
 def _unpacked(argument: Any) -> Any:
-    """Cells in place of traced arrays, inside of lists and tuples also."""
+    """Return cells in place of traced arrays, also inside lists and tuples."""
     if isinstance(argument, TracedArray):
         return argument.cells
     if isinstance(argument, list | tuple):
@@ -309,7 +309,7 @@ def _unpacked(argument: Any) -> Any:
 
 
 def _index(index: Any) -> Any:
-    """Return an index; of traced arrays only truth values that do not depend on a sample."""
+    """Return an index; a traced array is allowed only if it consists of constant Booleans."""
     return index._known().astype(bool) if isinstance(index, TracedArray) else index
 
 
@@ -321,17 +321,17 @@ def trace(
     calling: bool = False,
     short: bool = False,
 ) -> Program:
-    """Return the program of a function of rows of samples: what it does to one sample.
+    """Return the program of a function of rows of samples, for one sample.
 
     Args:
-        function: from rows of samples to rows of results; each sample is computed on its own.
-        kinds: of the rows that it takes.
-        most: operations that are recorded.
-        calling: whether calls are recorded as such, or expanded.
-        short: whether subroutines are functions of their own.
+        function: Function from rows of samples to rows of results; each sample is computed independently.
+        kinds: Kinds of the input rows.
+        most: Largest number of operations.
+        calling: Whether calls are recorded as such, or expanded.
+        short: Whether subroutines are separate functions.
 
     Raises:
-        NotImplementedError: it has no such program, or, as `TooLongError`, one of more operations.
+        NotImplementedError: The function cannot be traced; `TooLongError` if it has more operations.
     """
     tape = Tape(most, calling, short)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
@@ -346,17 +346,17 @@ def trace_by_size(
     *,
     short: bool = False,
 ) -> Program:
-    """Return the program of a function, as of `trace`: written out if it is short, else of calls.
+    """Return the program of a function, as `trace` does: without calls if it is short, else of calls.
 
     Args:
-        function: as of `trace`.
-        kinds: as of `trace`.
-        written_out: operations of the longest program that is written out.
-        most: operations, calls among them, of the longest other program.
-        short: as of `trace`.
+        function: See `trace`.
+        kinds: See `trace`.
+        written_out: Largest number of operations of a program without calls.
+        most: Largest number of operations, including calls, of another program.
+        short: See `trace`.
 
     Raises:
-        NotImplementedError: as of `trace`.
+        NotImplementedError: See `trace`.
     """
     try:
         return trace(function, kinds, written_out, short=short)

@@ -1,9 +1,9 @@
 """Programs as statements of C.
 
-A `Writer` writes the operations of a program one after the other. A `Dialect` says how types, constants and
-choices are written: plain C99 for a single sample (`vsacli.control.codegen.scalar`), or vectors with one
-sample a lane (`vsacli.compute.engine.lanes`). `Tables` places the constant tables of programs in as few
-arrays as hold them all.
+A `Writer` writes the operations of a program one after the other. A `Dialect` is the notation of types,
+constants and choices: plain C99 for a single sample (`vsacli.control.codegen.scalar`), or vectors with one
+sample in each lane (`vsacli.compute.engine.lanes`). `Tables` merges the constant tables of programs into few
+arrays.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ C_NAMES = {
     "searchsorted": "search",
     **{f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "tan2", "sinh")},
 }
-"""Functions that have another name than in NumPy."""
+"""Functions of math.h whose names differ from NumPy's."""
 
 REAL_TYPES = ("double", "float")
 """Types of C for real numbers."""
@@ -60,9 +60,9 @@ class ConstantArray(NamedTuple):
     """An array of constants.
 
     Attributes:
-        name: as in C.
-        type: of its entries, as in C.
-        values: its entries.
+        name: Name in C.
+        type: Type of the entries in C.
+        values: Entries.
     """
 
     name: str
@@ -71,30 +71,30 @@ class ConstantArray(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The place of a table."""
+    """Place of a table: an array and an offset."""
 
     array: ConstantArray
     offset: int
 
     @property
     def pointer(self) -> str:
-        """Expression of C for its first entry."""
+        """C expression of a pointer to the first entry."""
         return f"{self.array.name} + {self.offset}" if self.offset else self.array.name
 
 
 ArrayType = Callable[[tuple[float, ...], bool], str]
-"""Type in C of an array with some values, and whether they are searched."""
+"""Function from values, and whether they are searched, to the C type of their array."""
 
 
 class Tables:
     """All tables of some programs.
 
     Args:
-        programs: whose tables they are.
-        array_type: of the entries of each array.
+        programs: Programs with the tables.
+        array_type: Type of the entries of each array.
 
     Attributes:
-        arrays: in which they lie, the longest first.
+        arrays: Arrays that contain the tables, the longest first.
     """
 
     def __init__(self, programs: Iterable[Program], array_type: ArrayType) -> None:
@@ -118,7 +118,7 @@ class Tables:
 
 
 def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple[int, int]:
-    """Number of the array in which values follow each other, bit for bit, or of a new one, and where."""
+    """Return the index of an array that contains the values bit for bit, or of a new one, and the offset."""
     wanted = array("d", values)
     for number, others in enumerate(contents):
         whole, at = array("d", others).tobytes(), -1
@@ -134,17 +134,17 @@ class Dialect(NamedTuple):
 
     Attributes:
         types: C type of each kind of value.
-        real: writes a real constant.
-        literal: writes a real constant in an array.
-        array_type: chooses the type of the entries of an array.
-        take: writes the entry of a table at an index.
-        function: names the function for values of a kind: one of math.h; `maximum`, `minimum`, which let NaN
+        real: Writes a real constant.
+        literal: Writes a real constant in an array.
+        array_type: Chooses the type of the entries of an array.
+        take: Writes the entry of a table at an index.
+        function: Names the function for values of a kind: one of math.h; `maximum`, `minimum`, which let NaN
             pass; or `search` in a table, which is given as a pointer and a number of entries.
         templates: `integer` (a constant field of bits or index), `true`, `false`; `and`, `or`, `not` of truth
             values; `bits` (a mask where a truth value holds, else 0); `any` (whether a truth value holds for
             any sample, as a condition of C); `spread` (a real value from an array of constants).
-        where: template, for each kind, of one of two values by a truth value.
-        replaced: template of a new value where a truth value holds, else the old one, in a block of C that
+        where: Template, for each kind, of one of two values by a truth value.
+        replaced: Template of a new value where a truth value holds, else the old one, in a block of C that
             is entered where it holds for any sample.
     """
 
@@ -179,16 +179,16 @@ class Dialect(NamedTuple):
         return f"{self.function(kind, name)}({', '.join(operands)})"
 
     def from_slot(self, kind: Kind, slot: str) -> str:
-        """Return the value of a kind that lies in a place for real ones."""
+        """Return the value of a kind that is stored in a place for real values."""
         return slot if kind is Kind.REAL else f"({self.types[kind]}){slot}"
 
     def to_slot(self, kind: Kind, value: str) -> str:
-        """Return a value of a kind as it lies in a place for real ones, which holds all flags and indices."""
+        """Return a value of a kind as stored in a place for real values, exact for all flags and indices."""
         return value if kind is Kind.REAL else f"({self.types[Kind.REAL]}){value}"
 
 
 def digits(number: float) -> str:
-    """Return a constant with all its digits; those that are not finite by their names of math.h."""
+    """Return a constant with all digits; NaN and infinity by their names in math.h."""
     if math.isnan(number):
         return "NAN"
     if math.isinf(number):
@@ -200,9 +200,9 @@ class Writer:
     """Writes programs in a dialect.
 
     Args:
-        dialect: how to write.
-        tables: where their constants are.
-        subroutines: names the function of a subroutine.
+        dialect: Notation of the target language.
+        tables: Tables of constants.
+        subroutines: Names the function of a subroutine.
     """
 
     def __init__(
@@ -213,7 +213,7 @@ class Writer:
         self._name_of = subroutines
 
     def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
-        """Declarations of the values of operations, in their order; names of values begin with the prefix."""
+        """Yield declarations of the values of operations in order; names of values begin with the prefix."""
         for symbol in operations:
             if symbol.operation == "subroutine":
                 yield from self._subroutine(symbol, names, prefix)
@@ -254,7 +254,7 @@ class Writer:
         return dialect.call(symbol.kind, C_NAMES.get(operation, operation), texts)
 
     def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
-        """Yield a function that puts the results of a program into an array of real numbers."""
+        """Yield a function that writes the results of a program to an array of real numbers."""
         yield head
         yield "{"
         yield from self.statements(program.operations, names)
@@ -280,7 +280,7 @@ class Writer:
         return self.dialect.call(Kind.INDEX, C_NAMES[symbol.operation], searched)
 
     def _loop(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """Variables of the state, and the loop that changes them."""
+        """Yield the variables of the state, and the loop that changes them."""
         loop, *operands = symbol.operands
         own, body, dialect = _name(symbol, names, prefix), loop.body, self.dialect
         state = [f"{own}_{number}" for number in loop.numbers]
@@ -300,7 +300,7 @@ class Writer:
         yield "}"
 
     def _branch(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """Variables of the results, and the block that changes them."""
+        """Yield the variables of the results, and the block that changes them."""
         branch, *operands = symbol.operands
         own, body, dialect = _name(symbol, names, prefix), branch.body, self.dialect
         count = len(body.outputs)
@@ -325,7 +325,7 @@ class Writer:
             yield f"{self.dialect.types[kind]} {name} = {value};"
 
     def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
-        """Statements of a body, and its outputs put into variables all at once."""
+        """Yield the statements of a body, and the simultaneous assignment of its outputs."""
         prefix = f"{own}_v"
         yield from self.statements(body.operations, names, prefix)
         kinds = [kind_of(output) for output in body.outputs]
@@ -337,7 +337,7 @@ class Writer:
 
 
 def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
-    """Constants at the head of a file."""
+    """Yield the declarations of constants at the head of a file."""
     for name, array_type, values in tables.arrays:
         entries = ", ".join(dialect.entry(value, array_type) for value in values)
         yield f"static const {array_type} {name}[{len(values)}] = {{{entries}}};"
@@ -352,5 +352,5 @@ def _name(symbol: Symbol, names: Names, prefix: str) -> str:
 
 
 def _renamed(body: Program, texts: list[str]) -> Names:
-    """Return the inputs of a body by what they are given."""
+    """Return the names of the inputs of a body: the texts of its arguments."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}

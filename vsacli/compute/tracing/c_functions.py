@@ -1,9 +1,9 @@
-"""Functions of C that keep code short: of subroutines, and of programs that are nothing but calls.
+"""C functions that keep code short: of subroutines, and of programs that consist of calls.
 
-A subroutine is computed in a few places, in loops also: its function takes its arguments by value. The body
-of a call may have hundreds of operations and be called hundreds of times, each time on values in other
-places and with other constants. So its function is given the workspace in which all values lie, the constants
-of the call, and the places in the workspace of what it reads and writes.
+A subroutine is used in a few places, also in loops: its function receives its arguments by value. The body of
+a call may have hundreds of operations and be called hundreds of times, each time on other values and with
+other constants. So its function receives the workspace with all values, the constants of the call, and the
+indices in the workspace of the values that it reads and writes.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from vsacli.compute.tracing.program import NESTED, Kind, Program, Subroutine, Sy
 
 
 class Subroutines:
-    """All subroutines of some programs; those that do the same are one.
+    """All subroutines of some programs; equal ones share a function.
 
     Attributes:
-        bodies: by the name of the function, after those that it needs.
+        bodies: Bodies by the name of the function, each after those that it calls.
     """
 
     def __init__(self, programs: Iterable[Program] = ()) -> None:
@@ -34,11 +34,11 @@ class Subroutines:
                 self.bodies.setdefault(name, body)
 
     def name(self, body: Program) -> str:
-        """Return the name of the function that does what a body does."""
+        """Return the name of the function of a body."""
         return self._names[_key(body)]
 
     def functions(self, writer: Writer) -> Iterator[Iterator[str]]:
-        """Yield the text of each function: its arguments by value, and where it puts its results."""
+        """Yield the text of each function, with arguments by value and a pointer to its results."""
         real = writer.dialect.types[Kind.REAL]
         for name, body in self.bodies.items():
             names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
@@ -58,7 +58,7 @@ def _bodies(program: Program) -> Iterator[Program]:
 
 
 def _key(program: Program) -> Hashable:
-    """Return a key that is equal for programs that do the same in the same order."""
+    """Return a key that is equal for programs with the same operations in the same order."""
     operations = tuple(
         (symbol.index, symbol.operation, symbol.kind, *map(_operand_key, symbol.operands))
         for symbol in program.operations
@@ -67,23 +67,23 @@ def _key(program: Program) -> Hashable:
 
 
 def _operand_key(operand: Any) -> Hashable:
-    """Return a value by its number, a constant by its digits; NaN, too, equals itself."""
+    """Return a value by its number, a constant by its digits, so that NaN equals itself."""
     if isinstance(operand, Symbol):
         return operand.index, operand.kind
     if isinstance(operand, Table):
         return array("d", operand.values).tobytes()
-    if isinstance(operand, tuple):  # what holds a program
+    if isinstance(operand, tuple):  # a loop, branch, call or subroutine
         body, *rest = operand
         return type(operand), _key(body), repr(rest)
     return repr(operand)
 
 
 VALUES, CONSTANTS, PLACES = "values", "constants", "places"
-"""Names in a function of the workspace, its constants, and the places of arguments and results."""
+"""Names of a function's parameters: workspace, constants, and places of arguments and results."""
 
 
 class _Function(NamedTuple):
-    """A function for the body of calls, and which of its arguments are constants."""
+    """A function for the body of calls, and the arguments that are constants."""
 
     name: str
     body: Program
@@ -94,13 +94,13 @@ class CallingCode:
     """The parts of C code for a program of calls.
 
     Args:
-        name: beginning of the names of functions and tables.
-        program: one of nothing but calls and their items.
-        writer: writes the bodies.
+        name: Beginning of the names of functions and tables.
+        program: Program that consists of calls and their items.
+        writer: Writer of the bodies.
 
     Attributes:
-        slots: how many values the workspace holds.
-        slot: place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
+        slots: Number of values in the workspace.
+        slot: Places of inputs and outputs in the workspace, by index; those of inputs in order, from 0 on.
     """
 
     def __init__(self, name: str, program: Program, writer: Writer) -> None:
@@ -119,7 +119,7 @@ class CallingCode:
         self.slot, self.slots = workspace.slot, workspace.counts[Kind.REAL]
 
     def declarations(self, qualifiers: str) -> Iterator[str]:
-        """Tables, and functions with these qualifiers."""
+        """Return the tables, and the functions with these qualifiers."""
         constants = ", ".join(self._dialect.entry(value, self._number) for value in self._constants) or "0"
         yield f"static const {self._number} {self._name}_{CONSTANTS}[] = {{{constants}}};"
         yield f"static const int {self._name}_{PLACES}[] = {{{', '.join(map(str, self._places))}}};"
@@ -147,7 +147,7 @@ class CallingCode:
         self._places += [workspace.slot[value.index] for value in values]
 
     def _definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
-        """Yield a function that loads inputs at first use and stores results at once, to keep few values."""
+        """Yield a function that loads inputs at first use and stores results at once, to save registers."""
         types, body = self._dialect.types, function.body
         values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._number} *{CONSTANTS}"
         yield f"{qualifiers} void {function.name}({values}, {table}, const int *{PLACES})"

@@ -1,9 +1,9 @@
-"""Programs of nothing but calls, as long chains have them: the passes that make them, and where values lie.
+"""Programs that consist of calls, for long chains: the passes that make them, and the places of values.
 
-Outlining makes calls of what a program does between its calls, of bodies of bounded size: the time of a
-compiler grows with the square of a function's length. Sharing makes one body of those that differ in nothing
-but constants, which become arguments. A `Workspace` says where values lie while they are live, as a compiler
-allocates registers.
+Outlining turns the operations between calls into calls, with bodies of bounded size, since the time of a
+compiler grows with the square of a function's length. Sharing merges bodies that differ only in constants,
+which become arguments. A `Workspace` assigns places to values while they are live, as a compiler allocates
+registers.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from typing import Any, NamedTuple
 from vsacli.compute.tracing.program import NESTED, Call, Kind, Program, Symbol, kinds_of_operands
 
 MOST_OUTLINED = 500
-"""Operations in a row that become one body: the time of a compiler grows with the square of a function's."""
+"""Largest number of operations of an outlined body; the compiler's time grows with its square."""
 
 
 class _Run(NamedTuple):
-    """Operations in a row."""
+    """Consecutive operations."""
 
     operations: list[Symbol]
 
 
 def with_outlined_runs(program: Program) -> Program:
-    """Return the program with nothing but calls and items of these."""
+    """Return the program with all operations between calls turned into calls."""
     parts = list(_calls_and_runs(program.operations))
     last_part = {
         operand.index: number
@@ -48,7 +48,7 @@ def with_outlined_runs(program: Program) -> Program:
 
 
 def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _Run]:
-    """Calls and their items as they are, and the operations between in runs."""
+    """Yield calls and their items unchanged, and the operations between them in runs."""
     run: list[Symbol] = []
     for symbol in operations:
         of_call = symbol.operation == "call" or _is_item_of_call(symbol)
@@ -68,7 +68,7 @@ def _is_item_of_call(symbol: Symbol) -> bool:
 
 
 def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int) -> list[Symbol]:
-    """Return a call of operations, and the results that are read beyond, which keep their numbers."""
+    """Return a call of operations, and the results that are read after it, which keep their numbers."""
     own = {symbol.index for symbol in operations}
     given = {
         operand.index: operand
@@ -101,28 +101,28 @@ def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int)
 
 
 Place = tuple[int, ...]
-"""Place of a constant in a program: numbers of operation and operand; in a loop or conditional, the number
-of that operation and the place in its body."""
+"""Place of a constant in a program: indices of operation and operand; in a loop or conditional, the index of
+that operation and the place in its body."""
 
 Constants = dict[Place, float]
 
 
 class _Body(NamedTuple):
-    """The body of a call: all of it but its real constants, and these."""
+    """Body of a call: its structure without real constants, and the constants."""
 
     shape: Hashable
     constants: Constants
 
 
 class _Common(NamedTuple):
-    """One body for several calls, and where in theirs the constants stand that it is given."""
+    """Common body of several calls, and the places in their own bodies of constants that became arguments."""
 
     body: Program
     places: list[Place]
 
 
 def with_shared_bodies(program: Program) -> Program:
-    """Return the program with fewer bodies: constants in which similar ones differ become arguments."""
+    """Return the program with fewer bodies: constants in which similar bodies differ become arguments."""
     calls: list[Call] = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
     programs = {id(call.body): call.body for call in calls}
     bodies = {identity: _read(body) for identity, body in programs.items()}
@@ -159,7 +159,7 @@ def _read(program: Program) -> _Body:
 def _operand_shapes(
     symbol: Symbol, at: int, number: Mapping[int, int], constants: Constants
 ) -> Iterator[Hashable]:
-    """Yield what the operands of an operation are but for real constants, which are noted."""
+    """Yield the structure of an operation's operands, and collect their real constants."""
     for place, (operand, kind) in enumerate(zip(symbol.operands, kinds_of_operands(symbol), strict=True)):
         if place == 0 and symbol.operation in NESTED:
             inner = _read(operand.body)
@@ -173,14 +173,14 @@ def _operand_shapes(
 
 
 def _operand_shape(operand: Any, number: Mapping[int, int]) -> Hashable:
-    """Return the number of a value; else what is fixed, numbers to the digit."""
+    """Return the number of a value; for a constant its type and digits, for other operands themselves."""
     if isinstance(operand, Symbol):
         return number[operand.index]
     return (type(operand), repr(operand)) if isinstance(operand, float | int) else operand
 
 
 def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
-    """Return one body for several that differ in constants only; those that are equal in all stay."""
+    """Return one body for several that differ only in constants; equal constants stay in the body."""
     first: dict[tuple[str, ...], Place] = {}
     same: dict[Place, Place] = {}
     for place in of_bodies[0]:
@@ -192,7 +192,7 @@ def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
 
 
 def _opened(program: Program, parameters: Mapping[Place, int]) -> Program:
-    """Return a program that is given the constants in some places: those of the same number in one input."""
+    """Return a program with inputs in place of constants; places with equal numbers share an input."""
     if not parameters:
         return program
     values = [*program.inputs, *program.operations]
@@ -224,15 +224,15 @@ def _given(symbol: Symbol, places: Mapping[Place, int], inputs: Mapping[int, Sym
 
 
 class Workspace:
-    """Places of values; those that a call gives never lie where those do that it takes.
+    """Places of values; results of a call never share a place with its arguments.
 
     Args:
-        program: one of nothing but calls and their items.
-        by_kind: whether values of each kind have places of their own, else all have real ones.
+        program: Program that consists of calls and their items.
+        by_kind: Whether each kind of value has separate places; otherwise all places are real.
 
     Attributes:
-        slot: place of each value among those of its kind, by index; inputs come first, in their order.
-        counts: how many places there are for each kind.
+        slot: Place of each value among those of its kind, by index; inputs come first, in their order.
+        counts: Number of places for each kind.
     """
 
     def __init__(self, program: Program, *, by_kind: bool = False) -> None:
@@ -252,7 +252,7 @@ class Workspace:
                 self._last_use.pop(kept.index, None)
 
     def results(self, call: Symbol) -> list[Symbol]:
-        """Return the results of the next call, by outputs of its body, and give them places."""
+        """Return the results of the next call, in the order of its body's outputs, and assign places."""
         order = {number: place for place, number in enumerate(call.operands[0].numbers)}
         items = sorted(self._items[call.index], key=lambda item: order[item.operands[1]])
         for item in items:
@@ -274,5 +274,5 @@ class Workspace:
 
 
 def values_of(symbol: Symbol) -> Iterator[Symbol]:
-    """Return the operands of an operation that are no constants."""
+    """Yield the operands of an operation that are no constants."""
     return (operand for operand in symbol.operands if isinstance(operand, Symbol))

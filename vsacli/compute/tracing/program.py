@@ -1,7 +1,7 @@
-"""The intermediate representation: programs of operations on values that are known only when they run.
+"""The intermediate representation: programs of operations on symbols.
 
-Each value is assigned once, and an operation stands after its operands. Loops, branches and calls are
-operations, too: they hold the program of their body, and operations called "item" take their results apart.
+Each value is assigned once, and an operation follows its operands. Loops, branches and calls are operations,
+too: they contain the program of their body, and operations named "item" return their single results.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from vsacli.compute.vector import Scalar
 
 
 class Kind(enum.Enum):
-    """The kind of a value: floating-point number, truth value, field of bits, or index of a table."""
+    """Kind of a value: floating-point number, Boolean, bit field, or index of a table."""
 
     REAL = enum.auto()
     TRUTH = enum.auto()
@@ -25,7 +25,7 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True)
 class Table:
-    """Constants among which an operation chooses."""
+    """Constants from which an operation selects."""
 
     values: tuple[float, ...]
 
@@ -41,11 +41,11 @@ class Symbol:
     """An input of a program, or the result of an operation, as a scalar with + - * / cos sin tanh.
 
     Attributes:
-        tape: where the operation is.
-        index: number of the value on the tape.
-        operation: as `Tape.emit` has it; "input" for an input.
-        operands: of the operation; first comes what is fixed, a table or the body of a loop, if anything is.
-        kind: of the value.
+        tape: Tape that contains the operation.
+        index: Number of the value on the tape.
+        operation: Operation, as for `Tape.emit`; "input" for an input.
+        operands: Operands of the operation; a table, or the body of a loop, comes first.
+        kind: Kind of the value.
     """
 
     __slots__ = ("index", "kind", "operands", "operation", "tape")
@@ -60,7 +60,7 @@ class Symbol:
         self.kind = kind
 
     def with_operands(self, operands: Sequence[Any]) -> Symbol:
-        """Return the same value of an operation on other operands."""
+        """Return the symbol with other operands."""
         return Symbol(self.tape, self.index, self.operation, tuple(operands), self.kind)
 
     def __add__(self, other: Scalar) -> Operand:
@@ -88,15 +88,15 @@ class Symbol:
         return self.tape.emit("negative", self)
 
     def cos(self) -> Operand:
-        """Cosine; what `numpy.cos` calls."""
+        """Return the cosine; `numpy.cos` calls this method."""
         return self.tape.emit("cos", self)
 
     def sin(self) -> Operand:
-        """Sine; what `numpy.sin` calls."""
+        """Return the sine; `numpy.sin` calls this method."""
         return self.tape.emit("sin", self)
 
     def tanh(self) -> Operand:
-        """Hyperbolic tangent; what `numpy.tanh` calls."""
+        """Return the hyperbolic tangent; `numpy.tanh` calls this method."""
         return self.tape.emit("tanh", self)
 
 
@@ -105,12 +105,12 @@ Operand: TypeAlias = Symbol | float | int | bool
 
 
 class Program(NamedTuple):
-    """A program: what its outputs need, without a jump.
+    """A program: the operations that its outputs require, without jumps.
 
     Attributes:
-        inputs: symbols of its inputs.
-        operations: in their order.
-        outputs: symbols or constants of its results.
+        inputs: Symbols of its inputs.
+        operations: Operations in order.
+        outputs: Symbols or constants of its results.
     """
 
     inputs: tuple[Symbol, ...]
@@ -119,7 +119,7 @@ class Program(NamedTuple):
 
 
 def is_of_calls(program: Program) -> bool:
-    """Return whether a program was traced with calls, of which it then consists."""
+    """Return whether a program was traced with calls, and so consists of calls."""
     return any(symbol.operation == "call" for symbol in program.operations)
 
 
@@ -127,9 +127,9 @@ class Loop(NamedTuple):
     """A program that is repeated.
 
     Attributes:
-        body: receives the state and constants; returns the next state and whether that is the last one.
-        limit: largest number of times.
-        numbers: of the entries of the state among those that were traced.
+        body: Program from state and constants to the next state and whether it is the last.
+        limit: Largest number of repetitions.
+        numbers: Indices of the entries of the state among those that were traced.
     """
 
     body: Program
@@ -138,11 +138,11 @@ class Loop(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """A program that runs only where a truth value holds.
+    """A program that runs only where a Boolean is true.
 
     Attributes:
-        body: the program.
-        numbers: of its outputs among those that were traced.
+        body: Program.
+        numbers: Indices of the outputs among those that were traced.
     """
 
     body: Program
@@ -150,11 +150,11 @@ class Branch(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A program that others call as well.
+    """A program that may be shared by several calls.
 
     Attributes:
-        body: the program.
-        numbers: of its outputs among those that were traced.
+        body: Program.
+        numbers: Indices of the outputs among those that were traced.
     """
 
     body: Program
@@ -162,17 +162,17 @@ class Call(NamedTuple):
 
 
 class Subroutine(NamedTuple):
-    """A program that stands in a function of its own; its inputs and outputs are real numbers.
+    """A program that becomes a separate function; its inputs and outputs are real numbers.
 
     Attributes:
-        body: the program, whichever of its outputs are read.
+        body: Program, with all outputs.
     """
 
     body: Program
 
 
 NESTED = frozenset({"loop", "branch", "call", "subroutine"})
-"""Operations that hold a program."""
+"""Operations that contain a program."""
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
 LOGICAL = {"logical_and": "and", "logical_or": "or", "logical_not": "not"}
@@ -190,7 +190,7 @@ FUNCTIONS = frozenset(
 CHOOSING = frozenset({"maximum", "minimum"})
 ARITHMETIC = frozenset({"add", "subtract", "multiply", "divide", "negative"})
 NAN_PROPAGATING = (FUNCTIONS | ARITHMETIC | CHOOSING) - {"power", "hypot", "copysign"}
-"""Operations that give NaN wherever an operand is; the others do not: 1 to the power of NaN is 1."""
+"""Operations that return NaN if any operand is NaN; others may not: 1 to the power of NaN is 1."""
 
 _KINDS = {
     **dict.fromkeys(FUNCTIONS, Kind.REAL),
@@ -202,14 +202,14 @@ _KINDS = {
 
 
 def kind_of(operand: Any) -> Kind:
-    """Return the kind of a value; a plain integer is a real number wherever it may be one."""
+    """Return the kind of a value; a plain integer counts as a real number."""
     if isinstance(operand, Symbol):
         return operand.kind
     return Kind.TRUTH if isinstance(operand, bool) else Kind.REAL
 
 
 def kinds_of_operands(symbol: Symbol) -> list[Kind]:
-    """Return the kind of each operand, which decides on the notation of a constant."""
+    """Return the kind of each operand, which determines the notation of a constant."""
     if symbol.operation == "where":
         return [Kind.TRUTH, symbol.kind, symbol.kind]
     if symbol.operation == "bits":
@@ -230,7 +230,7 @@ def result_kind(operation: str, operands: Sequence[Any]) -> Kind:
     """Return the kind of an operation's result.
 
     Raises:
-        NotImplementedError: it is none of those that can be recorded.
+        NotImplementedError: The operation cannot be recorded.
     """
     if operation in _KINDS:
         return _KINDS[operation]
@@ -262,7 +262,7 @@ def _common_kind(operands: Sequence[Any]) -> Kind:
 
 
 def table_uses(*programs: Program) -> Iterator[tuple[Table, str]]:
-    """Yield tables with the operations on them, in nested programs as well, each of which is read once."""
+    """Yield tables with the operations on them, also of nested programs, each of which is visited once."""
     seen: set[int] = set()
     for program in programs:
         yield from _uses(program, seen)

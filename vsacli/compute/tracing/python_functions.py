@@ -1,8 +1,8 @@
-"""Programs as functions of Python.
+"""Programs as Python functions.
 
-`function_text` writes one whose functions have their names in NumPy. With NumPy's functions behind these
-names it computes rows of samples, with those of plain numbers a single sample, some hundred times faster than
-the text that was traced.
+`function_text` writes a function that uses NumPy's function names. With these names bound to NumPy it
+computes rows of samples; bound to functions of plain numbers it computes a single sample, about a hundred
+times faster than the kernel itself.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _CHOICES = {"where": "{1} if {0} else {2}", "take": "{0}[{1}]", "negative": "-{0
 NumberFunction = Callable[[Sequence[float]], list[float]]
 """Function from the inputs of a program to its outputs.
 
-Raises ArithmeticError or ValueError where Python has an error in place of NaN or infinity."""
+Raises ArithmeticError or ValueError where Python raises instead of returning NaN or infinity."""
 
 _ON_NUMBERS: dict[str, Any] = {
     **{name: getattr(math, name) for name in ("sqrt", "cbrt", "exp", "expm1", "log", "log1p", "hypot")},
@@ -48,17 +48,15 @@ _ON_NUMBERS: dict[str, Any] = {
 
 
 def function_text(program: Program, name: str, arguments: Mapping[str, int]) -> str:
-    """Return a function of sequences of numbers that returns the list of the program's outputs.
-
-    It calls functions by their names in NumPy.
+    """Return the text of a function from sequences of numbers to the list of the program's outputs.
 
     Args:
-        program: one without loops and branches.
-        name: of the function.
-        arguments: how many inputs there are in each of its arguments, by name.
+        program: Program without loops and branches.
+        name: Name of the function.
+        arguments: Number of inputs in each argument, by name.
 
     Raises:
-        NotImplementedError: the program has loops or branches.
+        NotImplementedError: The program has loops or branches.
     """
     distinct = dict.fromkeys(table for table, _ in table_uses(program))
     tables = {table: f"table_{number}" for number, table in enumerate(distinct)}
@@ -98,7 +96,7 @@ def number_function(program: Program) -> NumberFunction:
     """Return a program as a function of plain numbers.
 
     Raises:
-        NotImplementedError: it has loops or branches.
+        NotImplementedError: The program has loops or branches.
     """
     function: NumberFunction = defined(_code(program), "run", dict(_ON_NUMBERS))
     return function
@@ -114,14 +112,14 @@ def compiled(text: str) -> CodeType:
 
 
 def defined(code: CodeType, name: str, names: dict[str, Any]) -> Callable[..., Any]:
-    """Return the function of a name that code defines, whose globals are other names."""
+    """Return the function with a name that code defines, with `names` as globals."""
     exec(code, names)
     function: Callable[..., Any] = names[name]
     return function
 
 
 class StateFunction:
-    """A program without control flow and tables, for single states or for rows of them."""
+    """A program without control flow and tables, for single states or rows of states."""
 
     def __init__(self, program: Program) -> None:
         code = _code(program)

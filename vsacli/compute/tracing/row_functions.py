@@ -1,8 +1,8 @@
-"""Programs on rows of samples, with one call of NumPy an operation, on rows that are used again.
+"""Programs on rows of samples, with one NumPy call per operation, on reused rows.
 
-`RowFunction` carries out a program without loops and tables: each value lies in a row, which is free for
-another one once the value is dead, so that what it works on stays in the processor's cache.
-`CallingRowFunction` carries out a program of calls, of which each body is a `RowFunction`.
+`RowFunction` runs a program without loops and tables: each value has a row, which is reused once the value is
+dead, so that the rows stay in the processor's cache. `CallingRowFunction` runs a program of calls, each body
+of which is a `RowFunction`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vsacli.compute.tracing.program import CHOOSING, Kind, Operand, Program, Sym
 from vsacli.compute.tracing.python_functions import compiled, defined
 
 RowSpace = tuple[npt.NDArray[Any], ...]
-"""Rows for intermediate values: of real numbers, of truth values, of bits."""
+"""Rows for intermediate values: of real numbers, of Booleans, of bits."""
 
 DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint32}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
@@ -30,18 +30,17 @@ _SELECTIONS = {"where": "{1}, {2}", "bits": "{1}, 0"}
 
 
 class RowFunction:
-    """A program without loops and tables for rows of any length: one call of NumPy an operation.
+    """A program without loops and tables for rows of any length, with one NumPy call per operation.
 
-    What was traced makes a new row for each intermediate value, and computes some of them twice. This does
-    neither, so that what it works on stays in the processor's cache; it finds the numbers of its program to
-    the last bit.
+    The kernel itself allocates a row for each intermediate value, and computes some of them twice. This does
+    neither, so that its rows stay in the processor's cache. Results are those of the program to the last bit.
 
     Attributes:
-        rows: how many intermediate values of each kind are kept at most at a time.
-        run: computes, given rows of inputs, the rows of each kind that it needs, and rows for the outputs.
+        rows: Largest number of intermediate values of each kind kept at a time.
+        run: Function of input rows, workspace rows of each kind, and output rows.
 
     Raises:
-        NotImplementedError: the program has loops, branches or tables.
+        NotImplementedError: The program has loops, branches or tables.
     """
 
     def __init__(self, program: Program) -> None:
@@ -53,7 +52,7 @@ class RowFunction:
         self.rows = allocation.counts
 
     def workspace(self, samples: int) -> RowSpace:
-        """Rows for the intermediate values of at most this many samples."""
+        """Return rows for the intermediate values of at most this many samples."""
         return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in DTYPES.items())
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:
@@ -64,11 +63,11 @@ class RowFunction:
 
 
 class _RowAllocation:
-    """The row of each value of a program while it is live, as a compiler allocates registers.
+    """Rows of a program's values while they are live, as a compiler allocates registers.
 
     Attributes:
-        counts: how many rows there are of each kind.
-        constants: by their names, as arrays (): NumPy would make one of each number, at every call.
+        counts: Number of rows of each kind.
+        constants: Constants by name, as arrays (): NumPy would convert each number at every call.
     """
 
     def __init__(self, program: Program) -> None:
@@ -92,7 +91,7 @@ class _RowAllocation:
         self._calls = [line for number in range(len(program.operations)) for line in self._operation(number)]
 
     def heading(self) -> Iterator[str]:
-        """Statements that give the rows their names."""
+        """Return statements that assign names to the rows."""
         spaces = ("real", "truth", "bits")
         yield f" {', '.join(spaces)} = workspace"
         yield _unpacking("x", len(self._program.inputs), "inputs")
@@ -101,7 +100,7 @@ class _RowAllocation:
             yield _unpacking(letter, self.counts[kind], space)
 
     def statements(self) -> Iterator[str]:
-        """Statements that compute."""
+        """Return the statements that compute."""
         yield from self._calls
         for number, output in enumerate(self._program.outputs):
             if not (isinstance(output, Symbol) and self._output_row.get(output.index) == f"o{number}"):
@@ -112,7 +111,7 @@ class _RowAllocation:
         if symbol.kind not in DTYPES or symbol.operation in _NONE_ON_ROWS:
             raise NotImplementedError(f"{symbol.operation} has no form on rows")
         operands = [self._operand(operand, symbol.kind) for operand in symbol.operands]
-        if symbol.operation in _SELECTIONS:  # written in two steps, so no operand may lie in the same row
+        if symbol.operation in _SELECTIONS:  # written in two steps, so no operand may share the row
             row = self._allocated(symbol)
             one, other = _SELECTIONS[symbol.operation].format(*operands).split(", ")
             yield f" copyto({row}, {other})"
@@ -120,11 +119,11 @@ class _RowAllocation:
             self._free_dead_operands(symbol, number)
         else:
             self._free_dead_operands(symbol, number)
-            out = "out=" if symbol.operation in CHOOSING else ""  # a keyword takes longer; these ask for it
+            out = "out=" if symbol.operation in CHOOSING else ""  # slower, but these require the keyword
             yield f" {symbol.operation}({', '.join(operands)}, {out}{self._allocated(symbol)})"
 
     def _operand(self, operand: Operand, kind: Kind = Kind.REAL) -> str:
-        """Return a row, or a constant as values of a kind have it."""
+        """Return the name of a row, or of a constant in the type of a kind."""
         if isinstance(operand, Symbol):
             return self._row[operand.index]
         kind = kind if kind is Kind.BITS else kind_of(operand)
@@ -133,7 +132,7 @@ class _RowAllocation:
         return name
 
     def _allocated(self, symbol: Symbol) -> str:
-        """Return a row for a value: that of an output, one that is free, or a new one."""
+        """Return a row for a value: an output row, a free row, or a new one."""
         row = self._output_row.get(symbol.index)
         if row is None and self._free[symbol.kind]:
             row = self._free[symbol.kind].pop()
@@ -144,7 +143,7 @@ class _RowAllocation:
         return row
 
     def _free_dead_operands(self, symbol: Symbol, number: int) -> None:
-        """The rows of operands that are not needed any more, and of no output, may be used again."""
+        """Free the rows of operands that are used neither later nor as an output."""
         for operand in dict.fromkeys(part for part in symbol.operands if isinstance(part, Symbol)):
             dead = self._last_use[operand.index] == number and operand.index not in self._returned
             if dead and operand.operation != "input":
@@ -156,7 +155,7 @@ def _unpacking(letter: str, count: int, whole: str) -> str:
 
 
 class _Row(NamedTuple):
-    """The place of a row among those of its kind; inputs come first."""
+    """Index of a row among those of its kind; inputs come first."""
 
     kind: Kind
     place: int
@@ -175,10 +174,10 @@ class _Call(NamedTuple):
 
 
 class CallingRowFunction:
-    """A program of calls on rows of any length; elsewise as `RowFunction`.
+    """A program of calls on rows of any length; otherwise as `RowFunction`.
 
     Raises:
-        NotImplementedError: the program has loops, branches or tables.
+        NotImplementedError: The program has loops, branches or tables.
     """
 
     def __init__(self, program: Program) -> None:
@@ -200,7 +199,7 @@ class CallingRowFunction:
                 yield _Call(self._functions[id(body)], given, results)
 
     def workspace(self, samples: int) -> RowSpace:
-        """Rows for what calls hand on, and then for the intermediate values of any of the functions."""
+        """Return rows for the arguments and results of calls, and for intermediate values of any function."""
         own = {
             kind: max((function.rows[kind] for function in self._functions.values()), default=0)
             for kind in DTYPES

@@ -20,10 +20,10 @@ from vsacli.compute.tracing.program import (
 
 
 def folded(operation: str, operands: Sequence[Operand]) -> Operand | None:
-    """Return the result if it is a constant or an operand; None if the operation has to be carried out.
+    """Return the result if it is a constant or an operand; None if the operation must be computed.
 
-    What NumPy would compute is kept, NaN and infinity included: 0 x is not 0. But x + 0 is x, also where x
-    is -0.
+    Results are those of NumPy, including NaN and infinity: 0 x is not folded to 0. One exception: x + 0 is x,
+    also if x is -0.
     """
     if operation in NAN_PROPAGATING and any(map(_is_nan, operands)):
         return math.nan
@@ -36,7 +36,7 @@ def folded(operation: str, operands: Sequence[Operand]) -> Operand | None:
 
 
 _STRICT = frozenset({"less", "greater"})
-"""Comparisons that hold between no value and itself."""
+"""Comparisons that are false for a value and itself."""
 
 
 def _is_nan(operand: Operand) -> bool:
@@ -48,7 +48,7 @@ def _is(operand: Operand, constant: float) -> bool:
 
 
 def _neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
-    """Return the rule of a commutative operation that a constant leaves the other operand as it is."""
+    """Return the rule that a constant is the neutral element of a commutative operation."""
 
     def rule(a: Operand, b: Operand) -> Operand | None:
         return b if _is(a, constant) else _second_neutral(constant)(a, b)
@@ -57,7 +57,7 @@ def _neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
 
 
 def _second_neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
-    """Return the rule of an operation that a constant leaves the first operand as it is."""
+    """Return the rule that a constant second operand leaves the first operand unchanged."""
     return lambda a, b: a if _is(b, constant) else None
 
 
@@ -111,13 +111,13 @@ _RULES: dict[str, Callable[..., Operand | None]] = {
 
 
 Shortened = dict[tuple[int, frozenset[int]], Program]
-"""Remaining programs of calls, by their identity and the places of the outputs that are read."""
+"""Shortened programs of calls, by identity of the program and indices of the outputs that are read."""
 
 
 def without_dead_code(
     inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequence[Operand]
 ) -> Program:
-    """Return the program that computes these outputs by those of the operations that they need."""
+    """Return the program with only those operations that the outputs require."""
     needed = {output.index for output in outputs if isinstance(output, Symbol)}
     items: dict[int, set[int]] = defaultdict(set)
     shortened: Shortened = {}
@@ -140,7 +140,7 @@ def without_dead_code(
 
 
 def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
-    """Return a loop with the part of the state on which the wanted entries, and the end, depend."""
+    """Return a loop reduced to the state on which the wanted entries and the end depend."""
     (body, limit, numbers), *operands = symbol.operands
     places = _places(numbers, wanted)
     live: set[int] = set()
@@ -161,7 +161,7 @@ def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
 
 
 def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
-    """Return a branch with the wanted outputs."""
+    """Return a branch reduced to the wanted outputs."""
     (body, numbers), truth, *operands = symbol.operands
     places = _places(numbers, wanted)
     shorter = without_dead_code(body.inputs, body.operations, _chosen(body.outputs, places))
@@ -179,7 +179,7 @@ def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
 
 
 def _call(symbol: Symbol, wanted: set[int], shortened: Shortened) -> Symbol:
-    """Return a call with the wanted outputs; calls of one program for the same outputs keep one program."""
+    """Return a call reduced to the wanted outputs; calls that want the same outputs still share a program."""
     (body, numbers), *operands = symbol.operands
     places = frozenset(_places(numbers, wanted))
     key = id(body), places
@@ -204,6 +204,6 @@ def _chosen(entries: Sequence[Any], places: Iterable[int]) -> list[Any]:
 
 
 def _used(program: Program) -> set[int]:
-    """Values that a program reads or returns."""
+    """Return the values that a program reads or returns."""
     operands = (operand for symbol in program.operations for operand in symbol.operands)
     return {operand.index for operand in (*operands, *program.outputs) if isinstance(operand, Symbol)}

@@ -1,4 +1,4 @@
-"""Programs carried out in single precision by NumPy: the values that C code with type float finds."""
+"""Programs run in single precision by NumPy, to predict the values of C code with type float."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from vsacli.compute.tracing.program import (
 )
 
 Values = list[Any]
-"""Rows of samples, or constants of NumPy's types."""
+"""Rows of samples, or constants of NumPy types."""
 
 Results = dict[int, Any]
-"""Values that a nested program returns, by their numbers."""
+"""Values that a nested program returns, by index."""
 
 _DTYPES: dict[Kind, type[np.generic]] = {
     Kind.REAL: np.float32,
@@ -39,17 +39,17 @@ _DTYPES: dict[Kind, type[np.generic]] = {
 
 
 def in_single_precision(program: Program, rows: Sequence[FloatArray] | FloatArray) -> list[npt.NDArray[Any]]:
-    """Carry out a program, each operation of which rounds to single precision.
+    """Run a program with rounding to single precision after each operation.
 
-    Functions are computed in double precision and then rounded: `math.h` comes within a unit in the last
-    place of that, whereas the accuracy of NumPy's own in single precision depends on the processor.
+    Functions are computed in double precision and then rounded: `math.h` is within a unit in the last place
+    of that, whereas the accuracy of NumPy's functions in single precision depends on the processor.
 
     Args:
-        program: the program.
-        rows: its inputs, (samples,), which are rounded, too.
+        program: Program.
+        rows: Inputs of the program, (samples,), which are rounded, too.
 
     Returns:
-        Its outputs, (samples,): single precision, truth values or bits.
+        Outputs of the program, (samples,): single precision numbers, Booleans or bits.
     """
     with np.errstate(all="ignore"):
         outputs = _run(program, [np.asarray(row, dtype=np.float32) for row in rows])
@@ -84,7 +84,7 @@ def _result(operation: str, operands: Values) -> Any:
 
 
 def _loop(loop: Loop, *operands: Any) -> Results:
-    """Samples that are done keep their state while the others go on."""
+    # Samples that are done keep their state while the others continue.
     count = len(loop.numbers)
     state, constants = list(operands[:count]), operands[count:]
     going: Any = np.bool_(True)
@@ -128,4 +128,4 @@ _MEANING: dict[str, Callable[..., Any]] = {
     "subroutine": _subroutine,
     "take": lambda table, index: _entries(table)[index],
 }
-"""Operations that are no function of NumPy with these operands."""
+"""Operations that NumPy has no function for."""

@@ -1,4 +1,4 @@
-"""The tape: operations in the order in which a computation carries them out, folded and shared."""
+"""The tape: operations in the order of their execution, with constant folding and common subexpressions."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from vsacli.compute.tracing.program import (
 from vsacli.compute.tracing.simplification import folded, without_dead_code
 
 MOST_RECORDED = 50_000
-"""Operations of what becomes one function, a few of which no output needs: gcc takes a minute and 0.6 GB."""
+"""Largest number of operations recorded for one function: gcc then takes a minute and 0.6 GB."""
 
 
 class TooLongError(NotImplementedError):
-    """More operations than may be recorded."""
+    """A kernel has more operations than may be recorded."""
 
 
 class Tape:
-    """Operations in the order in which they were carried out; a common subexpression is there once.
+    """Operations in the order of their execution; a common subexpression is recorded once.
 
     Args:
-        most: how many there may be; with one more it raises `TooLongError`.
-        calling: whether calls are recorded as such, or expanded.
-        short: whether subroutines are functions of their own, else they are recorded where they stand.
+        most: Largest number of operations; beyond it `TooLongError` is raised.
+        calling: Whether calls are recorded as such, or expanded.
+        short: Whether subroutines are separate functions, or recorded inline.
 
     Attributes:
-        calls: what has been recorded of calls, by what tells them apart.
+        calls: Recorded calls, by their keys.
     """
 
     def __init__(self, most: int = sys.maxsize, calling: bool = False, short: bool = False) -> None:
@@ -55,7 +55,7 @@ class Tape:
         self._ended = False
 
     def inputs(self, count: int) -> list[Symbol]:
-        """New real variables, which a program receives in this order."""
+        """Return new real variables, which a program receives in this order."""
         return [self.input(Kind.REAL) for _ in range(count)]
 
     def input(self, kind: Kind) -> Symbol:
@@ -65,9 +65,9 @@ class Tape:
         return symbol
 
     def emit(self, operation: str, *operands: Operand | Table) -> Operand:
-        """Return the result of an operation on symbols and constants, named as the function of NumPy.
+        """Return the result of an operation on symbols and constants, named as the NumPy function.
 
-        Beyond these there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
+        In addition there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
         """
         arguments = tuple(map(_python_number, operands))
         known = folded(operation, arguments)
@@ -79,24 +79,24 @@ class Tape:
     def emit_loop(
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
     ) -> list[Symbol]:
-        """Return the state after the repetition of a program that was traced on a tape of its own."""
+        """Return the state after the repetition of a program that was traced on a separate tape."""
         loop = Loop(body, limit, tuple(range(len(state))))
         return self._emit_nested("loop", body.outputs[:-1], (loop, *state, *constants))
 
     def emit_branch(
         self, truth: Operand, body: Program, arguments: Sequence[Operand], otherwise: Sequence[Operand]
     ) -> list[Symbol]:
-        """Add a program where a truth value holds, and other values elsewhere; return the results."""
+        """Add a program that runs where a Boolean is true, and values elsewhere; return the results."""
         branch = Branch(body, tuple(range(len(otherwise))))
         return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
     def emit_call(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
-        """Add a call of a program traced on a tape of its own; return its results."""
+        """Add a call of a program traced on a separate tape; return its results."""
         call = Call(body, tuple(range(len(body.outputs))))
         return self._emit_nested("call", body.outputs, (call, *arguments))
 
     def emit_subroutine(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
-        """Add a call of a program that other places may share; return its results."""
+        """Add a call of a subroutine, which several places may share; return its results."""
         return self._emit_nested("subroutine", body.outputs, (Subroutine(body), *arguments))
 
     def _emit_nested(
@@ -121,7 +121,8 @@ class Tape:
     def program(self, outputs: Sequence[Operand]) -> Program:
         """Return the program from the inputs to these outputs, without dead code and with calls.
 
-        The tape ends with it: symbols know their tape, so whatever that keeps would stay as long as they do.
+        The tape cannot be used afterwards: it is emptied, since symbols refer to it and would keep its
+        contents.
         """
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
         program = without_dead_code(self._inputs, operations, outputs)
@@ -132,12 +133,12 @@ class Tape:
 
 
 def _python_number(operand: Any) -> Any:
-    """Constants as Python's own numbers."""
+    """Return constants as numbers of Python."""
     return operand if isinstance(operand, Symbol | Table | int | OfRounding) else float(operand)
 
 
 def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
-    """Return a key of common subexpressions: operands, constants to the digit, integers apart from floats."""
+    """Return the key of a common subexpression: operands, constants by digits, integers apart from floats."""
     names = [
         operand.index
         if isinstance(operand, Symbol)

@@ -1,7 +1,7 @@
 """Control flow on arrays of symbols: loops, branches, tables and subroutines of a sample, and shared calls.
 
-These are the second texts of the functions of `vsacli.compute.control_flow`. The body of a loop or branch is
-traced once; a call of a function with arguments of the same form, too.
+These are the traced implementations of the functions of `vsacli.compute.control_flow`. The body of a loop or
+branch is traced once, and so is a function called several times with arguments of the same form.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from vsacli.compute.tracing.tape import Tape
 Function = Callable[..., Any]
 
 LEAST_OPERATIONS = 15
-"""Operations from which a subroutine shortens code: passing arguments and results costs some five."""
+"""Smallest number of operations with which a subroutine shortens code; passing arguments costs about five."""
 
 
 @repeat_on.register(TracedArray)
 def repeat_traced(
     first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.repeat`: the step is traced once, and repeated when the program runs."""
+    """Record `control_flow.repeat`: the step is traced once, and repeated when the program runs."""
     count = len(state)
 
     def body(rows: Sequence[Any]) -> Sequence[Any]:
@@ -52,7 +52,7 @@ def repeat_traced(
 def where_needed_traced(
     mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.where_needed`: the function is traced, and runs where the mask holds."""
+    """Record `control_flow.where_needed`: the function is traced, and runs where the mask holds."""
     count = len(otherwise)
 
     def branch(truth: Operand, *entries: Operand) -> Sequence[Operand]:
@@ -66,7 +66,7 @@ def where_needed_traced(
 
 @subroutine_on.register(TracedArray)
 def subroutine_traced(first: TracedArray, function: Function, arguments: Sequence[Any]) -> tuple[Any, ...]:
-    """`vsacli.compute.control_flow.subroutine`: a function of its own if the code is to be short."""
+    """Record `control_flow.subroutine`: a separate function if the code is to be short."""
     if not first.tape.short:
         return tuple(function(*arguments))
     entries: list[Any] = [cells_of(each).flat[0] for each in arguments]
@@ -81,13 +81,13 @@ def subroutine_traced(first: TracedArray, function: Function, arguments: Sequenc
 def _nested(
     tape: Tape, function: Callable[[Sequence[Any]], Sequence[Any]], entries: Sequence[Operand]
 ) -> Program:
-    """Return the program of a body within one on a tape."""
+    """Return the program of a body nested in the program of a tape."""
     return trace(function, list(map(kind_of, entries)), short=tape.short)
 
 
 @look_up_on.register(TracedArray)
 def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
-    """`vsacli.compute.control_flow.look_up`."""
+    """Record `control_flow.look_up`."""
     return tuple(
         _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
     )
@@ -95,7 +95,7 @@ def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArr
 
 @cell_on.register(TracedArray)
 def cell_traced(position: Any, count: int) -> Any:
-    """`cell_of`: as many of the edges between the cells as the position is not below."""
+    """Record `cell_of`: the number of edges between cells that the position is not below."""
     return np.searchsorted(np.arange(1, count), position, side="right")
 
 
@@ -126,7 +126,7 @@ def _shaped(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
 
 
 class _Value(NamedTuple):
-    """A symbol: the how manieth of those in arguments or a result, and its kind."""
+    """A symbol: its index among those of the arguments or the result, and its kind."""
 
     number: int
     kind: Kind
@@ -134,7 +134,7 @@ class _Value(NamedTuple):
 
 @dataclass(frozen=True)
 class _Constant:
-    """Anything that is no symbol, and what tells it apart: 0 and 0.0 and False are three constants."""
+    """A constant, and its key, by which 0, 0.0 and False are distinguished."""
 
     key: Hashable
     value: Any = field(compare=False)
@@ -148,7 +148,7 @@ class _Array(NamedTuple):
 
 
 class _Several(NamedTuple):
-    """A tuple, list or dictionary; of a dictionary the keys."""
+    """A tuple, list or dictionary with the forms of its entries, and the keys of a dictionary."""
 
     type: type
     keys: tuple[Any, ...]
@@ -157,7 +157,7 @@ class _Several(NamedTuple):
 
 @call_on.register(TracedArray)
 def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) -> Any:
-    """`vsacli.compute.control_flow.call`, on a tape that records calls; else what is called is recorded."""
+    """Record `control_flow.call` on a tape that records calls; otherwise record the function inline."""
     tape = row.tape
     if not tape.calling:
         return function(*arguments)
@@ -165,7 +165,7 @@ def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) 
     form = _form(list(arguments), given)
     try:
         called = tape.calls.get((function, form))
-    except TypeError:  # what cannot be hashed may hold symbols
+    except TypeError:  # an unhashable argument may contain symbols
         return function(*arguments)
     if called is None:
         called = _recorded(function, form, [symbol.kind for symbol in given], short=tape.short)
@@ -180,9 +180,9 @@ class _Called(NamedTuple):
     """A function that has been called.
 
     Attributes:
-        body: its program.
-        result: form of its result.
-        returned: of each value in that, which of the inputs it is; None if it is an output of the body.
+        body: Program of the body.
+        result: Form of its result.
+        returned: For each value in the result, the input that it is, or None for an output of the body.
     """
 
     body: Program
@@ -222,7 +222,7 @@ def _key(constant: Any) -> Hashable:
 
 
 def _made(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
-    """Arguments or a result of a form, with values on a tape."""
+    """Return arguments or a result of a form, with values on a tape."""
     if isinstance(form, _Value):
         return values[form.number]
     if isinstance(form, _Constant):

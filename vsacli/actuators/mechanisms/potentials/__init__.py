@@ -1,1 +1,1 @@
-"""Mechanisms of one's own: the energy of the springs is written in the robot file."""
+"""User-defined mechanisms: the robot file contains the elastic energy as an expression."""

@@ -1,6 +1,8 @@
-"""Continuation: where a potential has a torque and a stiffness, on the branch that a start names.
+"""Solution of (14) for a potential by numerical continuation, on the branch of a start.
 
-Level curves of the torque are followed by steps that stay on one piece.
+`LevelCurves.step` is a predictor-corrector step along a level curve of the torque that stays on one monotone
+piece of the stiffness. `Branch` continues the start to the torque of a sample, and from there to both ends of
+the piece and to the demanded stiffness.
 """
 
 from __future__ import annotations
@@ -19,44 +21,44 @@ from vsacli.compute.rounding import OfRounding
 # kind that tests/actuators/test_potential_mechanism.py draws.
 
 MAX_STEP = 0.1
-"""Longest step, as a part of the ranges."""
+"""Longest step, as a share of the ranges."""
 
 LEAST_STEP = OfRounding(1e-13, power=0.9)
-"""Length at which a step changes nothing."""
+"""Length below which a step changes nothing."""
 
 LEAST_COSINE = 0.95
-"""Smallest cosine of the angle by which the level curve may turn in a step."""
+"""Smallest cosine of the angle between the level curve before and after a step."""
 
 LEAST_SHARE = 0.25
-"""Part of the stiffness, and of the sine, that a step must leave; so it passes no zero."""
+"""Smallest ratio of stiffness, and of the sine, after and before a step, so that a step passes no zero."""
 
 SHORT = 1e-3
-"""Step, as a part of the ranges, in which the stiffness is not looked at; of the motion from the start it is
-none along the level curve."""
+"""Step, as a share of the ranges, below which the change of stiffness is not checked. The steps from the
+start to another torque have no length along the level curve."""
 
 MOST_UNEXPLAINED = 0.1
-"""Part of the change of stiffness that its slopes at both ends of a step need not explain; where the slope
-changes its sign twice in between, they explain little."""
+"""Largest share of the change of stiffness that its slopes at both ends of a step do not explain. If the
+slope changes its sign twice in between, they explain little."""
 
 LEVEL_ERROR = OfRounding(1e-5, power=0.25)
-"""Distance from the level curve, as a part of the ranges, that the next step makes up for."""
+"""Largest distance from the level curve after a step, as a share of the ranges; the next step corrects it."""
 
 CONTRACTION = 0.1
-"""Part of a correction of Newton's method that the next one may be, for the method to converge."""
+"""Largest ratio of two successive Newton corrections with which the method counts as convergent."""
 
 
 class Spot(NamedTuple):
     """A point (phi, theta_2); arrays (samples,).
 
     Attributes:
-        phi: deflection.
+        phi: Deflection.
         s: theta_2.
-        tau_e: elastic torque.
-        stiffness: of the joint.
-        torque_1: change of the torque with phi, over the range of phi.
-        torque_2: the same with theta_2.
-        stiffness_1: change of the stiffness with phi, over the range of phi.
-        stiffness_2: the same with theta_2.
+        tau_e: Elastic torque.
+        stiffness: Stiffness of the joint.
+        torque_1: Change of the torque with phi, over the range of phi.
+        torque_2: Change of the torque with theta_2, over the range of theta_2.
+        stiffness_1: Change of the stiffness with phi, over the range of phi.
+        stiffness_2: Change of the stiffness with theta_2, over the range of theta_2.
     """
 
     phi: FloatArray
@@ -86,11 +88,11 @@ class Spot(NamedTuple):
 
     @property
     def along(self) -> tuple[FloatArray, FloatArray]:
-        """Direction of the level curve, as a part of the ranges; the stiffness grows with the sine."""
+        """Unit vector along the level curve, over the ranges; the stiffness grows if the sine is positive."""
         return -self.torque_2 / self.steepness, self.torque_1 / self.steepness
 
     def to(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Newton's step to a torque and a stiffness, as a part of the ranges."""
+        """Return the Newton step to a torque and a stiffness, as a share of the ranges."""
         missing = tau_e - self.tau_e, stiffness - self.stiffness
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
         return (
@@ -99,7 +101,7 @@ class Spot(NamedTuple):
         )
 
     def chosen(self, mask: BoolArray, other: Spot) -> Spot:
-        """This one where the mask holds, else the other."""
+        """Return this point where the mask holds, else the other."""
         return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
 
 
@@ -112,9 +114,9 @@ class LevelCurves:
     """The level curves of a potential within ranges.
 
     Args:
-        potential: the potential.
-        phi: range of the deflection.
-        theta_2: range of motor 2.
+        potential: Potential.
+        phi: Range of the deflection.
+        theta_2: Range of motor 2.
     """
 
     def __init__(
@@ -140,11 +142,11 @@ class LevelCurves:
         )
 
     def moved(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
-        """Return a point moved by a part of the ranges."""
+        """Return a point moved by a step, as a share of the ranges."""
         return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
 
     def onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
-        """Return the point on the level curve of a torque close by, with its stiffness, to first order."""
+        """Return the nearest point on the level curve of a torque, with its stiffness, to first order."""
         share = (tau_e - spot.tau_e) / (spot.steepness * spot.steepness)
         by_torque = spot.stiffness_1 * spot.torque_1 + spot.stiffness_2 * spot.torque_2
         return spot._replace(
@@ -161,7 +163,7 @@ class LevelCurves:
         return np.minimum(np.minimum(phi, 1 - phi), np.minimum(s, 1 - s))
 
     def room(self, spot: Spot) -> FloatArray:
-        """Return the distance of a point from all ends of the piece."""
+        """Return a measure of the distance from all ends of the piece, zero at each of them."""
         room: FloatArray = np.abs(spot.sine) * spot.stiffness
         for value, low, width in zip(spot[:2], self._low, self._width, strict=True):
             part = (value - low) / width
@@ -174,11 +176,11 @@ class LevelCurves:
         """Return a step of length h along a level curve, back onto tau_e, and whether it stays on the piece.
 
         Args:
-            spot: where to begin.
-            h: length, as a part of the ranges; the stiffness grows with it if the sine is positive.
-            tau_e: torque wanted.
-            q: position of the joint.
-            dq: how far that is from the position at which the spot was found.
+            spot: Point at which to begin.
+            h: Length, as a share of the ranges; the stiffness grows with it if the sine is positive.
+            tau_e: Torque of the level curve.
+            q: Position of the joint.
+            dq: Distance of q from the joint position at `spot`.
         """
         first, second = spot.along
         by_q = spot.torque_1 / self._width[0] - spot.stiffness  # of the torque, at constant phi and theta_2
@@ -204,20 +206,20 @@ class LevelCurves:
 
 
 CLOSE, NEWTON_STEPS = 1e-4, 4
-"""Length of Newton's step to a torque and a stiffness, as a part of the ranges and for a sine of one, from
-which on this many steps leave rounding: it is squared by each."""
+"""Length of a Newton step to a torque and a stiffness, as a share of the ranges and for a sine of one, from
+which `NEWTON_STEPS` steps converge to rounding: each squares it."""
 
 LEAST_SINE = OfRounding(1e-8, power=0.5)
-"""Sine that is zero; the stiffness then differs from that of the critical point by the square of this."""
+"""Sine that counts as zero; the stiffness differs from that of the critical point by the square of this."""
 
 LEAST_STIFFNESS = 1e-9
-"""Part of the stiffness at the start that is none."""
+"""Stiffness relative to that at the start that counts as zero."""
 
 MAX_STEPS = 400
-"""Some 60 do; more only where the level curve winds."""
+"""Largest number of steps. About 60 suffice; more are needed only where the level curve winds."""
 
 RESIDUAL = OfRounding(1e-10, power=0.75)
-"""Largest error of a solution: of the stiffness; of the torque, as a part of its change over the ranges."""
+"""Largest error of a solution: of the stiffness; of the torque, as a share of its change over the ranges."""
 
 
 class Piece(NamedTuple):
@@ -229,11 +231,11 @@ class Piece(NamedTuple):
 
 
 class Branch:
-    """Solutions that are continued from a start, where q = 0.
+    """Solutions continued from a start, at which q = 0.
 
     Attributes:
-        start: the start, arrays (1,).
-        orientation: sign of the sine on the branch.
+        start: Start, arrays (1,).
+        orientation: Sign of the sine on the branch.
     """
 
     def __init__(self, curves: LevelCurves, phi: float, theta_2: float) -> None:
@@ -245,13 +247,13 @@ class Branch:
 
     @property
     def stiffest(self) -> Spot:
-        """Return the largest stiffness under the torque of the start, arrays (1,)."""
+        """Point of the largest stiffness at the torque of the start, arrays (1,)."""
         with np.errstate(all="ignore"):
             return self._followed(self.start.tau_e, np.zeros(1)).high
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Return the reachable stiffness, and phi and theta_2 for the one in it; see `Mechanism.solve`."""
-        with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
+        """See `Mechanism.solve`."""
+        with np.errstate(all="ignore"):  # trial steps may leave the range; they are rejected
             seed, low, high = self._piece(tau_e, q)
             none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             lower = np.where(none, 0.0, low.stiffness)
@@ -272,7 +274,7 @@ class Branch:
     def _piece(self, tau_e: FloatArray, q: FloatArray) -> Piece:
         """Return the pieces at torques and positions.
 
-        The last ones are kept, since searches ask for them often.
+        The last pieces are kept, since searches solve for the same torques repeatedly.
         """
         if not isinstance(tau_e, np.ndarray):
             return self._followed(tau_e, q)
@@ -282,7 +284,7 @@ class Branch:
         return known[1]
 
     def _followed(self, tau_e: FloatArray, q: FloatArray) -> Piece:
-        """Return the pieces, by walks to both ends, which run side by side."""
+        """Return the pieces, by walks to both ends, computed as one array."""
         seed, count = self._seed(tau_e, q), len(tau_e)
         both = [np.concatenate((each, each)) for each in (tau_e, q, *seed)]
         side = np.concatenate((np.full_like(tau_e, -1.0), np.ones_like(tau_e)))
@@ -292,8 +294,8 @@ class Branch:
     def _seed(self, tau_e: FloatArray, q: FloatArray) -> Spot:
         """Return a point of the branch at torques and positions, NaN where there is none.
 
-        While these move to their values in proportion, the point moves along the level curve towards where it
-        has room on all sides, so that it goes on where the piece becomes short.
+        Torque and position move proportionally from the start to their values. Meanwhile the point moves
+        along the level curve away from the ends of the piece, so that the continuation survives a short one.
         """
 
         def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
@@ -322,7 +324,7 @@ class Branch:
     def _walk(
         self, seed: Spot, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray
     ) -> Spot:
-        """Return the end of the piece or the goal; direction 1 with growing, -1 with falling stiffness."""
+        """Return the goal, or the end of the piece before it; direction 1 for growing stiffness, else -1."""
 
         def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
             h, *values = state
@@ -347,10 +349,7 @@ class Branch:
         return self._curves.spot(end.phi, end.s, q)
 
     def _met(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
-        """Return the point of the piece with a stiffness.
-
-        Near it, by Newton's method for torque and stiffness.
-        """
+        """Return the point of the piece with a stiffness: by a walk, then by Newton's method."""
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
         spot = self._walk(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):

@@ -1,4 +1,4 @@
-"""A mechanism of one's own: its potential is written in the robot file."""
+"""A user-defined mechanism: the robot file contains its potential as an expression."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ from vsacli.documents.fields import (
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 GRID = 32
-"""Places along each range at which the energy is looked at."""
+"""Number of points along each range at which the energy is checked."""
 
 UNBOUNDED = 1e9
-"""Stiffness of a pole, relative to that at the start."""
+"""Stiffness relative to that at the start from which on a pole is reported."""
 
 LEAST_START_SINE = 1e-6
-"""Sine of the angle between the gradients of torque and stiffness at the start, relative to the ranges, below
-which A is taken for singular."""
+"""Sine of the angle between the gradients of torque and stiffness at the start, over the ranges, below which
+A counts as singular."""
 
 
 @dataclass(frozen=True)
 class BranchStart:
-    """A state of the springs that names the branch."""
+    """State of the springs that selects the branch."""
 
     theta_1: float = number(units.POSITION, "position of motor 1")
     theta_2: float = number(units.POSITION, "position of motor 2")
@@ -62,7 +62,7 @@ class BranchStart:
 
 @dataclass(frozen=True)
 class PotentialRange:
-    """The range of validity of a potential."""
+    """Range of validity of a potential."""
 
     phi: tuple[float, float] = interval(units.POSITION, "deflection theta_1 - q")
     theta_2: tuple[float, float] = interval(units.POSITION, "position of motor 2")
@@ -73,7 +73,7 @@ class PotentialRange:
 
 @dataclass(frozen=True)
 class Potential(Mechanism):
-    """Springs of any kind, by the energy that they store."""
+    """Springs of any kind, described by the energy that they store."""
 
     energy: str = text(
         "energy of the springs, J: an expression of `q`, `theta_1`, `theta_2`, `phi` (which is theta_1 - q), "
@@ -124,7 +124,7 @@ class Potential(Mechanism):
         return (*self._gaps(), *self._poles())
 
     def _gaps(self) -> Iterator[str]:
-        """Yield the place nearest to the start, of a grid over the ranges, where the energy is no number."""
+        """Yield the grid point nearest to the start at which the energy is no finite number."""
         shares = (np.arange(GRID) + 0.5) / GRID
         ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
         axes = [low + (high - low) * shares for low, high in ends]
@@ -139,7 +139,7 @@ class Potential(Mechanism):
             yield f"{what} {_place(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
 
     def _poles(self) -> Iterator[str]:
-        """Yield the places where the stiffness grows without bound on its way from the start."""
+        """Yield a point at which the stiffness grows without bound on the branch of the start."""
         stiffest = self._branch.stiffest
         if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
             place = _place(stiffest.phi[0], stiffest.s[0])
@@ -182,7 +182,7 @@ class Potential(Mechanism):
         needed = (("theta_2",), ("theta_1", "phi"), ("q", "phi"))
         lacking = [words[0] for words in needed if names.isdisjoint(words)]
         yield from (FieldProblem(("energy",), f"does not depend on {word}") for word in lacking)
-        if not lacking:  # else what is lacking may be what the constants are for
+        if not lacking:  # otherwise the unused constants may belong to the missing terms
             unused = (name for name in constants if name not in names)
             yield from (FieldProblem(("constants", name), "does not occur in the energy") for name in unused)
 
@@ -229,7 +229,7 @@ def _place(phi: float, theta_2: float) -> str:
 
 
 def _why_no_word(name: str) -> str:
-    """Why no constant may have a name; empty if one may."""
+    """Return why no constant may have a name; empty if one may."""
     if not _WORD.fullmatch(name):
         return "is no word: letters, digits and _, of which the first is no digit"
     return "has a meaning of its own in the energy; choose another name" if name in RESERVED else ""

@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 
 VARIABLES = ("q", "theta_1", "theta_2", "phi")
-"""Words for positions; phi is theta_1 - q."""
+"""Names of positions in an expression; phi is theta_1 - q."""
 
 MAX_LENGTH = 2000
-"""Characters of an expression; a MACCEPA takes 80."""
+"""Largest number of characters of an expression; a MACCEPA needs 80."""
 
 RESERVED = frozenset({*VARIABLES, "pi", *FUNCTIONS})
-"""Words that no constant may have."""
+"""Names that no constant may have."""
 
 
 def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
     """Return the expression of a potential.
 
     Raises:
-        ExpressionError: the text is none.
+        ExpressionError: The text is none.
     """
     names = (*VARIABLES, "pi", *constants)
     return parse(
@@ -40,7 +40,7 @@ def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
 
 
 def _truncation(of_q: int, of_motors: int, degree: int) -> Truncation:
-    """Derivatives over (q, theta_1, theta_2), at most this many over q, over both motors, and in all."""
+    """Return derivatives over (q, theta_1, theta_2) up to an order over q, over both motors, and in all."""
     return Truncation(
         (a, b, c)
         for a in range(of_q + 1)
@@ -55,7 +55,7 @@ TORQUES, ROWS, ACCELERATIONS = _truncation(1, 1, 1), _truncation(2, 1, 3), _trun
 
 
 class PotentialEnergy:
-    """A potential with values of its constants."""
+    """A potential with the values of its constants."""
 
     def __init__(self, expression: Expression, constants: Mapping[str, float]) -> None:
         self._expression = expression
@@ -65,8 +65,8 @@ class PotentialEnergy:
     def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
         """Return the derivatives by q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
 
-        Numbers are computed by the program of the series: NumPy without it would take ten times as long, to
-        find its way through the orders.
+        For numbers, a program traced from the series is run: the series itself would take ten times as long,
+        for bookkeeping of the orders.
         """
         rows = [coordinates[..., number] for number in range(3)]
         if not isinstance(coordinates, np.ndarray):
@@ -176,7 +176,7 @@ class PotentialState(MechanismState):
         return self._rate((0, 0), rates)
 
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """Quadratic in the rates of x, of U_qq."""
+        """Return the terms of U_qq'' that are quadratic in the rates of x."""
         return self._curvature((0, 0), rates)
 
     def spring_rates(self, rates: FloatArray) -> FloatArray:
@@ -184,7 +184,7 @@ class PotentialState(MechanismState):
         return np.stack((self._rate((1,), rates), self._rate((2,), rates)), axis=-1)
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
-        """A^-1 (y' - y_q q'), with phi' = theta_1' - q'."""
+        """Return A^-1 (y' - y_q q'), with phi' = theta_1' - q'."""
         u = self._all
         dtheta_1, dtheta_2 = self.rows.solve(dtau_e + u(0, 0) * dq, dstiffness - u(0, 0, 0) * dq)
         return np.stack((dtheta_1 - dq, dtheta_2, dq), axis=-1)
@@ -192,14 +192,14 @@ class PotentialState(MechanismState):
     def motor_accelerations(
         self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
-        """A^-1 (y'' - y_q q'' - what is quadratic in the rates)."""
+        """Return A^-1 of y'' - y_q q'' minus the terms quadratic in the rates."""
         u = self._all
         torque_row = ddtau_e + u(0, 0) * ddq + self._curvature((0,), rates)
         stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self.stiffness_curvature(rates)
         return np.stack(self.rows.solve(torque_row, stiffness_row), axis=-1)
 
     def _rate(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
-        """Rate of a derivative of the potential."""
+        """Return the rate of a derivative of the potential."""
         return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0]))
 
     def _curvature(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
@@ -210,6 +210,6 @@ class PotentialState(MechanismState):
 
 
 def _motion(rates: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """Rates of q, theta_1 and theta_2 with their numbers, from those of the coordinates."""
+    """Return the rates of q, theta_1 and theta_2 by index, from rates of the coordinates."""
     dphi, ds, dq = (rates[..., number] for number in range(3))
     return enumerate((dq, dphi + dq, ds))

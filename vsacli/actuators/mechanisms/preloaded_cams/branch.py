@@ -1,6 +1,6 @@
-"""The branch of a preloaded cam: the monotone piece of the stiffness that reaches the largest pretension.
+"""The branch of a preloaded cam: the monotone piece of the stiffness that extends to the largest pretension.
 
-A map of it over the torque, made once, says which end it has where, and gives first guesses of both.
+`map_branch` maps it over the torque once per cam: the kind of its inner end, and first guesses of both ends.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ PRETENSION, FOLD, PEAK, DOMAIN = range(4)
 class Cells(NamedTuple):
     """Both ends of the branch over the cube root of the torque, by cubics; arrays (cells,).
 
-    What is kept is the deflection from rest over that root: it is smooth, also where a cam without pretension
-    has the third power of the deflection as its torque.
+    The cubics approximate the ratio of deflection from rest to that root, which is smooth even for a cam
+    without pretension, whose torque is the third power of the deflection.
 
     Attributes:
-        root: cube root of the torque at which a cell begins.
-        outer: at the largest pretension: coefficients over the distance from there, (4, cells).
-        inner: the same at the other end of the branch.
-        end: what that is.
+        root: Cube root of the torque at which a cell begins.
+        outer: End at the largest pretension: coefficients over the distance from `root`, (4, cells).
+        inner: Other end of the branch, as above.
+        end: Kind of the inner end.
         sign: 1 where the stiffness falls with the pretension along the branch, -1 where it rises.
     """
 
@@ -53,15 +53,15 @@ class Branch(NamedTuple):
     """The branch at every torque.
 
     Attributes:
-        cells: of the torque.
-        torque_range: the torques that can be carried.
+        cells: Cells of the torque.
+        torque_range: Torques that can be carried.
     """
 
     cells: Cells
     torque_range: tuple[float, float]
 
     def ends(self, tau_e: FloatArray) -> Ends:
-        """Both ends but for a relative error of some 1e-5."""
+        """Return both ends of the branch, to a relative error of about 1e-5."""
         root = np.cbrt(tau_e)
         cell = np.searchsorted(self.cells.root[1:], root, side="right")
         start, end, sign, *cubics = look_up(
@@ -73,19 +73,19 @@ class Branch(NamedTuple):
 
 
 SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
-"""Shares of the domain at which curves are looked at; a fitted profile has some dozen features."""
+"""Shares of the domain at which curves are sampled; a fitted profile has some dozen features."""
 
 FIRST_CELLS = 32
-"""Cells of the torque on either side of rest that the map begins with."""
+"""Number of cells of the torque on either side of rest at first."""
 
 GUESS_RTOL = 1e-5
-"""Relative error of a deflection with which a cell is content: two Newton steps leave rounding of it."""
+"""Largest relative error of a deflection in a cell, which two Newton steps reduce to rounding."""
 
 MAX_HALVINGS = 36
-"""Times that cells are halved: where the branch jumps to another end, and where a curve turns around."""
+"""Largest number of halvings, at torques where the branch has another kind of end, or a curve turns."""
 
 MAX_SLOPE_SUM = 10.0
-"""Slopes at both ends of a cell, over its height and width, beyond which no cubic follows the curve."""
+"""Sum of the slopes at both ends of a cell, over its height and width, beyond which no cubic is close."""
 
 AT_REST = 1e-4
 """Share of the largest cube root of the torque at which the limit at rest is taken."""
@@ -99,10 +99,10 @@ def map_branch(
     """Return the branch of a cam.
 
     Args:
-        lift: over deflections from rest, which is the minimum.
-        domain: least and largest deflection from rest.
-        k: of the spring, N/m.
-        pretension: smallest and largest, m.
+        lift: Over deflections from rest, which is the minimum.
+        domain: Least and largest deflection from rest.
+        k: Stiffness of the spring, N/m.
+        pretension: Smallest and largest, m.
     """
     sides = _Side(lift, domain[1], k, pretension), _Side(_mirrored(lift), -domain[0], k, pretension)
     symmetric = domain[0] == -domain[1] and all(map(np.array_equal, *(side.lift_at_nodes for side in sides)))
@@ -114,7 +114,7 @@ def map_branch(
 
 
 def _mirrored(lift: LiftOf) -> LiftOf:
-    """Return the lift of the cam turned around."""
+    """Return the lift of the mirrored cam."""
     return lambda phi: lift(-phi).mirrored()
 
 
@@ -130,23 +130,23 @@ class _Nodes(NamedTuple):
     sign: FloatArray
 
     def mirrored(self) -> _Nodes:
-        """Return the nodes of the cam turned around."""
+        """Return the nodes of the mirrored cam."""
         turned = self.take(slice(None, None, -1))
         return turned._replace(
             root=-turned.root, outer_slope=-turned.outer_slope, inner_slope=-turned.inner_slope
         )
 
     def take(self, chosen: IndexArray | slice) -> _Nodes:
-        """Return some of the nodes."""
+        """Return a selection of the nodes."""
         return _Nodes(*(values[chosen] for values in self))
 
     def merged(self, others: _Nodes) -> _Nodes:
-        """These and others."""
+        """Return these nodes and others, sorted."""
         joined = _Nodes(*map(np.concatenate, zip(self, others, strict=True)))
         return joined.take(np.argsort(joined.root))
 
     def misses(self, middle: _Nodes) -> BoolArray:
-        """Return where the branch ends differently within a cell, or cubics miss its ends in the middle."""
+        """Return where the kind of end changes within a cell, or a cubic is inaccurate in its middle."""
         differ: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
         width = np.diff(self.root)
         for values, slope, wanted in (
@@ -159,7 +159,7 @@ class _Nodes(NamedTuple):
         return differ
 
     def cells(self) -> Cells:
-        """Cubics between the nodes; each cell has the kind of end of its node that is nearer to rest."""
+        """Return cubics between the nodes; each cell has the kind of end of its node nearer to rest."""
         width = np.diff(self.root)
         outer = _hermite(width, self.outer, self.outer_slope)
         inner = _hermite(width, self.inner, self.inner_slope)
@@ -168,7 +168,7 @@ class _Nodes(NamedTuple):
 
 
 def _hermite(width: FloatArray, values: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Coefficients of cubics with these values and slopes, of lines where it is too steep; (4, cells)."""
+    """Return coefficients of cubics with values and slopes, or of lines where too steep; (4, cells)."""
     mean, first, last = np.diff(values) / width, slopes[:-1], slopes[1:]
     usable = np.abs(first) + np.abs(last) <= MAX_SLOPE_SUM * np.abs(values).max() / width
     first, last = np.where(usable, first, mean), np.where(usable, last, mean)
@@ -186,17 +186,17 @@ class _Curve:
         return self._function(self._lift(phi))
 
     def root(self, low: FloatArray, high: FloatArray, tau_e: FloatArray) -> FloatArray:
-        """Deflection on the curve between two others."""
+        """Return the deflection on the curve between `low` and `high`."""
         return bracketed_root(lambda phi, tau_e: self(phi).at(tau_e), low, high, (tau_e,))
 
     def slope(self, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
-        """Derivative of the deflection over the torque along the curve; infinite where that turns around."""
+        """Return the derivative of the deflection over the torque along the curve; infinite at its turns."""
         here = self(phi)
         with np.errstate(all="ignore"):
             return -here.b / here.slope(tau_e)
 
     def turns(self, phi: FloatArray) -> FloatArray:
-        """Deflections strictly between others at which the torque turns around along the curve."""
+        """Return deflections strictly between nodes at which the torque has an extremum along the curve."""
 
         def turning(phi: FloatArray) -> FloatArray:
             here = self(phi)
@@ -232,7 +232,7 @@ class _Side:
         self.largest_torque = float(self._outer_torque[-1])
 
     def nodes(self) -> _Nodes:
-        """Nodes so dense that cubics between them are good first guesses."""
+        """Return nodes dense enough that cubics between them are good first guesses."""
         largest = np.cbrt(self.largest_torque)
         at_rest = self._at_rest(self._at(np.array([AT_REST * largest])))
         nodes = at_rest.merged(self._at(np.linspace(0, largest, FIRST_CELLS + 1)[1:]))
@@ -247,14 +247,14 @@ class _Side:
     def _at_rest(self, near: _Nodes) -> _Nodes:
         """Return the node without torque, from one next to it.
 
-        There the deflection grows as the torque, only to a fold as its cube root.
+        There the deflection is proportional to the torque; only that of a fold, to its cube root.
         """
         fold, zero = near.end == FOLD, np.zeros(1)
         inner, slope = (np.where(fold, values, 0.0) for values in (near.inner, near.inner_slope))
         return near._replace(root=zero, outer=zero, outer_slope=zero, inner=inner, inner_slope=slope)
 
     def _at(self, root: FloatArray) -> _Nodes:
-        """Both ends of the branch at torques whose cube roots are given."""
+        """Return both ends of the branch at torques with these cube roots."""
         tau_e = np.minimum(root**3, self.largest_torque)
         node = np.clip(np.searchsorted(self._outer_torque, tau_e), 1, self._outer_phi.size - 1)
         outer = self._held.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
@@ -272,7 +272,7 @@ class _Side:
         )
 
     def _inner_ends(self, tau_e: FloatArray, outer: FloatArray) -> tuple[FloatArray, IndexArray]:
-        """Return the first end of the branch beyond the outer one, and which it is."""
+        """Return the first end of the branch at deflections above the outer one, and its kind."""
         inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
         beyond = self._phi > outer[:, None]
         for which, curve in self._ends.items():
@@ -289,6 +289,6 @@ class _Side:
 
 
 def _over_root(root: FloatArray, phi: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Deflections over the cube root of the torque, and derivatives over that, from those over the torque."""
+    """Return phi over the cube root of the torque, and its derivative over that root, from d phi/d torque."""
     ratio = phi / root
     return ratio, (3 * root * root * slope - ratio) / root

@@ -26,20 +26,21 @@ if TYPE_CHECKING:
 
 DEGREE = 4
 PIECES = (2, 4, 6, 8, 12, 16, 24)
-"""Knot spans of g that are tried; even numbers, so that those of a symmetric profile are symmetric."""
+"""Numbers of knot spans of g that are tried; even, so that the spans of a symmetric profile are symmetric."""
 
 ROWS_PER_PIECE = 4
-"""Points that a span needs; by trial with noise on 40 points, the criterion takes too many shorter ones."""
+"""Smallest number of points per span. In trials with noise on 40 points, the criterion chose too many
+shorter spans."""
 
 PIECE_PENALTY = 2.0
-"""Weight of the number of pieces, in units of the usual one. By trial with noise of a ten-thousandth on 120
-points, the usual one takes too many in one draw of ten, with thirty times the fourth derivative."""
+"""Weight of the number of pieces relative to that of the usual criterion. In trials with noise of 1e-4 on 120
+points, the usual weight chose too many in one draw of ten, with thirty times the fourth derivative."""
 
 FIRST_PIECES = 6
-"""Spans with which rest is looked for at first."""
+"""Largest number of spans in the first search for rest."""
 
 LEAST_CURVATURE_SHARE = 1e-3
-"""Share of its mean below which g does not fall: without curvature at rest no pretension makes it stiff."""
+"""Smallest g, as a share of its mean: without curvature at rest, pretension causes no stiffness."""
 
 ROUNDING_SHARE = 1e-12
 """Share of the range of the lift below which a misfit is rounding."""
@@ -49,9 +50,9 @@ class Profile(NamedTuple):
     """A fitted profile.
 
     Attributes:
-        rest: deflection of the minimum, rad (m).
-        curve: lift over the deflection from there, but for a constant.
-        misfit: of the points, (rows,).
+        rest: Deflection of the minimum, rad (m).
+        curve: Lift over the deflection from there, but for a constant.
+        misfit: Distance of the curve from the points, (rows,).
     """
 
     rest: float
@@ -114,7 +115,7 @@ def _least(phi: FloatArray, lift: FloatArray) -> float:
 
 
 def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[FloatArray, float]:
-    """Weights of columns, none below the least, that with a constant come closest to a lift; and how far."""
+    """Fit weights of columns, at least `least`, and a constant to a lift; return also the misfit."""
     from scipy.optimize import nnls
 
     level = np.ones((len(lift), 1))
@@ -125,7 +126,7 @@ def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[Float
 
 
 def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
-    """Deflection between the neighbours of the lowest point from which the fit is best."""
+    """Return the deflection of rest with the best fit, between the neighbors of the lowest point."""
     from scipy.interpolate import PPoly
     from scipy.optimize import minimize_scalar
 
@@ -152,14 +153,15 @@ def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
 
 
 LARGEST_MISFIT = 0.03
-"""Share of the range of the lift by which a curve may miss a point; beyond, it is that of another cam."""
+"""Largest misfit of a point, as a share of the range of the lift; beyond it, the profile is refused."""
 
 
 @dataclass(frozen=True)
 class Cam(PreloadedCam):
-    """A spring that the lift of a cam compresses, over its deflection as measured or designed.
+    """A spring compressed by the lift of a cam, whose profile is measured or designed.
 
-    A smooth curve with one minimum, where the lift counts from, is fitted through the points and ends there.
+    A smooth curve with one minimum, from which the lift is counted, is fitted to the points; it is not
+    extrapolated.
     """
 
     profile: Table = value(
@@ -175,7 +177,7 @@ class Cam(PreloadedCam):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Return the cam of the example that comes along."""
+        """Return the cam of the bundled example."""
         return {"k": 40000, "r": 0.005, "pretension": [0.001, 0.02], "profile": "cam_profile.csv"}
 
     @cached_property
@@ -183,7 +185,7 @@ class Cam(PreloadedCam):
         return fit_profile(*self.profile.values.T)
 
     def _misfits(self) -> Iterator[Problem]:
-        """Yield the point that the fitted curve misses most, if it is that of another cam."""
+        """Yield the point that the fitted curve misses most, if the fit is refused."""
         row, share = worst_misfit(self.profile, self._fitted.misfit)
         if share > LARGEST_MISFIT:
             missed = f"misses the lift {self.profile.values[row, 1]:.4g} by {100 * share:.2g} % of its range"
@@ -219,7 +221,7 @@ class Cam(PreloadedCam):
 
 
 def _problems(table: Table) -> Iterator[Problem]:
-    """Why the rows are no profile with one minimum, with the lines."""
+    """Yield why the rows are no profile with one minimum, with the lines."""
     deflection, lift = table.values.T
     if problems := list(wrong_rows(table)):
         yield from problems

@@ -1,8 +1,8 @@
-"""The lift of a cam, and what it does to a spring.
+"""The lift of a cam with its derivatives, and the torque and stiffness of a spring behind it.
 
-With the lift l(phi) and the pretension p, the spring is compressed by x = l + p, and T = k l' x. Where a
-torque tau_e is kept, x = tau_e/(k l'), so that the stiffness k (l'^2 + l'' x) is a function of the deflection
-alone, G = k l'^2 + tau_e l''/l'.
+With the lift l(phi) and the pretension p, the spring is compressed by x = l + p, and T = k l' x. At a given
+torque tau_e, x = tau_e/(k l'), so that the stiffness k (l'^2 + l'' x) is a function of the deflection alone,
+G = k l'^2 + tau_e l''/l'.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ class LinearInTorque(NamedTuple):
     """A function a(phi) + b(phi) tau_e, which is zero along a curve; arrays of one shape.
 
     Attributes:
-        a: what does not depend on the torque.
-        a_slope: its derivative over the deflection.
-        b: what the torque is multiplied by.
-        b_slope: its derivative.
+        a: Part that does not depend on the torque.
+        a_slope: Derivative of a over the deflection.
+        b: Factor of the torque.
+        b_slope: Derivative of b over the deflection.
     """
 
     a: FloatArray
@@ -43,11 +43,11 @@ class Lift(NamedTuple):
     """Lift over the deflection from rest, with four derivatives; arrays of one shape.
 
     Attributes:
-        l: lift from its minimum, m.
-        l1: first derivative, m/rad (1).
-        l2: second derivative.
-        l3: third derivative.
-        l4: fourth derivative.
+        l: Lift from its minimum, m.
+        l1: First derivative, m/rad (1).
+        l2: Second derivative.
+        l3: Third derivative.
+        l4: Fourth derivative.
     """
 
     l: FloatArray  # noqa: E741  (its symbol)
@@ -57,11 +57,11 @@ class Lift(NamedTuple):
     l4: FloatArray
 
     def mirrored(self) -> Lift:
-        """Return the lift of the cam turned around, at the opposite deflection."""
+        """Return the lift of the mirrored cam, at the opposite deflection."""
         return self._replace(l1=-self.l1, l3=-self.l3)
 
     def after(self, step: FloatArray) -> Lift:
-        """Return the lift after a short step of the deflection, by Taylor's formula."""
+        """Return the lift after a short step of the deflection, by Taylor expansion."""
         half, third, fourth = step / 2, step / 3, step / 4
         return Lift(
             self.l + step * (self.l1 + half * (self.l2 + third * (self.l3 + fourth * self.l4))),
@@ -72,7 +72,7 @@ class Lift(NamedTuple):
         )
 
     def spring(self, k: float, pretension: FloatArray | float) -> SpringState:
-        """Torque and three derivatives over the deflection while the pretension is kept."""
+        """Return the torque and three derivatives over the deflection at constant pretension."""
         x = self.l + pretension
         return SpringState(
             k * self.l1 * x,
@@ -82,20 +82,20 @@ class Lift(NamedTuple):
         )
 
     def stiffness(self, k: float, tau_e: FloatArray) -> FloatArray:
-        """G; at rest, where nothing but zero torque can be carried, that of a relaxed spring."""
+        """Return G; at rest, where only zero torque can be carried, that of a relaxed spring."""
         at_rest = self.l1 == 0
         k_x = np.where(at_rest, 0.0, tau_e / np.where(at_rest, 1.0, self.l1))
         return k * self.l1 * self.l1 + self.l2 * k_x
 
     def held(self, k: float, pretension: float) -> LinearInTorque:
-        """Zero where a pretension carries the torque: T - tau_e."""
+        """Return T - tau_e, zero where the pretension carries the torque."""
         spring = self.spring(k, pretension)
         return LinearInTorque(
             spring.tau, spring.sigma, np.full_like(spring.tau, -1.0), np.zeros_like(spring.tau)
         )
 
     def turning(self, k: float) -> LinearInTorque:
-        """Zero at folds, where G turns around: -l'^2 dG/dphi."""
+        """Return -l'^2 dG/dphi, zero at folds, where G has an extremum."""
         twice_squared = 2 * k * self.l1 * self.l1
         return LinearInTorque(
             -twice_squared * self.l1 * self.l2,
@@ -105,6 +105,6 @@ class Lift(NamedTuple):
         )
 
     def rising(self, k: float) -> LinearInTorque:
-        """Zero where the torque has a maximum over the deflection: l' G."""
+        """Return l' G, zero where the torque has a maximum over the deflection."""
         squared = k * self.l1 * self.l1
         return LinearInTorque(squared * self.l1, 3 * squared * self.l2, self.l2, self.l3)

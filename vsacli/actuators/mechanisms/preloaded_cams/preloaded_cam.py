@@ -1,4 +1,4 @@
-"""Mechanisms whose motor 2 preloads the spring of a cam, MACCEPA among them: U = k/2 (l(phi) + p)^2."""
+"""Mechanisms in which motor 2 preloads the spring of a cam, such as MACCEPA: U = k/2 (l(phi) + p)^2."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from vsacli.documents.fields import NON_ZERO, POSITIVE, check_fields, interval, 
 class PreloadedCam(Mechanism):
     """A spring behind a cam whose lift l has one minimum, at rest.
 
-    The branch is the one that reaches the largest pretension. On any other the stiffness rises while the
-    pretension falls; all of them shrink to nothing as the torque goes to zero.
+    The branch is the one that extends to the largest pretension. On others the stiffness rises while the
+    pretension falls; all of them shrink to a point as the torque goes to zero.
     """
 
     k: float = number(units.LINEAR_STIFFNESS, "stiffness of the spring", check=POSITIVE)
@@ -47,13 +47,13 @@ class PreloadedCam(Mechanism):
 
     @property
     def rest(self) -> float:
-        """The deflection at which the lift has its minimum."""
+        """Deflection at which the lift has its minimum."""
         return 0.0
 
     @property
     @abstractmethod
     def deflection_range(self) -> tuple[float, float]:
-        """The deflections for which the cam has a lift."""
+        """Range of deflections in which the cam has a lift."""
 
     @abstractmethod
     def lift(self, from_rest: FloatArray) -> Lift:
@@ -120,7 +120,7 @@ class Maccepa(PreloadedCam):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Levers of a hand's size, with the stiffness of an arm's joint."""
+        """Return levers of a hand's size, with the stiffness of an arm's joint."""
         return {"b": 0.04, "c": 0.12, "k": 20000, "r": 0.01, "pretension": [0.002, 0.05]}
 
     @property
@@ -134,7 +134,7 @@ class Maccepa(PreloadedCam):
         return LeverSpring(self.b, self.c, self.k, self.r)
 
     def lift(self, from_rest: FloatArray) -> Lift:
-        """Growth of the distance a; with half angles, so that nothing cancels at rest."""
+        """Return the growth of the distance a; by half angles, so that nothing cancels at rest."""
         shortest, area = abs(self.c - self.b), self.b * self.c
         half_sine = np.sin(from_rest / 2)
         doubled = 2 * area * half_sine * half_sine

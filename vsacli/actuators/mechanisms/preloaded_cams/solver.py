@@ -1,8 +1,8 @@
-"""A preloaded cam solved: the deflection at which a torque meets a stiffness, between the ends of the branch.
+"""Solution of (14) for a preloaded cam: the deflection with a torque and a stiffness, between two ends.
 
-Torque and stiffness without the compression of the spring leave g(phi) = sigma l' - k l'^3 - tau_e l'' = 0,
-which is l' (sigma - G). Unlike G it is regular at rest; its root is simple within the branch, double at
-a fold.
+Eliminating the compression of the spring from torque and stiffness gives
+g(phi) = sigma l' - k l'^3 - tau_e l'' = 0, which is l' (sigma - G). Unlike G it is regular at rest; its root
+is simple within the branch, double at a fold.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 
 MAX_GUESS_ERROR = 1e-3
-"""Largest relative correction of an end; next to where a curve turns around a step leads anywhere."""
+"""Largest relative correction of an end: next to a turning point of a curve a Newton step is arbitrary."""
 
 STEP_RTOL = 3e-6
-"""Relative size of a step that leaves rounding only: it leaves the third power."""
+"""Relative size of a step after which the error, its third power, is rounding."""
 
 MAX_STEPS = 12
-"""Steps of third order. Two or three do; by trial with draws on a hundred cams, nine at most."""
+"""Largest number of steps. Two or three suffice; nine were the most in random trials on a hundred cams."""
 
 LEAST_CURVATURE_SHARE = 1e-3
-"""Share of the lift's curvature at rest below which it makes no first guess."""
+"""Smallest curvature in the first guess, as a share of the lift's curvature at rest."""
 
 AT_REST_SHARE = 1e-40
-"""Share of the stiffness below which k l'^2 tells that the deflection will leave the range of numbers."""
+"""Share of the stiffness below which k l'^2 marks a deflection close to underflow, which counts as rest."""
 
 
 class End(NamedTuple):
@@ -48,11 +48,11 @@ class Piece(NamedTuple):
     """The branch at given torques.
 
     Attributes:
-        outer: at the largest pretension; the stiffness is NaN where the torque cannot be carried.
-        inner: the other end, as above.
-        at_fold: whether that is a fold.
+        outer: End at the largest pretension; its stiffness is NaN where the torque cannot be carried.
+        inner: Other end, as above.
+        at_fold: Whether that is a fold.
         sign: 1 where the stiffness falls from the outer to the inner end, else -1.
-        curvature: second derivative of the lift at the inner end.
+        curvature: Second derivative of the lift at the inner end.
     """
 
     outer: End
@@ -67,11 +67,11 @@ class CamSolver:
     """The solver of a cam.
 
     Attributes:
-        lift: over deflections from rest.
-        domain: least and largest deflection from rest.
-        k: stiffness of the spring, N/m.
-        pretension: smallest and largest, m.
-        branch: over the torque.
+        lift: Over deflections from rest.
+        domain: Least and largest deflection from rest.
+        k: Stiffness of the spring, N/m.
+        pretension: Smallest and largest, m.
+        branch: Over the torque.
     """
 
     lift: Callable[[FloatArray], Lift]
@@ -85,8 +85,8 @@ class CamSolver:
         return LEAST_CURVATURE_SHARE * float(self.lift(np.zeros(1)).l2[0])
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
-        """Deflections from rest (phi_1) and pretensions (phi_2); arrays (samples,)."""
-        with np.errstate(all="ignore"):  # beyond what can be carried, steps lead anywhere
+        """Return deflections from rest (phi_1) and pretensions (phi_2); arrays (samples,)."""
+        with np.errstate(all="ignore"):  # steps are arbitrary at torques that cannot be carried
             piece = self._piece(tau_e)
             lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
             upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
@@ -151,7 +151,7 @@ class CamSolver:
         return phi + step, lift.after(step)
 
     def _deflection(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> tuple[FloatArray, Lift]:
-        """Deflection from rest at which the torque meets a stiffness between the ends, and the lift there."""
+        """Return the deflection from rest with the demanded stiffness at the torque, and the lift there."""
         low = np.minimum(piece.outer.phi, piece.inner.phi)
         high = np.maximum(piece.outer.phi, piece.inner.phi)
         start = np.minimum(np.maximum(self._first_guess(piece, tau_e, demand), low), high)
@@ -205,13 +205,13 @@ class CamSolver:
         return phi, *self.lift(phi)
 
     def _compression(self, lift: Lift, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
-        """Compression of the spring, from the torque; at rest, where there is none, from the stiffness."""
+        """Return the compression of the spring, from the torque; at rest, from the stiffness."""
         at_rest = self.k * lift.l1 * lift.l1 <= AT_REST_SHARE * demand
         return np.where(at_rest, demand / lift.l2, tau_e / lift.l1) / self.k
 
 
 def _distance(phi: FloatArray, last: FloatArray) -> LinearInTorque:
-    """Zero at the end of the domain, whatever the torque."""
+    """Return the distance to the end of the domain, zero there at any torque."""
     zero = np.zeros_like(phi)
     return LinearInTorque(phi - last, np.ones_like(phi), zero, zero)
 

@@ -1,4 +1,4 @@
-"""Levers that a spring resists by their turn, U = K(s) w(phi) in closed form: AwAS, AwAS-II, vsaUT-II."""
+"""Levers whose rotation a spring resists, U = K(s) w(phi) with a closed solution: AwAS, AwAS-II, vsaUT-II."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.documents.source import Source
 
 @dataclass(frozen=True)
 class Sine:
-    """tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2: it softens."""
+    """A softening torque tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2."""
 
     k: float = number(units.STIFFNESS, "stiffness at rest", check=POSITIVE)
     ratio: float = number(
@@ -61,11 +61,11 @@ class Sine:
         return np.arctan(self.ratio * quotient) / self.ratio
 
     def state(self, phi: FloatArray) -> SpringState:
-        """Torque and three derivatives."""
+        """Return torque and three derivatives."""
         return self.energy_and_state(phi)[1]
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy 2 k/ratio^2 sin^2(ratio phi/2), torque and three derivatives."""
+        """Return the energy 2 k/ratio^2 sin^2(ratio phi/2), the torque and three derivatives."""
         turn, squared = self.ratio * phi, self.ratio * self.ratio
         half = np.sin(turn / 2)
         tau, sigma = self.k / self.ratio * np.sin(turn), self.k * np.cos(turn)
@@ -78,7 +78,7 @@ TURN = Sine(k=2.0, ratio=2.0)
 
 
 def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Partials:
-    """Partial derivatives of the potential K(s) w(phi).
+    """Return the partial derivatives of the potential K(s) w(phi).
 
     Args:
         scale: K and two derivatives.
@@ -104,7 +104,7 @@ def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Parti
 
 @dataclass(frozen=True)
 class SineRatio(Mechanism):
-    """U = K(s) sin^2(phi): a spring that a lever stretches by its turn. Singular nowhere.
+    """A spring stretched by the rotation of a lever, U = K(s) sin^2(phi); never singular.
 
     With T = K sin 2phi and sigma = 2 K cos 2phi the solution is closed: 2K is the hypotenuse over the sides
     sigma and 2 tau_e, and 2phi the angle between it and sigma.
@@ -114,7 +114,7 @@ class SineRatio(Mechanism):
 
     @abstractmethod
     def scale(self, s: FloatArray) -> Scale:
-        """K(s) with its derivatives, positive and monotone over the range of the setting."""
+        """Return K(s) with its derivatives, positive and monotone over the range of the setting."""
 
     @abstractmethod
     def setting(self, scale: FloatArray) -> FloatArray:
@@ -130,7 +130,7 @@ class SineRatio(Mechanism):
         return ratio_partials(self.scale(s), *TURN.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """(2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
+        """Solve by (2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
         load = 2 * np.abs(np.where(np.isfinite(tau_e), tau_e, np.nan))
         least, most = ((2 * scale - load) * (2 * scale + load) for scale in self.scale_range)
         carried = most >= 0
@@ -167,7 +167,7 @@ class Awas(SineRatio):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Arms from 5 to 12 cm."""
+        """Return arms from 5 to 12 cm."""
         return {"k": 50000, "arm": [0.05, 0.12], "lead": 0.01}
 
     @property
@@ -183,7 +183,7 @@ class Awas(SineRatio):
         return self.k * shortest * shortest, self.k * longest * longest
 
     def scale(self, s: FloatArray) -> Scale:
-        """K = k r^2."""
+        """Return K = k r^2."""
         curvature = self.k * self.lead * self.lead
         return Scale(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
 
@@ -196,7 +196,7 @@ class Awas(SineRatio):
 class Lever(SineRatio):
     """A spring at one end of a lever, the link at the other, the pivot between them at p = lead theta_2.
 
-    The lever of length L multiplies what the spring gives by p/(L - p): U = k/2 L^2 (p/(L - p))^2 sin^2(phi).
+    The lever of length L multiplies the spring force by p/(L - p): U = k/2 L^2 (p/(L - p))^2 sin^2(phi).
     Jafari, Tsagarakis & Caldwell, ICRA 2011 (AwAS-II); Groothuis, Rusticelli, Zucchelli, Stramigioli &
     Carloni, IEEE/ASME Transactions on Mechatronics 2014 (vsaUT-II).
     """
@@ -224,18 +224,18 @@ class Lever(SineRatio):
 
     @property
     def setting_range(self) -> tuple[float, float]:
-        """theta_2 at the ends of the pivot's way."""
+        """theta_2 at the ends of the pivot's travel."""
         low, high = sorted(pivot / self.lead for pivot in self.pivot)
         return low, high
 
     @property
     def scale_range(self) -> tuple[float, float]:
-        """K at the ends of the pivot's way."""
+        """K at the ends of the pivot's travel."""
         low, high = (float(self.scale(np.array(pivot / self.lead)).value) for pivot in self.pivot)
         return low, high
 
     def scale(self, s: FloatArray) -> Scale:
-        """K = k/2 (L x)^2 with x = p/(L - p)."""
+        """Return K = k/2 (L x)^2 with x = p/(L - p)."""
         rest = self.length - self.lead * s
         ratio, slope = self.lead * s / rest, self.length * self.lead / (rest * rest)
         factor = self.k * self.length * self.length
@@ -244,6 +244,6 @@ class Lever(SineRatio):
         return Scale(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
 
     def setting(self, scale: FloatArray) -> FloatArray:
-        """Return the place of the pivot, L x/(1 + x)."""
+        """Return theta_2 of the pivot position, L x/(1 + x)."""
         ratio = np.sqrt(2 * scale / self.k) / self.length
         return self.length * ratio / (1 + ratio) / self.lead

@@ -24,14 +24,14 @@ Function = Callable[..., Values]
 """Value, slope and curvature at (x, *constants), arrays of one shape."""
 
 MAX_STEPS = 100
-"""Halvings leave no digit after 60; between them Halley's method takes a handful of steps."""
+"""Largest number of steps: 60 bisections exhaust the digits, with a few Halley steps between them."""
 
 SHORT_STEP = OfRounding(1e-5, power=1 / 3)
-"""Step, relative to x, after which the third power of it is rounding."""
+"""Step relative to x whose third power, the error after it, is rounding."""
 
 LEFT_ERROR = OfRounding(1e-17)
-"""Error after a step, relative to x, that is below rounding: Newton's step times Halley's correction squared.
-Where the slope vanishes, as next to a fold, steps that are short enough elsewhere are not."""
+"""Error after a step, relative to x, below rounding: Newton step times Halley's correction squared. Where the
+slope vanishes, as next to a fold, `SHORT_STEP` alone does not suffice."""
 
 
 def increasing_root(
@@ -40,11 +40,11 @@ def increasing_root(
     """Return the zero of a function between `low` and `high`, to rounding; an end if it has none.
 
     Args:
-        function: what increases between both.
-        low: the smaller ends, (samples,).
-        high: the larger ends.
-        start: first guesses; the middle is taken where they do not lie between both.
-        constants: what else the function takes, arrays (samples,).
+        function: Function that increases between both ends.
+        low: Smaller ends, (samples,).
+        high: Larger ends.
+        start: First guesses; the middle is taken where they do not lie between both.
+        constants: Further arguments of the function, arrays (samples,).
     """
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
@@ -67,7 +67,7 @@ def increasing_root(
 
 
 SETTINGS = 2001
-"""Points of the range at which the scale is looked at; neither a power nor four of them turns faster."""
+"""Points of the range at which the scale is checked; neither a power nor a quartic changes faster."""
 
 
 class Scale(NamedTuple):
@@ -92,7 +92,7 @@ class ScaleLaw(ABC):
 
     @abstractmethod
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives at settings."""
+        """Return K with its derivatives at settings."""
 
     def setting(self, scale: FloatArray, settings: tuple[float, float]) -> FloatArray:
         """Return the setting in a range at which K has a value."""
@@ -108,7 +108,7 @@ class ScaleLaw(ABC):
         return increasing_root(missing, low, high, start, (scale,))
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
-        """Return why it is invalid for a range of settings."""
+        """Yield the reasons why the scale is invalid for a range of settings."""
         s = np.linspace(*settings, SETTINGS)
         with np.errstate(all="ignore"):
             scale = self.at(s)
@@ -123,8 +123,8 @@ class ScaleLaw(ABC):
 class Power(ScaleLaw):
     """K = (offset + lead theta_2)^exponent.
 
-    A length, or a number of coils, and what a spring makes of it: exponent 2 for the arm of a lever, -1 for
-    the active coils of a jack spring, -3 for the free length of a leaf spring.
+    The base is a length or a number of coils: exponent 2 for the arm of a lever, -1 for the active coils of a
+    jack spring, -3 for the free length of a leaf spring.
     """
 
     exponent: float = number(units.DIMENSIONLESS, "power of the length", check=NON_ZERO)
@@ -132,7 +132,7 @@ class Power(ScaleLaw):
     offset: float = number(units.DIMENSIONLESS, "length where theta_2 is zero", default=0.0)
 
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives."""
+        """Return K with its derivatives."""
         length = self.offset + self.lead * s
         scale = length**self.exponent
         slope = self.exponent * self.lead * scale / length
@@ -154,7 +154,7 @@ class PolynomialScale(ScaleLaw):
     c4: float = number(units.DIMENSIONLESS, "coefficient of theta_2^4", default=0.0)
 
     def at(self, s: FloatArray) -> Scale:
-        """K with its derivatives, by Horner's scheme."""
+        """Return K with its derivatives, by Horner's scheme."""
         row = (self.c0, self.c1, self.c2, self.c3, self.c4)
         rate = tuple(power * each for power, each in enumerate(row))[1:]
         bent = tuple(power * each for power, each in enumerate(rate))[1:]
@@ -172,11 +172,11 @@ SCALES = LazyRegistry(
         "table": "vsacli.actuators.mechanisms.ratios.scales:MeasuredScale",
     }
 )
-"""Scales by the name they have in a robot file."""
+"""Scales by their name in a robot file."""
 
 
 MIN_ROWS = 4
-"""A cubic needs four."""
+"""Smallest number of rows, those of one cubic."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class MeasuredScale(ScaleLaw):
         return Scale(a + x * (b + x * (c + x * d)), b + x * (2 * c + x * (3 * d)), 2 * c + 6 * d * x)
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
-        """Yield a table that is too short or does not reach so far, too."""
+        """Yield also the reasons why the table is too short for the range."""
         rows = self.file.values[:, 0]
         if len(rows) < MIN_ROWS or not (np.diff(rows) > 0).all():
             yield f"the table needs {MIN_ROWS} rows or more, whose settings increase"

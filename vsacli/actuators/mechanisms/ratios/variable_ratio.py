@@ -23,22 +23,22 @@ from vsacli.documents.fields import OneOf, check_fields, interval, value
 from vsacli.documents.source import Source
 
 TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.ratio:Sine"})
-"""Torques by the name they have in a robot file: the laws of springs, and one that softens."""
+"""Torques by their name in a robot file: the spring laws, and one that softens."""
 
 DEFLECTIONS = np.geomspace(1e-6, 1.0, 4000)
-"""Shares of a law's domain at which the sign of g'^2 - g g'' is looked at; laws turn within tenths of it."""
+"""Shares of a law's domain at which the sign of g'^2 - g g'' is sampled; laws change over tenths of it."""
 
 ENDLESS = 1e3
-"""Deflection, rad (m), that stands for the end of a law that has none: no springs go so far."""
+"""Deflection, rad (m), at which an unbounded domain is cut off: no springs deflect so far."""
 
 
 class _Limit(NamedTuple):
     """The end of the deflection to one side of rest on the branch.
 
     Attributes:
-        phi: the last deflection, infinite if there is none.
+        phi: Last deflection, infinite if there is none.
         torque: g there.
-        critical: whether the stiffness turns around there, and A is singular; else the law ends.
+        critical: Whether the stiffness has an extremum there, and A is singular; else the law ends.
         stiffness: g' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
     """
 
@@ -59,7 +59,7 @@ class _End(NamedTuple):
 
 @dataclass(frozen=True)
 class VariableRatio(Mechanism):
-    """T = K(theta_2) g(phi): motor 2 scales a spring whose torque at K = 1 is g.
+    """A spring with the torque g(phi) that motor 2 scales: T = K(theta_2) g(phi).
 
     At a given torque the stiffness falls with the scale while the deflection grows, up to where g'^2 = g g''.
     """
@@ -81,7 +81,7 @@ class VariableRatio(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return a spring of which half, or all, or twice as much is there."""
+        """Return a spring with a length from half to twice the nominal one."""
         stiffness = 600 if joint_type == "revolute" else 6000
         return {
             "setting": [0.5, 2],
@@ -114,7 +114,7 @@ class VariableRatio(Mechanism):
         return ratio_partials(self.scale.at(s), *self.torque.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
-        """tau_e/sigma = g/g' solved for phi between the ends of the scale, then K = sigma/g'."""
+        """Solve tau_e/sigma = g/g' for phi between the ends of the scale, then K = sigma/g'."""
         least, most = sorted(self.scale.at(np.array(self.setting, dtype=float)).value.tolist())
         with np.errstate(all="ignore"):  # a torque of a tendon that pushes, for instance
             soft, stiff = self._end(tau_e, least), self._end(tau_e, most)
@@ -138,13 +138,13 @@ class VariableRatio(Mechanism):
         )
 
     def _deflection(self, ratio: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-        """Phi at which g/g' has a value, between two ends."""
+        """Return phi at which g/g' has a value, between two ends."""
         if isinstance(self.torque, Sine):
             return np.minimum(np.maximum(self.torque.deflection_at(ratio), low), high)
         return increasing_root(self._torque_over_stiffness, low, high, ratio, (ratio,))
 
     def _torque_over_stiffness(self, phi: FloatArray, ratio: FloatArray) -> Values:
-        """g/g' less a ratio, which grows with phi along the branch, and two derivatives."""
+        """Return g/g' minus a ratio, which increases with phi along the branch, and two derivatives."""
         state = self.torque.state(phi)
         found, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
         bent = 2 * found * slope * slope - slope - found * curvature
@@ -178,7 +178,7 @@ def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
         return state.sigma * state.sigma - state.tau * state.zeta
 
     phi = DEFLECTIONS * (end if np.isfinite(end) else np.copysign(ENDLESS, end))
-    with np.errstate(all="ignore"):  # laws that grow beyond all numbers
+    with np.errstate(all="ignore"):  # overflow of laws that grow fast
         turned = np.flatnonzero(falling(phi) < 0)
     if not turned.size:
         with np.errstate(all="ignore"):
