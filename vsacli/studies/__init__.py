@@ -1,4 +1,4 @@
-"""Questions beyond a run: fixes, optima, sensitivity, identification, sizing, comparison."""
+"""Studies beyond a run: fixes, optimization, sensitivity, identification, sizing, sweeps, comparison."""
 
 from typing import TYPE_CHECKING
 

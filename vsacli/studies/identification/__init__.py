@@ -1,4 +1,4 @@
-"""The numbers of a robot from records of its motion: motors, springs, friction and links."""
+"""Identification of a robot's parameters from recordings: motors, springs, friction and links."""
 
 from vsacli.studies.identification.identification import WORDS, fitted_text, identify
 from vsacli.studies.identification.identification_report import Identification

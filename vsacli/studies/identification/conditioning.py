@@ -1,8 +1,8 @@
 """Conditioning of a recording: its bandwidth, low-pass filters, derivatives, and the noise of its sensors.
 
-Positions pass a low-pass before they are differentiated. What an equation then makes of them, and the
-measured torque, pass the same second one, of half the bandwidth: what the first changes, at its flank, the
-second does not let through, so that no column of an equation is biased against another.
+Positions pass a low-pass filter before they are differentiated. All columns of an equation, which are
+functions of them, and the measured torque then pass a common second filter of half the bandwidth. It blocks
+the frequencies that the first one attenuates, so that no column of an equation is biased against another.
 """
 
 from __future__ import annotations
@@ -15,30 +15,29 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 
 ORDER = 6
-"""Order of the Butterworth filters, which run forwards and backwards: the flank is that of twice the
-order."""
+"""Order of the Butterworth filters; run forwards and backwards, they are as steep as twice the order."""
 
 WIDER = 2.0
-"""Bandwidth of the filter of positions over that of equations: at 2, each changes what the other lets through
-by 2.4e-4."""
+"""Ratio of the bandwidth for positions to that for equations: at 2, each filter changes the pass band of the
+other by 2.4e-4."""
 
 RINGING = 3.0
-"""Ends of a record that are left out, in periods of the bandwidth: of sums of sines cut off in full motion,
-the acceleration was off by 7e-5 of its rms there at most, and by 2e-3 a period earlier."""
+"""Discarded part at each end of a recording, in periods of the bandwidth: for sums of sines that are cut off
+in motion, the acceleration error beyond it was at most 7e-5 of the rms, and 2e-3 one period earlier."""
 
 SMOOTHNESS = 5
-"""Degree of the spline by which filtered positions are differentiated."""
+"""Degree of the spline that differentiates filtered positions."""
 
 
 class Filter(NamedTuple):
-    """The low-pass of all columns of the equations of a record, without lag.
+    """A zero-phase low-pass filter for all columns of the equations of a recording.
 
     Attributes:
-        bandwidth: at which it halves an amplitude, Hz.
-        sections: of second order, as of `scipy.signal.butter`.
-        stride: samples to one row of an equation, so that rows come at about twice the bandwidth and their
-            noise is nearly white.
-        reach: samples after which it has forgotten nearly all.
+        bandwidth: frequency at which the amplitude is halved, Hz.
+        sections: second-order sections from `scipy.signal.butter`.
+        stride: samples per row of an equation, so that the rate of rows is about twice the bandwidth and
+            their noise is nearly white.
+        reach: samples after which the impulse response has nearly vanished.
     """
 
     bandwidth: float
@@ -48,19 +47,19 @@ class Filter(NamedTuple):
 
     @classmethod
     def low_pass(cls, bandwidth: float, rate: float) -> Filter:
-        """Return a low-pass with a bandwidth, for recordings with this many samples a second; both Hz."""
+        """Return a filter with a bandwidth in Hz for recordings with a sample rate in Hz."""
         from scipy.signal import butter
 
         sections = butter(ORDER, bandwidth, fs=rate, output="sos")
         return cls(bandwidth, sections, max(1, int(rate / (2 * bandwidth))), int(RINGING * rate / bandwidth))
 
     def smoothed(self, columns: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
-        """Return the same columns, (samples, ...), filtered; those with NaN are NaN.
+        """Return columns filtered, (samples, ...); a column with NaN is all NaN.
 
         Args:
-            columns: as they are; beyond either end they are taken to go on.
-            ends: how: "even", as in a mirror, which keeps the noise of the last sample as small as that of
-                others, or "odd", as turned about the last sample, which keeps the slope.
+            columns: columns to filter, (samples, ...).
+            ends: continuation beyond both ends: "even" mirrors, which keeps the noise of the last sample as
+                small as that of others; "odd" rotates about the last sample, which keeps the slope.
         """
         from scipy.signal import sosfiltfilt
 
@@ -68,26 +67,26 @@ class Filter(NamedTuple):
         return np.asarray(sosfiltfilt(self.sections, columns, axis=0, padtype=ends, padlen=beyond))
 
     def applied(self, columns: FloatArray) -> FloatArray:
-        """Rows of equations, (rows, ...), from columns at the rate of the record, (samples, ...).
+        """Return rows of equations, (rows, ...), from columns at the rate of the recording, (samples, ...).
 
-        At its ends the filter does the same to all columns, whatever that is.
+        The effects of the ends are the same for all columns, so the equations hold there as well.
         """
         return self.smoothed(columns)[:: self.stride]
 
 
 class Signals(NamedTuple):
-    """One record on a uniform grid, SI units, joint side of the gears.
+    """A conditioned recording on a uniform grid, in SI units on the joint side of the gears.
 
     Attributes:
-        time: (samples,), s; the ends where the filter of the positions rings are left out.
+        time: times, (samples,) in s, without the ends where the filter of the positions rings.
         q, dq, ddq: motion of the joints, (samples, joints).
         theta, dtheta, ddtheta: motion of the motors, (samples, joints, 2); NaN where there is no motor, or
             nothing was recorded.
-        tau_motor: torques as measured, unfiltered, (samples, joints, 2), NaN there, too.
-        rate: samples a second.
-        filter: which every column of an equation passes, the measured torque as well.
-        noise: standard deviation of the noise of q and both theta before filtering, as far as it is white,
-            (joints, 3), NaN there, too; None if it is not known.
+        tau_motor: measured torques, unfiltered, (samples, joints, 2), with NaN in the same places.
+        rate: sample rate, Hz.
+        filter: filter for every column of an equation, including the measured torque.
+        noise: standard deviation of the white noise of q and both theta before filtering, (joints, 3), with
+            NaN in the same places; None if unknown.
     """
 
     time: FloatArray
@@ -103,7 +102,7 @@ class Signals(NamedTuple):
     noise: FloatArray | None = None
 
     def during(self, samples: slice) -> Signals:
-        """Return some consecutive samples of it."""
+        """Return consecutive samples of the recording."""
         over_time = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
         return self._replace(**{name: getattr(self, name)[samples] for name in over_time})
 
@@ -111,14 +110,14 @@ class Signals(NamedTuple):
 def conditioned(
     time: FloatArray, q: FloatArray, theta: FloatArray, tau_motor: FloatArray, bandwidth: float
 ) -> Signals:
-    """Filter and differentiate.
+    """Filter and differentiate a recording.
 
     Args:
-        time: (samples,), s, in equal steps.
-        q: (samples, joints).
-        theta: (samples, joints, 2), NaN throughout where there are none.
-        tau_motor: as above.
-        bandwidth: of the equations, Hz, less than a quarter of the rate.
+        time: evenly spaced times, (samples,) in s.
+        q: joint positions, (samples, joints).
+        theta: motor positions, (samples, joints, 2); columns without data are NaN.
+        tau_motor: motor torques, (samples, joints, 2); columns without data are NaN.
+        bandwidth: bandwidth of the equations, Hz, less than a quarter of the sample rate.
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     positions, low_pass = np.concatenate((q[..., None], theta), axis=-1), Filter.low_pass(bandwidth, rate)
@@ -138,7 +137,7 @@ def conditioned(
 
 
 def _by_name(motion: Sequence[FloatArray]) -> dict[str, FloatArray]:
-    """Positions, velocities and accelerations (samples, joints, 3) as fields of `Signals`."""
+    """Return positions, velocities and accelerations, (samples, joints, 3), as fields of `Signals`."""
     named: dict[str, FloatArray] = {}
     for derivative, each in zip(("", "d", "dd"), motion, strict=True):
         named |= {f"{derivative}q": each[..., 0], f"{derivative}theta": each[..., 1:]}
@@ -146,7 +145,7 @@ def _by_name(motion: Sequence[FloatArray]) -> dict[str, FloatArray]:
 
 
 def disturbed(signals: Signals) -> Signals:
-    """Return the recording with its noise of positions added once more, equal in every call."""
+    """Return the recording with position noise added once more; every call adds the same noise."""
     assert signals.noise is not None, "of a record"
     samples = len(signals.time) + 2 * signals.filter.reach
     drawn = np.random.default_rng(0).normal(size=(samples, *signals.noise.shape)) * signals.noise
@@ -156,14 +155,14 @@ def disturbed(signals: Signals) -> Signals:
 
 
 def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: float) -> tuple[FloatArray, ...]:
-    """Positions and their first two derivatives, filtered, without the ends where that rings."""
+    """Return filtered positions and their first two derivatives, without the ends where filters ring."""
     smooth = Filter.low_pass(WIDER * low_pass.bandwidth, rate).smoothed(positions, ends="odd")
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
     return tuple(each[inside] for each in (smooth, *_derivatives(time, smooth)))
 
 
 def _derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """First and second, of columns (samples, ...) without NaN or wholly NaN."""
+    """Return the first two derivatives of columns, (samples, ...), each of which is all finite or all NaN."""
     from scipy.interpolate import make_interp_spline
 
     there = np.isfinite(positions).all(axis=0)
@@ -175,33 +174,34 @@ def _derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, F
 
 
 ABOVE_NOISE = 30.0
-"""Power of a line over the noise near the highest frequencies; no line of 1e6 of white noise reaches it."""
+"""Ratio of a spectral line's power to the noise at high frequencies above which it is motion; none of 1e6
+lines of white noise reaches it."""
 
 ROOM = 1.5
-"""Bandwidth of equations over the highest frequency of the motion, which passes but for 0.8 %. On the paper's
-arm residuals were noise from a ratio of 1 on, and to beyond 10; inertias gain a little up to 4."""
+"""Ratio of the equations' bandwidth to the highest frequency of the motion, which is attenuated by 0.8 %. On
+the paper's arm, residuals were noise for ratios from 1 to beyond 10; inertias improve a little up to 4."""
 
 FASTEST = 20.0
-"""Hz that the bandwidth has at most: joints move no faster, and mains hum lies well beyond the filters."""
+"""Largest bandwidth, Hz: joints move no faster, and the filters then suppress mains hum."""
 
 LEAST_NOISE = 5e-5
-"""Power of noise in the accelerations, over that of these, that the bandwidth lets through at most: the share
-by which inertias come out too small."""
+"""Largest ratio of noise power to signal power in the filtered accelerations: the share by which inertias
+come out too small."""
 
 SLOWEST_SPANS = 12.0
-"""Periods of the bandwidth that a record holds at least: filters leave out three at either end."""
+"""Smallest number of periods of the bandwidth in a recording: filters discard three at either end."""
 
 SAMPLES = 8.0
-"""Samples to a period of the bandwidth at least."""
+"""Smallest number of samples per period of the bandwidth."""
 
 
 def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
-    """Return a bandwidth for the equations of a record, Hz.
+    """Return a bandwidth for the equations of a recording, Hz.
 
     Args:
-        time: (samples,), s, in equal steps.
-        q: positions of joints, (samples, joints); NaN in columns that were not recorded.
-        theta: of motors, (samples, joints, 2), as above.
+        time: evenly spaced times, (samples,) in s.
+        q: joint positions, (samples, joints); NaN in columns that were not recorded.
+        theta: motor positions, (samples, joints, 2); NaN in columns that were not recorded.
     """
     lowest, highest = bounds(time)
     positions = np.concatenate((q[..., None], theta), axis=-1).reshape(len(time), -1)
@@ -211,13 +211,13 @@ def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
 
 
 def bounds(time: FloatArray) -> tuple[float, float]:
-    """Between which bandwidths of a record lie, Hz."""
+    """Return the smallest and the largest possible bandwidth of a recording, Hz."""
     duration = float(time[-1] - time[0])
     return SLOWEST_SPANS / duration, (len(time) - 1) / duration / SAMPLES
 
 
 def _motion_and_noise_ends(time: FloatArray, column: FloatArray) -> tuple[float, float]:
-    """Return the highest frequency that can be told from noise, and that up to which accelerations can."""
+    """Return the highest frequency of the motion above the noise, and that up to which accelerations are."""
     window = np.hanning(len(time))
     power = np.abs(np.fft.rfft(window * (column - np.mean(column)))) ** 2
     frequency = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
@@ -231,21 +231,19 @@ def _motion_and_noise_ends(time: FloatArray, column: FloatArray) -> tuple[float,
 
 
 def white_noise(power: FloatArray) -> FloatArray:
-    """Mean power of a line of white noise, from the upper half of a spectrum, (lines, ...).
-
-    There half of the lines lie below ln 2 of the mean, as powers of noise are exponentially distributed.
-    """
+    """Return the mean power of a line of white noise, from the upper half of a spectrum, (lines, ...)."""
+    # powers of noise are exponentially distributed, so that their median is ln 2 of their mean
     return np.asarray(np.median(power[len(power) // 2 :], axis=0) / np.log(2))
 
 
 QUIET_FROM = 2.0
-"""Bandwidths from which on a record holds hardly any motion."""
+"""Multiple of the bandwidth above which a recording has hardly any motion."""
 
 
 def torque_noise(signals: Signals) -> FloatArray:
-    """Root mean square of what of the noise of each motor's torque passes the filter, (joints, 2).
+    """Return the rms noise of each motor's torque after the filter, (joints, 2); NaN if unidentifiable.
 
-    As if it were white: that of drives which filter their torque is larger. NaN where it cannot be told.
+    The noise is assumed white; that of drives which filter their torque is larger.
     """
     from scipy.signal import sosfreqz
 

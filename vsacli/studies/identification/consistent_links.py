@@ -1,12 +1,11 @@
-"""Links that are bodies, near those of the file, with the base parameters found within their errors.
+"""Physically consistent links near those of the file that have the identified base parameters.
 
-A link is a body if its pseudo-inertia P, the second moments of its mass in homogeneous coordinates, is
-positive definite: its mass is positive, its inertia positive definite, the triangle inequality holds (P. M.
-Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018)). Nearest is the smallest
-relative entropy tr(P_0^-1 P) - ln det(P_0^-1 P) - 4, which does not depend on frames and units (T. Lee, P. M.
-Wensing, F. C. Park, IEEE Transactions on Robotics 36 (2020)). It is convex in the parameters, and infinite
-where P is singular, so that plain Newton steps find its only minimum: no solver of semidefinite programs is
-needed.
+A link is physically consistent if its pseudo-inertia P, the second moments of its mass in homogeneous
+coordinates, is positive definite: mass and inertia are positive and the triangle inequality holds (P. M.
+Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018)). The nearest links minimize
+the relative entropy tr(P_0^-1 P) - ln det(P_0^-1 P) - 4, which does not depend on frames and units (T. Lee,
+P. M. Wensing, F. C. Park, IEEE Transactions on Robotics 36 (2020)). It is convex in the parameters, and
+infinite where P is singular, so that Newton's method finds the unique minimum without a semidefinite solver.
 """
 
 from __future__ import annotations
@@ -30,42 +29,43 @@ from vsacli.studies.identification.regressor import (
 )
 
 WEIGHT = 1.0
-"""Weight of the relative entropy next to half the squared standard errors of the result: where a recording
-tells little, links are rather an error off than far from the file's. With 0.01 a link came out with 141
-kg."""
+"""Weight of the relative entropy against half the squared deviation in standard errors: where a recording
+determines little, links should deviate by a standard error rather than be far from the file. With 0.01, a
+link came out with 141 kg."""
 
 WITHIN = 3.0
-"""Standard errors by which the result may differ from that of bodies: of forty numbers one is beyond two."""
+"""Largest deviation of consistent links from the result, in standard errors: one of forty parameters exceeds
+two by chance."""
 
 LEAST_MASS = 1e-3
-"""Mass of the body with which a link without one is compared, over that of the heaviest link."""
+"""Mass of the reference body for a link without mass, relative to the heaviest link."""
 
 LEAST_RADIUS = 5e-3
-"""Radius of gyration, m, of the body with which a link without inertia is compared."""
+"""Radius of gyration of the reference body for a link without inertia, m."""
 
 SHARP = 1e-6
-"""Standard error, over the value or 1, that nothing falls below: so exact records leave a covariance, too."""
+"""Lower bound of standard errors, relative to the value or 1, so that exact recordings have a covariance."""
 
 LIGHTER = 2.0
-"""Factor between the weights that lead from the file's links to those that were found, each from the minimum
-of the one before. With 10, a quarter of random arms a thousand standard errors off did not arrive; with 3 all
+"""Ratio of successive weights that lead from the file's links to the identified ones, each minimum being the
+next start. With 10, a quarter of random arms a thousand standard errors away did not converge; with 3, all
 did."""
 
 STEPS = 100
-"""Newton steps at most with a weight; one to ten do."""
+"""Limit on Newton steps per weight; one to ten suffice."""
 
 ARRIVED = 1e-6
-"""Newton decrement with which a minimum is reached: half its square is what could still be gained. Steps by
-1/(1 + decrement) leave links bodies (S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 9.6)."""
+"""Newton decrement at a minimum: half its square is the remaining gain. Steps by 1/(1 + decrement) keep links
+consistent (S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 9.6)."""
 
 
 class LinkEstimate(NamedTuple):
-    """The result: combinations of standard parameters, their values and covariance.
+    """The identified combinations of standard parameters, with values and covariance.
 
     Attributes:
-        shares: of the parameters of all links in each, (combinations, parameters).
-        values: (combinations,).
-        covariance: (combinations, combinations).
+        shares: factors of the parameters of all links in each combination, (combinations, parameters).
+        values: values of the combinations, (combinations,).
+        covariance: covariance of the values, (combinations, combinations).
     """
 
     shares: FloatArray
@@ -74,11 +74,12 @@ class LinkEstimate(NamedTuple):
 
 
 class ConsistentLinks(NamedTuple):
-    """Links that are bodies.
+    """Physically consistent links.
 
     Attributes:
-        links: of all joints, base to tip; none if nothing was found, or they are not within its errors.
-        off: by how many standard errors each value that was found is off from theirs, (combinations,).
+        links: links of all joints, base to tip; empty if nothing was identified, or if no consistent links
+            agree with the result.
+        off: deviation of the links from each identified value, in standard errors, (combinations,).
     """
 
     links: tuple[Link, ...]
@@ -86,16 +87,16 @@ class ConsistentLinks(NamedTuple):
 
     @property
     def within(self) -> bool:
-        """Whether bodies can have the result, within its errors."""
+        """Whether consistent links agree with the result within its errors."""
         return bool(np.all(np.abs(self.off) <= WITHIN))
 
 
 def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
-    """Links near a robot's that are bodies and have the values that were found.
+    """Return the physically consistent links nearest to a robot's that have the identified values.
 
     Args:
-        robot: the robot as its file has it.
-        estimate: the result.
+        robot: robot as in its file.
+        estimate: identified values.
     """
     if not len(estimate.values):
         return ConsistentLinks((), estimate.values)
@@ -106,17 +107,17 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
     nearest = ConsistentLinks((), off)
     if not nearest.within:
-        return nearest  # they are next to no bodies: of the smallest mass, or flat
+        return nearest  # its links are almost inconsistent: with hardly any mass, or flat
     return nearest._replace(links=tuple(map(link_of, found.reshape(-1, len(SYMBOLS)))))
 
 
 def pseudo_inertia(parameters: FloatArray) -> FloatArray:
-    """Second moments of the mass, (..., 4, 4), of standard parameters (..., 10)."""
+    """Return the second moments of the mass, (..., 4, 4), from standard parameters, (..., 10)."""
     return np.asarray(np.tensordot(parameters, _BASIS, axes=1))
 
 
 def _basis() -> FloatArray:
-    """Pseudo-inertias of one unit of each parameter, (10, 4, 4)."""
+    """Return the pseudo-inertias of one unit of each parameter, (10, 4, 4)."""
     found = np.zeros((len(SYMBOLS), 4, 4))
     found[0, 3, 3] = 1.0
     for axis in range(3):
@@ -132,7 +133,7 @@ _BASIS = _basis()
 
 
 def _body_near(link: Link, robot: Robot) -> FloatArray:
-    """Standard parameters of a body that differs from a link only as far as that is none, (10,)."""
+    """Return the parameters of a link, (10,), changed only as far as consistency requires."""
     heaviest = max(each.link.mass for each in robot.joints) or 1.0
     mass, com = max(link.mass, LEAST_MASS * heaviest), np.array(link.com)
     inertia = link.inertia.tensor
@@ -146,13 +147,14 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
 
 
 class _Problem(NamedTuple):
-    """Parameters x = centre + directions @ s, of which the first s are errors of the result.
+    """Coordinates s of the parameters x = centre + directions @ s; the first s are errors of the result.
 
     Attributes:
-        centre: parameters with the values that were found, (parameters,).
-        directions: (parameters, parameters); in the first ones those values change by standard errors.
-        errors: how many these are.
-        inverse: of the pseudo-inertias of the links to be near to, (links, 4, 4).
+        centre: parameters with the identified values, (parameters,).
+        directions: directions, (parameters, parameters); the first ones change the identified values by
+            standard errors, the others keep them.
+        errors: number of the first directions.
+        inverse: inverses of the pseudo-inertias of the reference links, (links, 4, 4).
     """
 
     centre: FloatArray
@@ -162,7 +164,7 @@ class _Problem(NamedTuple):
 
     @classmethod
     def of(cls, estimate: LinkEstimate, root: FloatArray, start: FloatArray) -> _Problem:
-        """Return the problem with identified values as coordinates, scaled by a root of their covariance."""
+        """Return the problem for an estimate; `root` is a square root of its covariance."""
         from scipy.linalg import solve_triangular
 
         q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
@@ -174,12 +176,12 @@ class _Problem(NamedTuple):
         return cls(centre, np.hstack((errors, q[:, count:])), count, inverse)
 
     def parameters(self, s: FloatArray) -> FloatArray:
-        """Standard parameters, (links, 10)."""
+        """Return the standard parameters at s, (links, 10)."""
         x: FloatArray = (self.centre + self.directions @ s).reshape(-1, len(SYMBOLS))
         return x
 
     def value(self, s: FloatArray, weight: float) -> float:
-        """Relative entropy, and half the squared errors over the weight; infinite if a link is no body."""
+        """Return relative entropy plus half the squared errors over the weight; infinite if inconsistent."""
         matrices = pseudo_inertia(self.parameters(s))
         try:
             np.linalg.cholesky(matrices)
@@ -189,7 +191,7 @@ class _Problem(NamedTuple):
         return float(entropy + s[: self.errors] @ s[: self.errors] / (2 * weight))
 
     def slopes(self, s: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
-        """Gradient and Hessian of the value."""
+        """Return the gradient and the Hessian of the value."""
         inverse = np.linalg.inv(pseudo_inertia(self.parameters(s)))
         gradient = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
         moved = np.einsum("lij,pjk->lpik", inverse, _BASIS)
@@ -206,7 +208,7 @@ class _Problem(NamedTuple):
 
 
 def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
-    """Standard parameters of all links with the least value, (parameters,), from those of bodies."""
+    """Return the parameters of all links with the least value, (parameters,), from a consistent start."""
     s = np.asarray(np.linalg.solve(problem.directions, start - problem.centre), dtype=np.float64)
     off = float(s[: problem.errors] @ s[: problem.errors])
     lighter = int(np.ceil(np.log10(max(off, 1.0) / WEIGHT) / np.log10(LIGHTER)))
@@ -216,14 +218,14 @@ def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
 
 
 def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
-    """Return the minimum by Newton steps, halved at most until links are bodies and the value falls."""
+    """Return the minimum by Newton steps, halved until the value decreases, at most to 1/(1 + decrement)."""
     for _ in range(STEPS):
         gradient, hessian = problem.slopes(s, weight)
         scale: FloatArray = 1 / np.sqrt(np.diagonal(hessian))
         try:
             step: FloatArray = -scale * np.linalg.solve(hessian * np.outer(scale, scale), scale * gradient)
         except np.linalg.LinAlgError:
-            break  # next to no bodies, and far from what was found
+            break  # almost inconsistent links, far from the identified values
         decrement = math.sqrt(max(-float(gradient @ step), 0.0))
         if decrement <= ARRIVED:
             break
@@ -235,13 +237,13 @@ def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
 
 
 def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
-    """Links that are bodies, nearest to the robot's, by the solution of a system of links."""
+    """Return the physically consistent links for the solution of a system of links."""
     assert isinstance(found.system, LinkSystem), "of links"
     return consistent_links(robot, _estimate(found.system, found))
 
 
 def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
-    """Return the identifiable base parameters, alone or in combinations, at the other values found."""
+    """Return the identifiable base parameters, alone or in combinations, with values and covariance."""
     fit, base = found.fit, system.base
     combined = {each.terms[0][0]: each.terms for each in fit.inseparable}
     first = [at for at in range(len(fit.values)) if at in combined or np.isfinite(fit.standard_errors[at])]
@@ -260,7 +262,7 @@ def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
 
 
 def doubts_of(links: ConsistentLinks) -> Iterator[str]:
-    """Yield doubts if no bodies can have these parameters."""
+    """Yield a sentence if no consistent links agree with the result."""
     if not links.within:
         off = np.abs(links.off).max()
         yield (

@@ -1,8 +1,9 @@
 """Least squares of the equations of recordings, with standard errors for residuals of any color.
 
-`Equations` hold at the samples of one recording, a `System` stacks those of all. `least_squares` solves
-linear ones, weighted by the noise of each group, and says which unknowns cannot be told; `gauss_newton`
-repeats that for equations that are not linear. Covariances are the sandwich of `score_covariance`.
+`Equations` are those at the samples of one recording, a `System` stacks those of all recordings.
+`least_squares` solves linear equations, weighted by the noise of each group, and finds the unidentifiable
+unknowns; `gauss_newton` repeats that for nonlinear equations. Covariances are sandwich estimates with the
+middle part from `score_covariance`.
 """
 
 from __future__ import annotations
@@ -20,19 +21,19 @@ from vsacli.studies.measured.line_fit import count_of_cosines, covariance_of_sum
 
 
 class Equations(NamedTuple):
-    """Equations of one record that are linear in the changes of some unknowns, rows in any order.
+    """Equations of one recording, linearized in the unknowns, with rows in any order.
 
     Attributes:
         measured: measured values, (rows,).
-        predicted: the same by the present numbers, (rows,).
-        slopes: its derivatives by the unknowns, (rows, unknowns).
-        group: names of the noise in each row, (rows,): rows of one name have noise of one size.
-        sample: number of each row's sample on the even grid of the record, (rows,); a group has one row of a
-            sample. Rows of one sample, whatever their groups, may have noise in common.
-        errors: what independent errors of numbers that were found before change of `measured`, each by one
-            standard error, (rows, errors); None if it does not depend on any.
-        noise: gives what noise of the positions, once more, changes of `measured` less `predicted`, (rows,),
-            and of `slopes`, (rows, unknowns); None if that is not known. See
+        predicted: predictions of these values, (rows,).
+        slopes: derivatives of the predictions by the unknowns, (rows, unknowns).
+        group: name of each row's group, (rows,); rows of a group have noise of equal size.
+        sample: index of each row's sample on the uniform grid of the recording, (rows,); a group has one row
+            per sample. Rows of one sample, also in different groups, may have common noise.
+        errors: changes of `measured` by independent errors of parameters identified before, each of one
+            standard error, (rows, errors); None if `measured` does not depend on such parameters.
+        noise: function that returns the changes of `measured - predicted`, (rows,), and of `slopes`,
+            (rows, unknowns), if the noise of the positions is added once more; None if that is unknown. See
             `SystemOfEquations.equations`.
     """
 
@@ -46,18 +47,18 @@ class Equations(NamedTuple):
 
 
 class System(NamedTuple):
-    """The equations of all records, one below the other.
+    """The stacked equations of all recordings; see `Equations`.
 
     Attributes:
         measured: measured values, (rows,).
-        residual: that less the prediction, (rows,).
-        slopes: derivatives of the prediction, (rows, unknowns).
-        groups: names of noise.
-        group: of each row, index in `groups`, (rows,).
-        record: of each row, (rows,).
-        sample: of each row in its record, (rows,).
-        errors: of the measurements, (rows, errors).
-        noise: gives what noise of positions changes of the residual, (rows,), and of the slopes.
+        residual: measured minus predicted values, (rows,).
+        slopes: derivatives of the predictions, (rows, unknowns).
+        groups: names of the groups.
+        group: index of each row's group in `groups`, (rows,).
+        record: index of each row's recording, (rows,).
+        sample: index of each row's sample in its recording, (rows,).
+        errors: changes of the measured values by earlier errors, (rows, errors).
+        noise: function that returns the changes of residual, (rows,), and slopes by noise of the positions.
     """
 
     measured: FloatArray
@@ -72,7 +73,7 @@ class System(NamedTuple):
 
     @classmethod
     def of(cls, records: Sequence[Equations]) -> System:
-        """Return the system of some records."""
+        """Stack the equations of several recordings."""
         measured, predicted, slopes, group, sample = (
             np.concatenate([getattr(each, name) for each in records]) for name in Equations._fields[:5]
         )
@@ -101,25 +102,25 @@ class System(NamedTuple):
         )
 
     def by_group(self, of_rows: FloatArray) -> FloatArray:
-        """Sums of a number of each row over the groups, (groups,)."""
+        """Return the sums of row values over each group, (groups,)."""
         sums: FloatArray = np.bincount(self.group, of_rows, len(self.groups)).astype(np.float64)
         return sums
 
 
 LEAST_FREEDOM = 0.01
-"""Share of a row's noise that its residual shows at least, 1 less its leverage; below, the row was not fitted
-but interpolated, and its residual says nothing."""
+"""Lower bound of 1 minus the leverage of a row; below it, the fit interpolates the row, whose residual is
+then meaningless."""
 
 
 def score_covariance(system: System, q: FloatArray, residual: FloatArray) -> FloatArray:
-    """Covariance of q^T e, the meat of the sandwich, (columns, columns).
+    """Return the covariance of q^T e, the middle part of the sandwich, (columns, columns).
 
-    Scores of one sample are added before anything else, so that noise that groups have in common counts.
+    Scores of one sample are added first, so that noise common to several groups is taken into account.
 
     Args:
-        system: whose equations they are.
+        system: system of the equations.
         q: orthonormal columns, (rows, columns).
-        residual: of each row, in units of its noise, (rows,).
+        residual: residual of each row in units of its noise, (rows,).
     """
     freedom = np.maximum(1.0 - np.einsum("rc,rc->r", q, q), LEAST_FREEDOM)
     scores = q * (residual / np.sqrt(freedom))[:, None]
@@ -131,18 +132,18 @@ def score_covariance(system: System, q: FloatArray, residual: FloatArray) -> Flo
 
 
 def freedom_of(system: System) -> int:
-    """Return from how many cosines the covariance is taken: its degrees of freedom."""
+    """Return the degrees of freedom of the covariance: the number of cosines that estimate it."""
     samples = [system.sample[system.record == record] for record in np.unique(system.record)]
     return sum(count_of_cosines(int(np.ptp(each)) + 1) for each in samples)
 
 
 def wider(freedom: int) -> float:
-    """Return the variance of Student's t: so few cosines tell the covariance but roughly."""
+    """Return the variance of Student's t: few cosines determine the covariance only roughly."""
     return freedom / max(freedom - 2, 1)
 
 
 def _by_sample(scores: FloatArray, group: IndexArray, sample: IndexArray) -> FloatArray:
-    """Sums over the rows of each sample of a record, (samples, columns); zero where there are none."""
+    """Return the sums of scores over the rows of each sample, (samples, columns); zero without rows."""
     first = sample.min()
     summed = np.zeros((int(sample.max() - first) + 1, scores.shape[1]))
     for each in np.unique(group):
@@ -152,29 +153,29 @@ def _by_sample(scores: FloatArray, group: IndexArray, sample: IndexArray) -> Flo
 
 
 SEPARABLE = 1 / 300
-"""Share of a column that no combination of the others explains, from which on its unknown can be told.
+"""Relative distance of a column from the span of the others above which its unknown is identifiable.
 
-At a constant stiffness the shares that k and k_c of the paper's arm leave to each other are some 1e-3, no
-more than filtered noise changes these columns by, and k_c came out off by its own size; a stiffness of two
-sines leaves 0.1 and more."""
+At constant stiffness, this distance is about 1e-3 for k and k_c of the paper's arm, no more than filtered
+noise changes these columns, and the error of k_c was as large as k_c; with a stiffness of two sines it is 0.1
+or more."""
 
 QUIET = 1e-9
-"""Noise of a group over the measured values, below which it is the rounding of filters and not noise."""
+"""Ratio of a group's noise to its measured values below which it is rounding of the filters."""
 
 PASSES = 20
-"""Times the noise of the groups is estimated at most; three or four do unless a group has hardly any rows."""
+"""Limit on estimates of the groups' noise; three or four suffice unless a group has hardly any rows."""
 
 SETTLED = 0.01
-"""Relative change of the noise of a group that ends this."""
+"""Relative change of the noise of every group below which the estimates have converged."""
 
 
 class Combination(NamedTuple):
     """An identifiable combination of indistinguishable unknowns: the sum of factor times unknown.
 
     Attributes:
-        terms: index of each unknown with its factor; that of the first one is 1.
-        value: of the sum.
-        standard_error: of that.
+        terms: index and factor of each unknown; the first factor is 1.
+        value: value of the sum.
+        standard_error: standard error of the value.
     """
 
     terms: tuple[tuple[int, float], ...]
@@ -187,19 +188,19 @@ class Combination(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Unknowns by least squares.
+    """Unknowns estimated by least squares.
 
     Attributes:
-        values: of the unknowns, (unknowns,); those that cannot be told are as they were before.
-        standard_errors: of these, (unknowns,), NaN for those that cannot be told.
-        solution: unknowns that predict best, (unknowns,): of those that cannot be told apart some are as
-            before, and the others make up for it.
-        covariance: of that, (unknowns, unknowns), zero for those that are as before.
-        condition: of the columns, each divided by its norm.
+        values: values of the unknowns, (unknowns,); unidentifiable ones keep their previous value.
+        standard_errors: standard errors of the values, (unknowns,); NaN for unidentifiable ones.
+        solution: unknowns that predict best, (unknowns,); of indistinguishable ones some keep their previous
+            value, and the others compensate for it.
+        covariance: covariance of the solution, (unknowns, unknowns); zero for unknowns that were kept.
+        condition: condition number of the columns, each divided by its norm.
         inseparable: identifiable combinations of indistinguishable unknowns.
-        unexcited: unknowns without effect on the prediction, (unexcited,).
-        residual_rms: root mean square residual of each group, corrected for the unknowns.
-        converged: whether an iteration came to its end; see `gauss_newton`.
+        unexcited: indices of the unknowns without effect on the prediction, (unexcited,).
+        residual_rms: rms residual of each group, corrected for the number of unknowns.
+        converged: whether the iteration converged; see `gauss_newton`.
     """
 
     values: FloatArray
@@ -217,11 +218,11 @@ class Step(NamedTuple):
     """A solution of the linear equations.
 
     Attributes:
-        change: of the unknowns, (unknowns,).
-        split: of the weighted columns.
-        weight: of each row, 1 over its noise, (rows,).
-        noise: of each group, (groups,).
-        length: of the change, in units in which the standard errors of white residuals are 1.
+        change: change of the unknowns, (unknowns,).
+        split: independent and dependent weighted columns.
+        weight: weight of each row, 1 over its noise, (rows,).
+        noise: noise of each group, (groups,).
+        length: length of the change, in units in which the standard errors for white residuals are 1.
     """
 
     change: FloatArray
@@ -236,27 +237,27 @@ def least_squares(
     present: FloatArray,
     tolerance: float = SEPARABLE,
 ) -> Fit:
-    """Solve linear equations; rows of each group count by its noise, which is estimated from the residual.
+    """Solve linear equations, weighted by the noise of each group, which is estimated from the residuals.
 
-    Standard errors hold for residuals of any colour, which groups may have in common; see `score_covariance`.
+    Standard errors hold for residuals of any color, also common to groups; see `score_covariance`.
 
     Args:
-        records: equations of each record.
-        present: numbers at which they predict, (unknowns,).
-        tolerance: share of a column that no combination of the others may explain.
+        records: equations of each recording.
+        present: values of the unknowns at which the equations predict, (unknowns,).
+        tolerance: relative distance of an identifiable unknown's column from the span of the others.
 
     Raises:
-        InputError: there are no more equations than unknowns.
+        InputError: there are not more equations than unknowns.
     """
     system = System.of(records)
     return fit_of(system, present, solved(system, tolerance), present)
 
 
 def solved(system: System, tolerance: float = SEPARABLE) -> Step:
-    """Return the solution alone.
+    """Return the solution of linear equations, without standard errors.
 
     Raises:
-        InputError: there are no more equations than unknowns.
+        InputError: there are not more equations than unknowns.
     """
     rows, unknowns = system.slopes.shape
     if rows <= unknowns:
@@ -274,7 +275,7 @@ def solved(system: System, tolerance: float = SEPARABLE) -> Step:
 
 
 def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
-    """Return the solution with the noise of each group known, (groups,)."""
+    """Return the solution for a given noise of each group, (groups,)."""
     from scipy.linalg import solve_triangular
 
     weight = 1 / noise[system.group]
@@ -286,7 +287,7 @@ def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
 
 
 def _noise(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray:
-    """Root mean square residual of each group, (groups,), over the rows less the fitted unknowns."""
+    """Return the rms residual of each group, (groups,), per row minus fitted unknowns."""
     freedom = np.maximum(system.by_group(1 - leverage), 1.0)
     return np.sqrt(system.by_group(left**2) / freedom)
 
@@ -300,10 +301,10 @@ def fit_of(
     """Return the fit of a solution, with standard errors.
 
     Args:
-        system: the equations at the present numbers.
-        present: those, (unknowns,).
-        step: the solution.
-        before: values of unidentifiable unknowns, (unknowns,).
+        system: equations at the present values.
+        present: present values of the unknowns, (unknowns,).
+        step: solution of the equations.
+        before: values that unidentifiable unknowns keep, (unknowns,).
     """
     split, left = step.split, system.residual - system.slopes @ step.change
     solution = present + step.change
@@ -326,10 +327,10 @@ def fit_of(
 
 
 def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
-    """Return the covariance of the changed unknowns: of noise, of earlier values, and of bias.
+    """Return the covariance of the solution due to noise, errors of earlier parameters, and bias.
 
     Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
-    How much is known roughly, and counts as an error.
+    This bias is known roughly, and is counted as an error.
     """
     from scipy.linalg import solve_triangular
 
@@ -349,7 +350,7 @@ def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
 
 
 def _combinations(split: Independence, solution: FloatArray, errors: FloatArray) -> list[Combination]:
-    """One for each kept column of which others have a share."""
+    """Return the combination of each kept column on which dropped columns depend."""
     found = []
     for place, kept in enumerate(split.kept):
         shares = split.shares[place]
@@ -362,36 +363,36 @@ def _combinations(split: Independence, solution: FloatArray, errors: FloatArray)
 
 
 STEPS = 50
-"""Steps at most. Springs whose exponents were a third off took 6 to 10."""
+"""Limit on steps. Springs with exponents wrong by a third required 6 to 10."""
 
 HALVINGS = 20
-"""Times a step is halved at most, to a millionth: if even that gains nothing, none will."""
+"""Limit on halvings of a step, to a millionth: if that reduces nothing, no step will."""
 
 ARRIVED = 0.1
-"""Length of a step, in standard errors, that is no longer worth going on: a hundredth of their square. With
-0.01, widths of friction that are hardly told took twice the steps."""
+"""Step length, in standard errors, at which the iteration has converged: a hundredth of their square. With
+0.01, poorly identifiable widths of friction required twice the steps."""
 
 
 def gauss_newton(
     equations: Callable[[FloatArray], Sequence[Equations]], start: FloatArray, tolerance: float = SEPARABLE
 ) -> Fit:
-    """Solve equations by repeated linear ones; where unknowns cannot be told apart, some stay as they were.
+    """Solve nonlinear equations by the Gauss-Newton method; of indistinguishable unknowns some are kept.
 
-    A step is halved until it leaves less, in units of the noise, than there was before. With
-    `scipy.optimize.least_squares`, called again for each estimate of the noise, 22 systems came out the same
-    to 1e-10 standard errors, with twice the evaluations; it has no rule for unknowns that cannot be told.
+    A step is halved until it reduces the residuals in units of the noise. `scipy.optimize.least_squares`,
+    called again for each estimate of the noise, gave the same result for 22 systems to 1e-10 standard errors,
+    with twice the evaluations; it has no rule for unidentifiable unknowns.
 
     Args:
-        equations: those of all records at some values of the unknowns; predicted values that are not finite
-            say that there is no such robot, and a shorter step is tried.
-        start: values of the unknowns at first, (unknowns,).
-        tolerance: as of `least_squares`.
+        equations: function that returns the equations of all recordings at given values of the unknowns;
+            predictions that are not finite mean that no such robot exists, and a shorter step is tried.
+        start: initial values of the unknowns, (unknowns,).
+        tolerance: see `least_squares`.
 
     Returns:
-        The last result; `converged` is false if the steps did not come to an end.
+        Last result; `converged` is false if the steps did not converge.
 
     Raises:
-        InputError: there are no more equations than unknowns.
+        InputError: there are not more equations than unknowns.
     """
     present, system = start, System.of(equations(start))
     for _ in range(STEPS):
@@ -409,7 +410,7 @@ def gauss_newton(
 def _shorter(
     equations: Callable[[FloatArray], Sequence[Equations]], present: FloatArray, system: System, step: Step
 ) -> tuple[FloatArray, System] | None:
-    """Unknowns after the longest part of a step that gains, with their equations; None if none does."""
+    """Return unknowns and equations after the longest halved step that reduces the residuals, or None."""
     before = _left(system, step)
     for halving in range(HALVINGS):
         there = present + step.change / 2**halving
@@ -420,7 +421,7 @@ def _shorter(
 
 
 def _left(system: System, step: Step) -> float:
-    """Sum of squared residuals in units of the noise; infinite where nothing is predicted."""
+    """Return the sum of squared residuals in units of the noise; infinite if a prediction is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = float(np.sum((system.residual * step.weight) ** 2))
     return left if np.isfinite(left) else np.inf

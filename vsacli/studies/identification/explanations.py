@@ -1,9 +1,9 @@
-"""Structure of residuals: its possible causes, and the parameters that it makes wrong.
+"""Explanations of residuals: possible causes, and the parameters that these make wrong.
 
-Residuals of noise have no structure. Each cause of `causes` is tested by `addition`; the one that explains
-most is taken, then what is left is tested again. What is found so is told if it matters: if a number would be
-another one, by more than its standard error says, if most of what is left is no noise, or if that is too much
-anyway.
+Residuals of pure noise have no structure. `addition` tests each cause of `causes`; the one that explains most
+is chosen, then the remaining residual is tested again. A cause is reported if it matters: if it would change
+a parameter by more than its standard error admits, if it explains most of the residual, or if the residual is
+too large anyway.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.residual_causes import Cause, causes
 
 FEWEST_ROWS = 3
-"""Equations to an unknown below which residuals say too little about missing columns."""
+"""Equations per unknown below which residuals do not determine missing columns."""
 
 
 class Addition(NamedTuple):
-    """Effect of some further columns on a fit.
+    """The effect of further columns on a fit.
 
     Attributes:
-        chance: probability of an effect as large if the columns had none.
-        left: share that they leave of the sum of squares of the residuals, in units of the noise.
+        chance: probability of an effect of this size by chance.
+        left: remaining share of the sum of squared residuals in units of the noise.
         sizes: coefficients of the columns, (columns,).
     """
 
@@ -50,12 +50,12 @@ class Addition(NamedTuple):
 def addition(
     equations: Sequence[Equations], columns: Sequence[FloatArray], noise: dict[str, float]
 ) -> Addition | None:
-    """Add columns to equations and test them; None if the unknowns explain them all, or rows are too few.
+    """Add columns to equations and test them; return None if they depend on the others or rows are too few.
 
     Args:
-        equations: of each record, at the values that fit best.
-        columns: of each record, (rows, columns).
-        noise: of each group.
+        equations: equations of each recording at the values that fit best.
+        columns: columns of each recording, (rows, columns).
+        noise: noise of each group.
     """
     system = System.of([each._replace(noise=None) for each in equations])
     weight = np.array([1 / noise[name] for name in system.groups])[system.group]
@@ -84,11 +84,11 @@ def addition(
 
 
 def _beyond(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal basis of what known ones leave of columns, and the columns' coefficients by the basis's."""
+    """Return an orthonormal basis of columns beyond known ones, and the map of its coefficients to theirs."""
     norms = np.linalg.norm(columns, axis=0)
     scale = 1 / np.where(norms > 0, norms, 1.0)
     left = columns * scale
-    for _ in range(2):  # twice: rounding of the first leaves a trace of the known ones
+    for _ in range(2):  # twice, since rounding of the first pass leaves a share of the known columns
         left = left - known @ (known.T @ left)
     basis, sizes, turned = np.linalg.svd(left, full_matrices=False)
     there = sizes > SEPARABLE
@@ -96,7 +96,7 @@ def _beyond(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _chance(sizes: FloatArray, covariance: FloatArray, freedom: int) -> float:
-    """Probability that Hotelling's statistic of numbers that are zero is as large."""
+    """Return the probability that Hotelling's statistic is as large if the true sizes are zero."""
     from scipy.special import fdtrc
 
     count = len(sizes)
@@ -106,26 +106,26 @@ def _chance(sizes: FloatArray, covariance: FloatArray, freedom: int) -> float:
 
 
 CHANCE = 1e-4
-"""Probability that a cause that is none is taken for one. Of an arm with seven joints some hundred are
-tested, so that one identification in a hundred names one by accident."""
+"""Probability of accepting a cause by chance. About a hundred are tested for an arm with seven joints, so
+that one identification in a hundred names a cause by accident."""
 
 NEARLY = 1.25
-"""Ratio of what two causes leave, sums of squares, below which the one with fewer columns is preferred, and
-above which a further cause is worth a word. Columns that mean nothing take a few percent of it."""
+"""Ratio of the remaining sums of squares of two causes below which the cause with fewer columns is preferred,
+and above which a further cause is reported. Meaningless columns reduce the sum by a few percent."""
 
 MOST = 0.75
-"""Share of the sum of squares from which on most is explained: half of the root mean square is left."""
+"""Explained share of the sum of squares that counts as most: half of the rms remains."""
 
 SEVERAL = 3
-"""Causes of one system at most; those of all motors of a joint are one."""
+"""Largest number of causes for one system; a cause common to both motors of a joint counts once."""
 
 
 class Explanation(NamedTuple):
     """The explanation of the residuals of a system.
 
     Attributes:
-        sentences: one for each cause, and one on the numbers that are wrong if it is not regarded.
-        matters: whether there are such numbers, or most of the residuals is explained.
+        sentences: one sentence for each cause, and one on the parameters that are wrong if it is ignored.
+        matters: whether there are such parameters, or most of the residual is explained.
     """
 
     sentences: tuple[str, ...]
@@ -139,10 +139,10 @@ def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fa
     """Explain the residuals of a joint's motors, or of all links.
 
     Args:
-        robot: the robot.
+        robot: robot as in its file.
         found: solution of the equations.
-        records: to which they were fitted.
-        fails: whether they leave too much; then causes are told that change no number, too.
+        records: fitted recordings.
+        fails: whether the residuals are too large; then causes are reported even if they change no parameter.
     """
     exact = [each._replace(noise=None) for each in records]
     equations = [found.equations(each)._replace(noise=None) for each in exact]
@@ -171,7 +171,7 @@ def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fa
 
 
 def _moved(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
-    """Yield the change of identified values if a missing cause were in the equations."""
+    """Yield clauses on identified values that would change with the causes in the equations."""
     for at, number in enumerate(found.free):
         value, before = float(found.fit.values[at]), float(found.fit.standard_errors[at])
         name, unit, error = found.system.names[number], found.system.units[number], float(errors[at])
@@ -186,7 +186,7 @@ def _moved(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator
 def _chosen(
     possible: Sequence[Cause], equations: Sequence[Equations], noise: dict[str, float]
 ) -> list[Cause]:
-    """Causes that explain something beyond chance, the one that explains most first."""
+    """Return the causes that explain something beyond chance, the one that explains most first."""
     chosen: list[tuple[Cause, Addition]] = []
     while len(chosen) < SEVERAL:
         present = _longer(equations, [cause for cause, _ in chosen])
@@ -212,7 +212,7 @@ def _longer(equations: Sequence[Equations], chosen: Sequence[Cause]) -> list[Equ
 
 
 def _share_left(cause: Cause, longer: Sequence[Equations], solution: FloatArray) -> float:
-    """Return the remaining share of squared residuals in equations with a cause."""
+    """Return the remaining share of squared residuals, over the rows that a cause changes."""
     rows = [np.any(columns != 0, axis=1) for columns in cause.columns]
     before = [(each.measured - each.predicted)[there] for each, there in zip(longer, rows, strict=True)]
     explained = [each.slopes[there] @ solution for each, there in zip(longer, rows, strict=True)]

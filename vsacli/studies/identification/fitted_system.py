@@ -1,4 +1,4 @@
-"""A fitted system of equations: its numbers within their bounds, and its residuals on held-out recordings."""
+"""Fits of a system of equations: parameters within their bounds, and residuals on held-out recordings."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vsacli.studies.identification.conditioning import Signals, disturbed
 from vsacli.studies.identification.estimation import Equations, Fit, gauss_newton
 
 FEWEST_ROWS = 5
-"""Equations to an unknown below which a record is too short to hold a part of it out."""
+"""Equations per unknown below which a recording is too short to hold out a part of it."""
 
 
 CERTAIN = 2.0
-"""Standard errors by which a number must differ from that of the file to contradict it."""
+"""Difference from the value of the file, in standard errors, that contradicts the file."""
 
 
 class SystemOfEquations(ABC):
-    """Numbers of a robot and the equations that tell of them.
+    """Unknown parameters of a robot and the equations that determine them.
 
     Attributes:
-        title: whose numbers they are: the joint, or the links.
-        names, units: of the numbers.
-        sums: terms of each base parameter; "" for parameters of the robot file.
-        before: their values by the robot file, (numbers,), SI units.
+        title: name of the joint, or "links".
+        names, units: names and units of the parameters.
+        sums: terms of each base parameter as text; "" for parameters of the robot file.
+        before: values in the robot file, (parameters,), SI units.
     """
 
     title: str
@@ -40,18 +40,18 @@ class SystemOfEquations(ABC):
 
     @abstractmethod
     def of_record(self, values: FloatArray, signals: Signals) -> Equations:
-        """Return the equations of a recording at some values of the numbers, (numbers,)."""
+        """Return the equations of a recording at given values of the parameters, (parameters,)."""
 
     @abstractmethod
     def admissible(self, number: int, value: float) -> float | None:
-        """Return the nearest value that a number may have; None if it is to stay as it was."""
+        """Return the nearest admissible value of a parameter, by index; None if it must keep its value."""
 
     @abstractmethod
     def without(self, fixed: dict[int, float]) -> Self:
-        """Return the same system with some numbers at given values, which are no longer unknown."""
+        """Return the system with some parameters, by index, fixed at given values."""
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:
-        """Return the equations of a recording, at the values found."""
+        """Return the equations of a recording, with the effect of its noise if that is known."""
         found = self.of_record(values, signals)
         if signals.noise is None:
             return found
@@ -66,11 +66,11 @@ class SystemOfEquations(ABC):
 
 
 class Bound(NamedTuple):
-    """A number that came out as none that a robot has, so that it was set.
+    """The value at which a parameter is held because its result is not admissible.
 
     Attributes:
-        value: the held value.
-        standard_error: of the result; NaN if the robot has nothing near it.
+        value: value at which it is held.
+        standard_error: standard error of the result; NaN if no admissible value is near the result.
     """
 
     value: float
@@ -81,10 +81,10 @@ class Solution(NamedTuple):
     """A fitted system.
 
     Attributes:
-        system: which it is.
-        free: indices of its numbers that were fitted.
-        fit: of these, in their order.
-        bound: the others, by index.
+        system: system of equations.
+        free: indices of the fitted parameters.
+        fit: fit of these parameters, in the same order.
+        bound: held parameters, by index.
     """
 
     system: SystemOfEquations
@@ -94,19 +94,19 @@ class Solution(NamedTuple):
 
     @property
     def predicting(self) -> FloatArray:
-        """Values of all numbers that predict best."""
+        """Values of all parameters that predict best, (parameters,)."""
         values = self.system.before.copy()
         values[list(self.bound)] = [each.value for each in self.bound.values()]
         values[list(self.free)] = self.fit.solution
         return values
 
     def equations(self, signals: Signals) -> Equations:
-        """Of a record, at the values found."""
+        """Return the equations of a recording at the values that predict best."""
         return self.system.equations(self.predicting, signals)
 
 
 def solution(system: SystemOfEquations, records: Sequence[Signals]) -> Solution:
-    """Fit, and again without numbers that come out as no robot has them, until all may be."""
+    """Fit a system repeatedly, holding parameters with inadmissible results, until all are admissible."""
     bound: dict[int, Bound] = {}
     while True:
         free = tuple(number for number in range(len(system.names)) if number not in bound)
@@ -127,9 +127,9 @@ def _equations(system: SystemOfEquations, records: Sequence[Signals], values: Fl
 
 
 def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:
-    """Return the value to hold a parameter at; None if its result is admissible, or it cannot be identified.
+    """Return the value to hold a parameter at; None if its result is admissible or it is unidentifiable.
 
-    It is held at the value of the file if the recording agrees with it.
+    The value of the file is preferred if the recording agrees with it.
     """
     nearest, before = system.admissible(number, value), float(system.before[number])
     if nearest == value or math.isnan(error):
@@ -140,10 +140,10 @@ def _bound(system: SystemOfEquations, number: int, value: float, error: float) -
 
 
 def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
-    """Residual of each group on held-out samples, root mean square.
+    """Return the rms residual of each group on held-out samples.
 
-    Each of several records is predicted by a fit to the others, the last fifth of a single one by a fit to
-    the previous ones. NaN where that leaves too little.
+    Each of several recordings is predicted by a fit to the others, the last fifth of a single recording by a
+    fit to the rest. Groups are missing if too little is left for the fit.
     """
     parts = [(records[:at] + records[at + 1 :], record) for at, record in enumerate(records)]
     if len(records) == 1:
@@ -163,5 +163,5 @@ def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))

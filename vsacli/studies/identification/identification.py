@@ -1,4 +1,8 @@
-"""Identify the numbers of a robot from recordings, and write them into its file."""
+"""Identification of a robot's parameters from recordings, and the robot file with the result.
+
+Motors are identified joint by joint, then all links together with the torque of their springs. Checks of the
+recordings and explanations of the residuals decide the verdict.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +59,7 @@ from vsacli.studies.identification.recording_checks import (
 from vsacli.studies.identification.recordings import Record, check_distinct, complete_joints, read_record
 
 WORDS = (*GROUPS, LINKS)
-"""Words for groups of parameters."""
+"""Names of the groups of parameters."""
 
 FORCES = wrench_columns("wrench")
 """Columns of the wrench on the end effector."""
@@ -63,8 +67,8 @@ FORCES = wrench_columns("wrench")
 PUSHED = "nothing is found of links while something acts on the end effector"
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
-"""Residual over the noise, and over the torque, beyond both of which the equations do not hold: what is left
-is then no noise of the sensor, and more than a good model of friction leaves."""
+"""Ratios of residual to noise and of residual to torque; beyond both, the equations do not hold: the residual
+is then more than sensor noise, and more than a good friction model leaves."""
 
 
 def identify(
@@ -74,19 +78,19 @@ def identify(
     bandwidth: float | None = None,
     columns: str | Path | None = None,
 ) -> Identification:
-    """Find numbers of a robot from records of its motion.
+    """Identify parameters of a robot from recordings of its motion.
 
     Args:
-        robot: with numbers to begin with.
-        recordings: CSV files with a column `time` and columns named as `vsacli export` names them: positions
-            of joints and motors, and motor torques or currents; cells may be empty.
+        robot: robot with initial values of the parameters.
+        recordings: CSV files with a column `time` and columns named as by `vsacli export`: positions of
+            joints and motors, and motor torques or currents; cells may be empty.
         fit: parameters to identify: words of `WORDS`, or patterns of paths such as
             `joints.elbow.actuator.spring.*`.
-        bandwidth: of the filter, Hz; chosen from each record if None.
-        columns: a file with the mapping of columns with other names.
+        bandwidth: bandwidth of the filter, Hz; chosen for each recording if None.
+        columns: file that maps other column names.
 
     Raises:
-        InputError: a record cannot be used, or `fit` names nothing.
+        InputError: a recording cannot be used, or `fit` matches no parameter.
     """
     check_robot(robot)
     check_fit(robot, fit, WORDS)
@@ -131,7 +135,7 @@ def identify(
 
 
 def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tuple[list[Signals], bool]:
-    """Return signals without the delays that matter, and whether there are any."""
+    """Return signals without their significant delays, and whether any delay was removed."""
     late = [by.matters(each.rate) for each, by in zip(signals, delays, strict=True)]
     moved = zip(signals, delays, late, strict=True)
     return [without_delay(each, by.seconds) if matters else each for each, by, matters in moved], any(late)
@@ -140,10 +144,10 @@ def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tupl
 def _read(
     robot: Robot, recordings: str | Path | Sequence[str | Path], columns: str | Path | None
 ) -> list[Record]:
-    """Return the records.
+    """Read all recordings.
 
     Raises:
-        InputError: there is none, one cannot be used, or two are the same.
+        InputError: there is none, one cannot be used, or two are identical.
     """
     paths = [recordings] if isinstance(recordings, str | Path) else list(recordings)
     if not paths:
@@ -155,10 +159,10 @@ def _read(
 
 
 def _conditioned(record: Record, bandwidth: float | None) -> Signals:
-    """Return a record ready for equations.
+    """Return a recording filtered and differentiated.
 
     Raises:
-        InputError: the bandwidth that was asked for does not fit the record.
+        InputError: the requested bandwidth does not fit the recording.
     """
     chosen = bandwidth_of(record.time, record.q, record.theta) if bandwidth is None else bandwidth
     low, high = bounds(record.time)
@@ -172,13 +176,13 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
 def solutions(
     robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
 ) -> list[Solution]:
-    """Solve for motors joint by joint, then for all links, with the torques of their springs.
+    """Solve for motors joint by joint, then for all links with the torques of their springs.
 
     Args:
-        robot: the robot.
-        joints: indices of those that were recorded.
+        robot: robot with initial values.
+        joints: indices of the recorded joints.
         fit: see `identify`.
-        signals: records.
+        signals: conditioned recordings.
     """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
     if LINKS not in fit or without_links(robot, joints, fit, signals):
@@ -244,10 +248,8 @@ def _explanations(
     signals: Sequence[Signals],
     of_gains: Sequence[Gain],
 ) -> list[Explanation]:
-    """Return explanations of the residuals; of links only if the springs agree.
-
-    Links are found by that, so that one fault would be told of both.
-    """
+    """Return explanations of the residuals."""
+    # links are identified from the torque of springs, so a fault of the springs would be explained twice
     explained: list[Explanation] = []
     for system, report in zip(found, reports, strict=True):
         wrong = any(each.matters for each in explained) or any(each.doubtful for each in of_gains)
@@ -268,11 +270,11 @@ def _fitted(
 
 
 NOTHING = 1e-9
-"""Size of numbers of links, SI units, that are left by rounding."""
+"""Size of link parameters, SI units, below which they are rounding errors."""
 
 
 def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
-    """Yield the parameters in the order of the file, friction that it lacks included."""
+    """Yield the identified parameters of the robot file, and changed friction that the file lacks."""
     known = set(map(str, parameters(robot)))
     for number in (number for system in systems for number in system.numbers):
         if number.identifiable and not number.sum and (number.path in known or number.changed):
@@ -282,13 +284,13 @@ def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     """Return the text of the robot's file with the identified parameters and their standard errors.
 
-    Everything else, comments too, stays as the user wrote it; paths lead to the same files. Friction that the
-    file has none of is put in where it was found.
+    Everything else, comments included, remains as the user wrote it; paths still refer to the same files.
+    Identified friction is inserted if the file has none.
 
     Args:
-        robot: as it was read from its file.
-        found: the identification.
-        folder: where the text will stand.
+        robot: robot as read from its file.
+        found: result of the identification.
+        folder: folder of the new file.
 
     Raises:
         InputError: the robot was not read from a file.
@@ -316,7 +318,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
 
 
 def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
-    """Numbers of links by path, in frames of the file's convention, of those that are not as they were."""
+    """Return parameters of changed links by path, in the frames of the file's convention."""
     modified = dict(texts_at(text, "convention")).get("convention") == "modified"
     found: dict[str, Any] = {}
     for index, (joint, before) in enumerate(zip(fitted.joints, robot.joints, strict=True)):
@@ -330,5 +332,5 @@ def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """Return a value with more digits than recordings determine, but without meaningless remainders."""
+    """Return a value with 7 digits, more than recordings determine, and 0 for a rounding error."""
     return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")

@@ -1,4 +1,4 @@
-"""The report of an identification: numbers, residuals and curves of its systems, as text and as JSON."""
+"""The report of an identification: parameters, residuals and curves of its systems, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recordings import TORQUE, Record
 
 OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
-"""Verdicts, the worst last: all numbers are told; some are not; the equations leave more than noise; a record
-looks wrong."""
+"""Verdicts, the worst last: all parameters are identified; some are not; residuals exceed the noise; a
+recording looks wrong."""
 
 CHANGED = 3.0
-"""Standard errors by which a number differs from that of the file. Of a hundred numbers that do not, five are
-beyond two, and less than one beyond three."""
+"""Difference from the file, in standard errors, that is a change. Of a hundred unchanged parameters, five
+exceed two standard errors by chance, and less than one exceeds three."""
 
 
 TENS = 10
-"""Standard errors of a difference below which it has a decimal."""
+"""Difference in standard errors below which it is printed with a decimal."""
 
 LARGEST_SAID = 1e3
-"""Standard errors of a difference up to which their number is said; beyond, none is meant."""
+"""Difference in standard errors above which it is not printed, since it means nothing."""
 
 
 @dataclass(frozen=True)
 class Number(Published):
-    """A number of a robot as found.
+    """The result for one parameter of a robot.
 
     Attributes:
-        path: to it, from the robot; of a base parameter, its name.
-        unit: of all values.
-        before: by the robot file.
-        value: identified, or kept.
-        standard_error: of that; NaN if it was not told.
-        note: why it was not told, or is at a bound; empty otherwise.
-        sum: terms of a base parameter, which the file does not have; else empty.
+        path: path of the parameter in the robot, or name of a base parameter.
+        unit: unit of all values.
+        before: value in the robot file.
+        value: identified value, or the previous one.
+        standard_error: standard error of the value; NaN if unidentifiable.
+        note: reason why it is unidentifiable, or at a bound; otherwise empty.
+        sum: terms of a base parameter, which the file does not have; otherwise empty.
     """
 
     path: str
@@ -68,12 +68,12 @@ class Number(Published):
 
     @property
     def identifiable(self) -> bool:
-        """Whether it was found."""
+        """Whether the parameter was identified."""
         return math.isfinite(self.standard_error)
 
     @property
     def off(self) -> float:
-        """Standard errors by which it differs from that of the file; NaN if it was not told."""
+        """Difference from the file in standard errors; NaN if unidentifiable."""
         difference = self.value - self.before
         if not (difference and self.identifiable):
             return 0.0 * self.standard_error
@@ -81,21 +81,21 @@ class Number(Published):
 
     @property
     def changed(self) -> bool:
-        """Whether it differs from that of the file by more than it may be off."""
+        """Whether the value differs from the file by more than `CHANGED` standard errors."""
         return self.identifiable and abs(self.value - self.before) > CHANGED * self.standard_error
 
 
 @dataclass(frozen=True)
 class Residual(Published):
-    """The residual of the equations of a motor or a link; root mean squares, after the filter.
+    """The residual of the equations of a motor or a link, as root mean squares after the filter.
 
     Attributes:
-        group: which it is.
-        unit: of all values.
-        torque: measured values.
-        residual: that less the prediction.
-        noise: of the measured torque, from where no motion is; NaN if it is not known.
-        held_out: the residual where the fit did not see it; NaN if nothing was held out.
+        group: name of the motor or link.
+        unit: unit of all values.
+        torque: measured torque.
+        residual: measured minus predicted torque.
+        noise: noise of the residual, expected from the noise of torque and positions; NaN if unknown.
+        held_out: residual on held-out samples; NaN if nothing was held out.
     """
 
     group: str
@@ -111,12 +111,12 @@ class SystemReport(Published):
     """The results for the parameters of a joint's motors and springs, or of the links.
 
     Attributes:
-        title: whose they are.
-        numbers: all that were looked for.
-        condition: of the columns of the equations.
-        combinations: identifiable combinations of indistinguishable parameters, sentences.
-        residuals: of each motor, or link.
-        converged: whether the search came to an end.
+        title: name of the joint, or "links".
+        numbers: results for all unknown parameters.
+        condition: condition number of the columns of the equations.
+        combinations: identifiable combinations of indistinguishable parameters, as sentences.
+        residuals: residuals of each motor or link.
+        converged: whether the fit converged.
     """
 
     title: str
@@ -129,18 +129,18 @@ class SystemReport(Published):
 
 @dataclass(frozen=True)
 class RecordReport(Published):
-    """The use of a recording.
+    """Properties of a recording and its use.
 
     Attributes:
-        path: of it.
-        duration: of the used part, s.
-        rate: samples a second.
-        bandwidth: of the filter, Hz.
-        delay: by which torques were later than positions, s; NaN if it could not be told.
-        delay_error: its standard error.
-        corrected: whether it was taken out.
-        doubts: likely faults, sentences.
-        unused: columns that were not needed.
+        path: path of the file.
+        duration: duration of the used part, s.
+        rate: sample rate, Hz.
+        bandwidth: bandwidth of the filter, Hz.
+        delay: delay of torques behind positions, s; NaN if unidentifiable.
+        delay_error: standard error of the delay, s.
+        corrected: whether the delay was removed.
+        doubts: likely faults, as sentences.
+        unused: columns that were not required.
     """
 
     path: str
@@ -156,13 +156,13 @@ class RecordReport(Published):
 
 @dataclass(frozen=True)
 class Torques:
-    """Measured and predicted torques of a record for a figure, (rows,).
+    """Measured and predicted torques of a recording for a figure.
 
     Attributes:
-        record: path of it.
-        group: motor or link.
-        unit: of the torques.
-        time, measured, predicted: rows of the equations.
+        record: path of the recording.
+        group: name of the motor or link.
+        unit: unit of the torques.
+        time, measured, predicted: times and torques at the rows of the equations, (rows,).
     """
 
     record: str
@@ -174,23 +174,23 @@ class Torques:
 
     @property
     def residual(self) -> float:
-        """Root mean square of their difference."""
+        """Root mean square of measured minus predicted torque."""
         return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
 
 
 @dataclass(frozen=True)
 class Identification(Published):
-    """Numbers of a robot from records of its motion.
+    """Parameters of a robot identified from recordings of its motion.
 
     Attributes:
-        robot: its name.
+        robot: name of the robot.
         verdict: `ok`, or the worst of `untold`, `misfit` and `doubtful`.
-        records: how each was used.
-        systems: results, joint by joint.
-        notes: further findings, sentences.
-        fitted: the robot with the numbers found.
-        torques: measured and predicted, for figures; not in JSON.
-        sources: the files of the robot and the records, as they were read; not in JSON.
+        records: properties and use of each recording.
+        systems: results, joint by joint, then those of the links.
+        notes: further findings, as sentences.
+        fitted: robot with the identified parameters.
+        torques: measured and predicted torques for figures; not in JSON.
+        sources: files of the robot and the recordings, as read; not in JSON.
     """
 
     robot: str
@@ -207,7 +207,7 @@ class Identification(Published):
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """Results of all systems."""
+        """Results for the parameters of all systems."""
         return tuple(number for system in self.systems for number in system.numbers)
 
     def __str__(self) -> str:
@@ -223,7 +223,7 @@ class Identification(Published):
         )
 
     def as_text(self) -> ReportText:
-        """Return the report in its parts, of its tables the numbers; the other is `residual_rows`."""
+        """Return the report in parts, with the table of parameters; `residual_rows` is the other table."""
         lines = [self._summary(), *map(_used_line, self.records), *self._sentences()]
         return ReportText(self._headline(), self._numbers(), lines)
 
@@ -232,7 +232,7 @@ class Identification(Published):
         return f"{self.robot} from {count}: {self.verdict.upper()}"
 
     def _summary(self) -> str:
-        """Return how many values agree with the file, disagree, or say nothing about it."""
+        """Return the numbers of parameters that agree with the file, differ, or are unidentifiable."""
         identifiable = sum(each.identifiable for each in self.numbers)
         changed = sum(each.changed for each in self.numbers)
         counts = {
@@ -253,7 +253,7 @@ class Identification(Published):
         return rows
 
     def residual_rows(self) -> list[tuple[str, ...]]:
-        """Return a table of the residuals of each motor, or link; its header first."""
+        """Return a table of the residuals of each motor or link, the header first."""
         rows: list[tuple[str, ...]] = [
             ("rms, filtered", "torque", "residual", "noise", "held out", "condition")
         ]
@@ -292,7 +292,7 @@ def _used_line(record: RecordReport) -> str:
 
 
 def significant(value: float, error: float) -> str:
-    """Return a value with as many digits as its standard error leaves meaning, two of that."""
+    """Return a value rounded to two digits of its standard error."""
     if not (math.isfinite(error) and error > 0):
         return f"{value:.6g}"
     decimals = 1 - math.floor(math.log10(error))
@@ -301,11 +301,11 @@ def significant(value: float, error: float) -> str:
 
 
 SMOOTH_CURVES = 8
-"""Rows of figures to one of the equations, whose curves have corners."""
+"""Rows of a figure per row of the equations, whose coarse curves would have corners."""
 
 
 def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
-    """Return the results of a system, and how well it fits."""
+    """Return the results and residuals of a system."""
     system, fit = found.system, found.fit
     of_joint = f"{JOINTS}.{system.title}.actuator."
     names = [system.names[number].removeprefix(of_joint) for number in found.free]
@@ -365,7 +365,7 @@ def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterato
 
 
 def _joint_of(robot: Robot, group: str) -> int:
-    """Index of the joint whose motor, or link, a group is."""
+    """Return the index of the joint whose motor or link a group is."""
     return robot.joint_names.index(group.rpartition(" ")[2])
 
 
@@ -374,12 +374,12 @@ def _unit(robot: Robot, group: str) -> str:
 
 
 def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]) -> float:
-    """Return the noise of measurements, by that of torques and of positions; NaN if either is unknown."""
+    """Return the noise of a group's residual from that of torques and positions; NaN if either is unknown."""
     index = _joint_of(robot, group)
     motors, sprung = motor_names(robot, index), robot.joints[index].actuator.sprung
     of_positions = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
     noise = rms(np.concatenate(of_positions)) if of_positions else math.nan
-    if sprung and group not in motors:  # what springs carry, which positions tell
+    if sprung and group not in motors:  # the torque of springs follows from positions alone
         return noise
     motor = motors.index(group) if sprung else 0
     of_torque = np.array([torque_noise(each)[index, motor] for each in signals])
@@ -389,7 +389,7 @@ def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequ
 def torques(
     robot: Robot, found: Sequence[Solution], records: Sequence[Record], signals: Sequence[Signals]
 ) -> Iterator[Torques]:
-    """Measured and predicted torques of all records and systems."""
+    """Yield measured and predicted torques of all recordings and systems."""
     for record, coarse in zip(records, signals, strict=True):
         stride = max(1, coarse.filter.stride // SMOOTH_CURVES)
         of_record = coarse._replace(filter=coarse.filter._replace(stride=stride))

@@ -15,29 +15,29 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 
 NOTHING = 1e-13
-"""Norm of a column, over that of the largest, up to which it holds nothing but rounding."""
+"""Ratio of a column's norm to the largest norm up to which the column is rounding."""
 
 ABOVE_NOISE = 4.0
-"""Size of what a column adds, over that of its noise, from which on it is told: below, more than a sixteenth
-of its square is noise, and its unknown comes out too small by as much."""
+"""Ratio of a column's independent part to its noise above which it is independent: below, more than a
+sixteenth of its square is noise, and its unknown comes out too small by that share."""
 
 CERTAIN = 10.0
-"""A share of a column in another one that is less than this many times the tolerance is taken for zero: it is
-as uncertain as the dependence itself, some times more by the condition of the independent columns."""
+"""Multiple of the tolerance below which the share of a column in another is set to zero: a share is as
+uncertain as the dependence itself, amplified by the condition number of the independent columns."""
 
 
 class Independence(NamedTuple):
-    """Columns of a matrix, split.
+    """Columns of a matrix, split into independent, dependent and zero columns.
 
     Attributes:
-        kept: independent ones, (kept,), the largest first; each adds most to those before it.
-        dropped: those that are combinations of them, (dropped,).
-        nothing: those that are zero, (nothing,).
-        shares: of the kept columns in the dropped ones, (kept, dropped).
+        kept: indices of independent columns, (kept,); each is the one farthest from the span of the previous.
+        dropped: indices of columns that are combinations of the kept ones, (dropped,).
+        nothing: indices of zero columns, (nothing,).
+        shares: shares of the kept columns in the dropped ones, (kept, dropped).
         scale: norm of each column, (columns,).
         q: orthonormal basis of the kept columns, (rows, kept).
-        r: triangular, `q r` are the kept columns divided by their norms.
-        condition: of all columns that are not zero, divided by their norms.
+        r: upper triangular factor: `q r` are the kept columns divided by their norms.
+        condition: condition number of all nonzero columns divided by their norms.
     """
 
     kept: IndexArray
@@ -51,13 +51,13 @@ class Independence(NamedTuple):
 
 
 def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None = None) -> Independence:
-    """Split the columns of a matrix, of any units.
+    """Split the columns of a matrix, whatever their units.
 
     Args:
-        columns: (rows, columns).
-        tolerance: distance of a column from its best combination of those kept, over its norm, from which on
-            it is independent.
-        noise: of the columns; the rest of an independent column must exceed it.
+        columns: matrix, (rows, columns).
+        tolerance: distance of a column from the span of the kept ones, relative to its norm, above which it
+            is independent.
+        noise: noise of the columns, which the remainder of an independent column must exceed.
     """
     from scipy.linalg import solve_triangular
 
@@ -85,12 +85,12 @@ def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None
 
 
 def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[int]:
-    """Places of the independent columns of unit norm: the one that adds most to those before it is next.
+    """Return indices of the independent columns, in the order of pivoting.
 
     Args:
-        triangle: the columns, turned to be few rows.
-        noise: of them, turned in the same way: combinations of columns have those of their noise.
-        tolerance: as of `independence`.
+        triangle: columns of unit norm, reduced to few rows by QR.
+        noise: noise of the columns, reduced by QR; each elimination is applied to it as well.
+        tolerance: see `independence`.
     """
     left, noise = triangle.copy(), noise.copy()
     waiting, kept = list(range(left.shape[1])), []
@@ -108,7 +108,7 @@ def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[
 
 
 def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:
-    """Places of the columns that are no combinations of those before them; as `independence` otherwise."""
+    """Return indices of the columns that are not combinations of previous columns; see `independence`."""
     scale = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
     r = np.linalg.qr(columns[:, there] / scale[there], mode="r")
@@ -117,7 +117,7 @@ def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:
 
 
 def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatArray:
-    """Shares of independent columns (rows, kept) in others, (kept, columns)."""
+    """Return the shares of independent columns, (rows, kept), in other columns, (kept, columns)."""
     scale, of_others = np.linalg.norm(kept, axis=0), np.linalg.norm(columns, axis=0)
     shares, *_ = np.linalg.lstsq(kept / scale, columns, rcond=None)
     shares[:, of_others <= NOTHING * of_others.max(initial=0.0)] = 0.0
@@ -127,11 +127,11 @@ def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatA
 
 
 def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:
-    """Return a combination of unknowns, e.g. `k + 0.0123 k_c`.
+    """Return a combination of unknowns as text, e.g. `k + 0.0123 k_c`.
 
     Args:
-        terms: index of each unknown with its factor; that of the first one is 1.
-        names: of the unknowns.
+        terms: index and factor of each unknown; the first factor is 1.
+        names: names of all unknowns.
     """
     (first, _), *others = terms
     signed = (f" {'-' if factor < 0 else '+'} {_times(abs(factor))}{names[at]}" for at, factor in others)

@@ -1,7 +1,7 @@
 """Equations of links: the torque of springs, or of the motor of a rigid joint, is Y pi + damping + friction.
 
-The torque of springs follows from recorded positions by their parameters, which the motors gave before: their
-uncertainty is part of that of the links. A rigid joint has motor and link in one equation.
+The torque of springs follows from recorded positions and the spring parameters, which the equations of motors
+gave before; their uncertainty adds to that of the links. A rigid joint has motor and link in one equation.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ from vsacli.studies.identification.regressor import (
 )
 
 LINKS = "links"
-"""Title of the system of all of them, and the word by which users ask for it."""
+"""Title of the system of all links, and its word in `fit`."""
 
 RESISTANCES = ("damping", "friction")
-"""Parts of a joint against which its link moves."""
+"""Parts of a joint that resist the motion of its link."""
 
 
 class LinkSystem(SystemOfEquations):
-    """Equations of all links whose torque is known: by springs and motors, or by a rigid drive.
+    """Equations of all links whose torque is known, from springs or from a rigid drive.
 
     Args:
-        robot: the robot, as its file has it.
-        base: combinations of the inertial parameters of its links, the first unknowns.
-        sought: the others, numbers of the robot.
-        springs: numbers of springs that were found before.
-        errors: effect of independent errors on these, (springs, errors), each by one standard error.
+        robot: robot as in its file.
+        base: base parameters of its links, the first unknowns.
+        sought: further unknowns, parameters of the robot file.
+        springs: spring parameters identified before.
+        errors: effect of independent errors, of one standard error each, on `springs`, (springs, errors).
     """
 
     def __init__(
@@ -101,13 +101,13 @@ class LinkSystem(SystemOfEquations):
         )
 
     def admissible(self, number: int, value: float) -> float | None:
-        """Return the value itself unless it is of the robot file, and that may hold no more than zero."""
+        """See `SystemOfEquations.admissible`; base parameters may have any value."""
         if number < len(self.base.kept):
             return value
         return admissible(self._robot, self.names[number], value)
 
     def without(self, fixed: dict[int, float]) -> LinkSystem:
-        """See `SystemOfEquations.without`; only numbers of the file are fixed."""
+        """See `SystemOfEquations.without`; only parameters of the file can be fixed."""
         robot = self._robot.replace({self.names[number]: value for number, value in fixed.items()})
         first = len(self.base.kept)
         sought = [each for at, each in enumerate(self.sought, first) if at not in fixed]
@@ -118,9 +118,9 @@ def link_system(robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = (
     """Return the system of a robot's links, with damping and friction of its joints.
 
     Args:
-        robot: as its file has it.
-        fit: words and patterns, of which those of motors count where joints are rigid.
-        motors: results for motors and springs, which give the torque of springs and its errors.
+        robot: robot as in its file.
+        fit: words and patterns; those for motors count for rigid joints.
+        motors: solutions of motors and springs, which give the torque of springs and its errors.
     """
     sought = [each for each in parameters(robot) if each.part in RESISTANCES]
     for index, joint in enumerate(robot.joints):
@@ -130,7 +130,7 @@ def link_system(robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = (
 
 
 def _springs(robot: Robot, motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
-    """Numbers of springs as they predict best, and their errors as sums of independent ones."""
+    """Return spring parameters that predict best, and their errors as sums of independent errors."""
     from scipy.linalg import block_diag
 
     known, springs, roots = {str(each): each for each in parameters(robot)}, [], []
@@ -148,7 +148,7 @@ def _springs(robot: Robot, motors: Sequence[Solution]) -> tuple[list[Parameter],
 def _carried(
     robot: Robot, index: int, signals: Signals, springs: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
-    """Torque that springs or a rigid drive bring to a joint, (samples,), and its slopes by springs."""
+    """Return the torque of springs or a rigid drive at a joint, (samples,), and its slopes by springs."""
     actuator = robot.joints[index].actuator
     if not actuator.sprung:
         return signals.tau_motor[:, index, 0], np.zeros((len(springs), len(signals.time)))
@@ -164,7 +164,7 @@ def _carried(
 def _resistance(
     robot: Robot, index: int, signals: Signals, numbers: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return damping and friction of a joint and its rigid drive, (samples,), and slopes by parameters."""
+    """Return the resisting torque of a joint and its rigid drive, (samples,), and its slopes."""
     joint = apart(seeded(robot, numbers).joints[index])
     motion = joint_motion(signals, index)
     dq = motion["dq"]
@@ -176,13 +176,13 @@ def _resistance(
 
 
 def without_links(robot: Robot, joints: Sequence[int], fit: Sequence[str], records: Sequence[Signals]) -> str:
-    """Why nothing is found of the links, a sentence; empty if there is no reason.
+    """Return the reason why links cannot be identified, as a sentence; "" if they can.
 
     Args:
-        robot: the robot.
-        joints: indices of those that were recorded.
-        fit: as of `link_system`.
-        records: of its motion.
+        robot: robot as in its file.
+        joints: indices of the recorded joints.
+        fit: see `link_system`.
+        records: conditioned recordings.
     """
     positions = np.concatenate([each.q for each in records])
     unknown = [name for name, q in zip(robot.joint_names, positions.T, strict=True) if np.isnan(q).any()]

@@ -1,7 +1,7 @@
 """Equations of motors behind springs: tau_motor = B theta'' + D theta' + friction + U_theta(q, theta).
 
-They are (73)-(74) with recorded values, and free of the links. The unknowns are numbers of springs, motors
-and friction that words or patterns of paths ask for; `MotorSystem` is the system of one joint.
+These are (73)-(74) with recorded values, and do not contain the links. The unknowns are the parameters of
+springs, motors and friction that words or patterns of paths select; `MotorSystem` is the system of one joint.
 """
 
 from __future__ import annotations
@@ -27,26 +27,25 @@ from vsacli.studies.identification.fitted_system import SystemOfEquations
 
 SPRINGS, MOTORS, FRICTION = "springs", "motors", "friction"
 GROUPS = (SPRINGS, MOTORS, FRICTION)
-"""Words for groups of parameters."""
+"""Names of the groups of parameters."""
 
 FIXED = ("gear_ratio", "torque_constant", "resistance")
-"""Numbers of motors that are counted or printed on them, and of which no torque on the joint's side tells."""
+"""Motor parameters that are known from the design, and that no torque on the joint side determines."""
 
 WIDTH = "width"
 
 OF_MOTORS = ("motor", "coupled_inertia")
-"""Words of paths to numbers of motors."""
+"""Keys in the paths of motor parameters."""
 
 
 def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return the numbers of one joint's motors and springs that are to be found.
+    """Return the parameters of one joint's motors and springs to be identified.
 
-    Terms of a spring that are zero, and the width of friction that is sharp, stay so unless a pattern names
-    them: missing ones are not identified.
+    Zero terms of a spring, and a zero width of friction, are identified only if a pattern matches them.
 
     Args:
-        robot: the robot.
-        index: of the joint.
+        robot: robot as in its file.
+        index: index of the joint.
         fit: words of `GROUPS`, and patterns of paths such as `joints.elbow.actuator.spring.*`.
     """
     return tuple(
@@ -57,11 +56,11 @@ def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, .
 
 
 def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
-    """Return a robot with zero friction at motors behind springs that had none, to identify it.
+    """Return a robot with zero friction added at motors behind springs that have none, to identify it.
 
     Args:
-        robot: the robot.
-        joints: indices of those that it is about.
+        robot: robot as in its file.
+        joints: indices of the joints to change.
     """
     paths = [str(each) for each in parameters(robot) if each.joint in joints and group_of(each)]
     sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
@@ -72,7 +71,7 @@ def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
 
 
 def admissible(robot: Robot, path: str, value: float) -> float | None:
-    """Return this value if the robot file admits it at a path, else zero; None if it admits neither."""
+    """Return a value if the robot file admits it at a path, else zero; None if it admits neither."""
     for each in (value, 0.0):
         try:
             robot.replace(path, each)
@@ -100,10 +99,10 @@ def _asked_for(parameter: Parameter, group: str, fit: Sequence[str]) -> bool:
 
 
 def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
-    """Refuse a text that is no word and fits no parameter that can be identified.
+    """Check that each text is a word or matches a parameter that can be identified.
 
     Raises:
-        InputError: with the probable word.
+        InputError: a text is neither; the error suggests similar words.
     """
     paths = [str(each) for each in parameters(robot) if each.joint is not None and group_of(each)]
     problems = []
@@ -119,7 +118,10 @@ def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
 
 
 def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
-    """Torques of both motors, (2, samples), from the motion of joint and motors by name; NaN of none."""
+    """Return the torques of both motors, (2, samples), from the motion of joint and motors by name.
+
+    They are NaN for a motor that does not exist.
+    """
     tau_spring = actuator.carried(motion).tau_spring
     missing = np.full((SIDES - len(tau_spring), *tau_spring.shape[1:]), np.nan)
     against = np.concatenate((tau_spring, missing))
@@ -135,10 +137,8 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
 
 
 def joint_motion(signals: Signals, index: int) -> dict[str, Any]:
-    """Motion of a joint and its motors, samples last, as duals that no number of the robot changes.
-
-    Functions of NumPy then take numbers of the robot that are duals.
-    """
+    """Return the motion of a joint and its motors, samples last, as duals without derivatives."""
+    # NumPy functions of duals accept robot parameters that are duals, which those of arrays do not
     return {name: Dual(values, {}) for name, values in _arrays(signals, index).items()}
 
 
@@ -159,9 +159,9 @@ class MotorSystem(SystemOfEquations):
     """Equations of the motors of a joint with springs.
 
     Args:
-        robot: the robot, as its file has it.
-        index: of the joint.
-        sought: numbers of its actuator that are to be found; the others are taken as they are.
+        robot: robot as in its file.
+        index: index of the joint.
+        sought: unknown parameters of the actuator; the others keep their values.
     """
 
     def __init__(self, robot: Robot, index: int, sought: Sequence[Parameter] = ()) -> None:
@@ -173,13 +173,13 @@ class MotorSystem(SystemOfEquations):
         self.before = np.array([each.value for each in sought])
 
     def of_record(self, values: FloatArray, signals: Signals) -> Equations:
-        """See `SystemOfEquations.of_record`; the equations of those motors whose torque was recorded."""
+        """See `SystemOfEquations.of_record`; only motors with a recorded torque have equations."""
         index, count = self._index, len(self._sought)
         present = [
             each._replace(value=float(value)) for each, value in zip(self._sought, values, strict=True)
         ]
         carrying = apart(seeded(self._robot, present).joints[index]).actuator
-        with np.errstate(all="ignore"):  # numbers far off, from which the search comes back
+        with np.errstate(all="ignore"):  # a step of the search may go too far and is then shortened
             torques = predicted_torques(carrying, joint_motion(signals, index))
         slopes = tangent_of(torques, count, np.shape(value_of(torques)))
         measured = signals.tau_motor[:, index].T
@@ -215,15 +215,15 @@ def motor_systems(
     fit: Sequence[str],
     records: Sequence[Signals],
 ) -> Iterator[MotorSystem]:
-    """Yield the systems of joints with springs in which anything is to be identified.
+    """Yield the systems of joints with springs that have parameters to identify.
 
-    Numbers of springs that change no torque at all, since they but bound where these work, are passed over.
+    Spring parameters that change no torque, because they only bound the working range, are left out.
 
     Args:
-        robot: the robot.
-        joints: indices of those that were recorded.
+        robot: robot as in its file.
+        joints: indices of the recorded joints.
         fit: words and patterns, see `unknowns`.
-        records: of its motion.
+        records: conditioned recordings.
     """
     for index in joints:
         sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()

@@ -1,13 +1,13 @@
-"""Recordings compared with the robot: columns with wrong names, late torques, and their gain.
+"""Recordings compared with the robot: misnamed columns, delayed torques, and torque gains.
 
-`model_doubts` finds wrong units, turned signs, exchanged columns and motors before a fit, `delay` by how much
-torques are later than positions after it. `gains` asks whether all numbers are by one factor not those of
-the file.
+Before a fit, `model_doubts` finds wrong units and signs, exchanged columns and exchanged motors. After it,
+`delay` finds by how much torques lag behind positions, and `gains` finds joints whose parameters all differ
+from the file by one factor.
 
-Equations of motors are linear in inertias, dampings, friction and the sizes of springs: torques that read 3 %
-too large make all of these 3 % too large, and leave nothing. No motion tells such a gain from a joint whose
-numbers differ so from the file. What the file says of the links does: what springs carry by the numbers found
-is held against the torque that links of these masses need.
+Equations of motors are linear in inertias, dampings, friction and spring coefficients: torques that read 3 %
+too large make all of these 3 % too large, without a residual. No motion distinguishes such a gain from a
+joint whose parameters differ like that. The links of the file do: the identified spring torque is compared
+with the torque that these links require.
 """
 
 from __future__ import annotations
@@ -39,16 +39,17 @@ from vsacli.studies.measured.likely_causes import exchanged, likely_causes
 from vsacli.studies.measured.pairing import exactness, tame
 
 ELSEWHERE = 0.5
-"""Distance, over the size of the deflections, from which on they are on another branch."""
+"""Relative distance from deflections on the preload's branch above which deflections are on another one."""
 
 FOLLOWS_BETTER = 0.25
-"""Variance of a motor about what it may follow, over that about its joint, below which it does follow it."""
+"""Variance of a motor about another joint, relative to that about its own joint, below which it follows the
+other one."""
 
 FOLLOWS = 0.5
-"""The same over the variance of the followed joint."""
+"""Upper bound of the variance about the followed joint, relative to the variance of that joint."""
 
 RESTING = 1e-3
-"""Share of the predicted range below which a measured torque does not move."""
+"""Share of the predicted range below which a measured torque is constant."""
 
 ODD_GAINS: Mapping[str, float] = MappingProxyType(
     {
@@ -57,19 +58,20 @@ ODD_GAINS: Mapping[str, float] = MappingProxyType(
         "look as if the second were in degrees, or the first marked so": math.pi / 180,
     }
 )
-"""Gains of a motor's motion over its joint's, with the likely slip."""
+"""Ratios of a motor's motion to its joint's, by the likely mistake."""
 
 
 def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
     """Yield sentences on columns whose content does not fit their names.
 
-    Motors follow their joints, and torques what the robot file predicts, but for what is to be found.
+    Motors should follow their joints, and torques the predictions of the robot file, apart from the errors of
+    its parameters.
 
     Args:
-        robot: as its file has it.
-        joints: indices of those that were recorded.
-        record: as it was read.
-        signals: the same, conditioned.
+        robot: robot as in its file.
+        joints: indices of the recorded joints.
+        record: recording as read.
+        signals: conditioned recording.
     """
     sprung = [index for index in joints if robot.joints[index].actuator.sprung]
     sprung = [index for index in sprung if (TORQUE, index, MOTORS[0]) in record.columns]
@@ -83,7 +85,7 @@ def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: S
 
 
 def _followed(torques: Sequence[Agreement]) -> list[Agreement]:
-    """Torques with the columns whose predictions they follow, where columns look exchanged."""
+    """Return the torques, with the column whose prediction each follows if columns look exchanged."""
     found, units = list(torques), {torque.unit for torque in torques}
     if len(units) > 1 or len({torque.samples for torque in torques}) > 1:
         return found
@@ -95,7 +97,7 @@ def _followed(torques: Sequence[Agreement]) -> list[Agreement]:
 
 
 def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[str]:
-    """Motors behind springs that follow something else than their joint."""
+    """Yield sentences on motors behind springs that do not follow their joint."""
     stride = signals.filter.stride
     actuator, q = robot.joints[index].actuator, signals.q[::stride]
     for motor, follows in enumerate(actuator.has(VARIABLES["phi"])[: actuator.motor_count]):
@@ -116,13 +118,13 @@ def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> It
 
 
 def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
-    """Return whether a motor follows another joint much better than its own, given its variance."""
+    """Return whether a motor follows a joint much better than with the variance `own`."""
     about = float(np.var(theta - q))
     return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
 
 
 def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, float]]:
-    """Torques as measured beside those that the robot file predicts, and the gear ratio."""
+    """Yield the agreement of each motor's measured torque with its prediction, and the gear ratio."""
     system = MotorSystem(robot, index)
     equations = system.of_record(system.before, signals)
     joint = robot.joints[index]
@@ -177,7 +179,7 @@ def _agreement(
 
 
 def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
-    """Deflections that carry what they do on another branch than that of the preload."""
+    """Yield a sentence if most deflections are on another branch than that of the preload."""
     actuator = robot.joints[index].actuator
     if not actuator.commanded or actuator.opposite_preload is None:
         return
@@ -196,33 +198,34 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
 
 
 CERTAIN_DELAY = 4.0
-"""Standard errors from which on a delay is taken out; at 2, each twentieth record without any would be."""
+"""Delay in standard errors above which it is removed; at 2, one in twenty recordings would be shifted by
+chance."""
 
 WORTH_IT = 0.05
-"""Samples from which on it is worth it."""
+"""Delay in samples above which it is removed."""
 
 
 class Delay(NamedTuple):
     """The delay of the torques of a recording behind its positions.
 
     Attributes:
-        seconds: negative if they are ahead; NaN if it cannot be told.
-        standard_error: of that.
+        seconds: delay, s; negative if torques are early, NaN if unidentifiable.
+        standard_error: standard error of the delay, s.
     """
 
     seconds: float
     standard_error: float
 
     def matters(self, rate: float) -> bool:
-        """Return whether it is to be taken out of a record with this many samples a second."""
+        """Return whether the delay is to be removed from a recording with a sample rate in Hz."""
         size = abs(self.seconds)
         return size > CERTAIN_DELAY * self.standard_error and size * rate > WORTH_IT
 
 
 def delay(found: Sequence[Solution], signals: Signals) -> Delay:
-    """Return the one with which the equations of all motors hold best.
+    """Return the delay with which the equations of all systems hold best.
 
-    Torques that are late by d are tau(t - d) = tau(t) - d tau'(t): a further unknown of each system.
+    Torques delayed by d are tau(t - d) = tau(t) - d tau'(t), so that d is a further unknown of each system.
     """
     rates = np.gradient(signals.tau_motor, 1 / signals.rate, axis=0)
     beside = signals._replace(tau_motor=rates, noise=None)
@@ -237,7 +240,7 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
 
 
 def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tuple[float, float]]:
-    """Yield the delay with its standard error, unless nothing of the system was recorded."""
+    """Yield the delay and its standard error, unless the system has no equations."""
     equations, of_rates = found.equations(signals), found.equations(rates)
     if len(equations.measured):
         of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
@@ -247,7 +250,7 @@ def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tup
 
 
 def without_delay(signals: Signals, late: float) -> Signals:
-    """Return the same with torques that are earlier by this many seconds."""
+    """Return the recording with torques advanced by `late` seconds."""
     from scipy.interpolate import make_interp_spline
 
     torques = signals.tau_motor.copy()
@@ -258,20 +261,20 @@ def without_delay(signals: Signals, late: float) -> Signals:
 
 
 CERTAIN_FACTOR = 4.0
-"""Standard errors from which on a factor is not 1, or not another one."""
+"""Difference of a factor from 1, or from another factor, in standard errors, that is significant."""
 
 WITHIN = 3.0
-"""Standard errors, root mean square, by which numbers may be off from a common factor."""
+"""Largest rms deviation of parameters from a common factor, in standard errors."""
 
 
 class Factor(NamedTuple):
-    """A ratio of the result to the value of the file, with its standard error."""
+    """A ratio with its standard error."""
 
     value: float
     error: float
 
     def differs(self, other: float) -> bool:
-        """Return whether it is certainly another one."""
+        """Return whether the factor differs significantly from another one."""
         return abs(self.value - other) > CERTAIN_FACTOR * self.error
 
     def __str__(self) -> str:
@@ -279,11 +282,11 @@ class Factor(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """The judgement of the gain of a joint's torques.
+    """A finding on the gain of a joint's torques.
 
     Attributes:
-        sentence: on it.
-        doubtful: whether it is the torques, rather than the robot, that differ from the file.
+        sentence: finding as a sentence.
+        doubtful: whether the torques, rather than the robot, are likely wrong.
     """
 
     sentence: str
@@ -296,10 +299,10 @@ def gains(
     """Return findings on joints whose parameters all differ from the file by one factor.
 
     Args:
-        robot: as its file has it.
-        joints: indices of those that were recorded.
-        motors: results, joint by joint.
-        signals: records.
+        robot: robot as in its file.
+        joints: indices of the recorded joints.
+        motors: solutions, joint by joint.
+        signals: conditioned recordings.
     """
     factors = {each.system.title: factor for each in motors if (factor := _common_factor(each, signals))}
     if not factors:
@@ -313,7 +316,7 @@ def gains(
 
 
 def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None:
-    """Return the common factor of all parameters of a joint's motors and springs from the file, if any."""
+    """Return the common factor of a joint's motor and spring parameters over those of the file, if any."""
     equations = [found.equations(each) for each in signals]
     slopes = np.concatenate([each.slopes[:, found.free] for each in equations])
     predicted = np.concatenate([each.predicted for each in equations])
@@ -325,14 +328,14 @@ def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None
     share = split.q.T @ (predicted * weight)
     left = predicted * weight - split.q @ share
     if np.linalg.norm(left) > SEPARABLE * np.linalg.norm(share):
-        return None  # equations have other numbers, which a gain does not change: so it leaves something
+        return None  # other parameters contribute that a gain of the unknowns cannot change
     by_gain = np.zeros(slopes.shape[1])
     by_gain[split.kept] = np.linalg.solve(split.r, share) / split.scale[split.kept]
     return _fitted_factor(found, by_gain[identifiable], identifiable)
 
 
 def _fitted_factor(found: Solution, by_gain: FloatArray, identifiable: IndexArray) -> Factor | None:
-    """Return the factor with which numbers come nearest to the file, if they then agree with it."""
+    """Return the factor that brings parameters nearest to the file, if they then agree with it."""
     of_file = found.system.before[list(found.free)][identifiable]
     difference = found.fit.values[identifiable] - of_file
     covariance = found.fit.covariance[np.ix_(identifiable, identifiable)]
@@ -348,7 +351,7 @@ def _fitted_factor(found: Solution, by_gain: FloatArray, identifiable: IndexArra
 def _by_links(
     robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
 ) -> dict[str, Factor]:
-    """Return the torque of springs by identified values over that required by links of the file, by joint."""
+    """Return the ratio of identified spring torque to that required by the links of the file, by joint."""
     if without_links(robot, joints, (LINKS,), signals):
         return {}
     system = link_system(robot, (), motors)
@@ -366,7 +369,7 @@ def _by_links(
 
 
 def _of_link(equations: Equations, group: str, base: FloatArray, own: Sequence[int]) -> Equations:
-    """Equations of a joint's torque in units of that of its links; resistance of the joint is free."""
+    """Return equations of a joint whose unknowns are the ratio to the link torque, and its resistance."""
     here = equations.group == group
     slopes = equations.slopes[here]
     assert equations.errors is not None, "as of links"
@@ -382,7 +385,7 @@ def _of_link(equations: Equations, group: str, base: FloatArray, own: Sequence[i
 
 
 def _rotor_differs(robot: Robot, found: Solution) -> bool:
-    """Return whether numbers of motors are certainly others than in the file, not those of springs alone."""
+    """Return whether any motor parameter differs significantly from the file."""
     known = {str(each): each for each in parameters(robot)}
     return any(
         abs(found.fit.values[at] - found.system.before[number])
@@ -393,7 +396,7 @@ def _rotor_differs(robot: Robot, found: Solution) -> bool:
 
 
 def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bool) -> Gain:
-    """Return whether torques or robot differ, as far as the links, or the rotor, tell."""
+    """Return the finding for a factor: torques or robot are wrong, as far as links or rotor decide it."""
     size = "large" if factor.value > 1 else "small"
     alike = f"{found.system.title}: the numbers found are {factor} times those of the file, all of them"
     carried = f"what springs carry by these numbers is {by_links} times what links as in the file need"

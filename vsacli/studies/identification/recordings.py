@@ -1,8 +1,8 @@
-"""Recordings for identification: columns of CSV files, their faults, and all of them on one even grid.
+"""Recordings for identification: columns of CSV files, their faults, and all of them on one uniform grid.
 
-Columns with stamps of their own are read (`recorded_columns`) and judged one by one: faults that stop a fit,
-and doubts that make it unreliable. Then `read_record` resamples them. What only the robot's equations show is
-found in `recording_checks`.
+`recorded_columns` reads columns, each with its own time stamps. They are checked one by one for faults that
+prevent a fit and for faults that make it unreliable; then `read_record` resamples them. Faults that only the
+robot's equations reveal are found in `recording_checks`.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
 READINGS = (POSITION, MOTOR, TORQUE)
 """Required columns of a joint.
 
-Readings of sensors in a simulation, `q_measured` and so on, take precedence.
+Simulated sensor readings, `q_measured` and so on, take precedence.
 """
 
 Where: TypeAlias = tuple[str, int, int | None]
-"""Variable, index of the joint, and number of the motor or None."""
+"""Variable, joint index, and number of the motor or None."""
 
 
 class Column(NamedTuple):
     """A recorded column.
 
     Attributes:
-        name: in the file.
-        place: its variable, joint and motor.
-        time: of its samples, (samples,), s from the first row of the file on.
-        values: (samples,), SI units, joint side of the gear.
-        has_unit: whether a unit follows its name.
+        name: name in the file.
+        place: variable, joint and motor.
+        time: times of the samples, (samples,) in s since the first row of the file.
+        values: values, (samples,), SI units on the joint side of the gear.
+        has_unit: whether the file gives a unit after the name.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Column(NamedTuple):
 
 
 class _RobotColumns(NamedTuple):
-    """The possible columns of a robot; see `Jointed`."""
+    """The possible columns of a robot, as a `Jointed`."""
 
     robot: Robot
 
@@ -97,15 +97,15 @@ class _RobotColumns(NamedTuple):
 def recorded_columns(
     robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
 ) -> tuple[list[Column], tuple[str, ...], Source]:
-    """Return the columns that are needed, the names of the others, and the file as it was read.
+    """Return the required columns, the names of the others, and the file as read.
 
     Args:
-        robot: that was recorded.
-        path: the CSV file.
-        mapping: assignment of columns with other names.
+        robot: recorded robot.
+        path: path of the CSV file.
+        mapping: mapping of other column names.
 
     Raises:
-        InputError: there is none, a unit is one of something else, or times do not ascend.
+        InputError: no column is required, a unit does not fit its variable, or times do not ascend.
     """
     wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
     wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
@@ -129,7 +129,7 @@ def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
 
 
 def _torque_of_current(robot: Robot, signal: Measured) -> float:
-    """Return the factor of a column to torques, if it holds currents."""
+    """Return the factor that converts a column to torques if it holds currents, otherwise 1."""
     variable, joint, motor, *_ = signal.place
     if variable != CURRENT or motor is None:
         return 1.0
@@ -137,20 +137,21 @@ def _torque_of_current(robot: Robot, signal: Measured) -> float:
 
 
 FEWEST_SAMPLES = 200
-"""Numbers of a column that are worth a fit: some seconds at 50 Hz."""
+"""Smallest number of samples in a column for a fit: four seconds at 50 Hz."""
 
 NOISY = 1e-7
-"""Noise of a torque, over its range, from which on equal readings are no motion at rest."""
+"""Noise of a torque, relative to its range, above which equal readings are not a robot at rest."""
 
 CUT_SAMPLES = 10
-"""Readings at the very largest value from which on they are no accident."""
+"""Number of readings at the extreme value above which they are not an accident."""
 
 CUT_SHARE = 5.0
-"""The same, over those at the next value below: 2.4 at the crest of a sine in steps, without noise."""
+"""Ratio of readings at the extreme value to those at the next one for a cut-off; the crest of a quantized
+sine without noise has 2.4."""
 
 
 def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
-    """Yield sentences on unusable recordings."""
+    """Yield sentences on faults that make columns unusable."""
     yield from _together((column.name, clause) for column in columns for clause in _stamp_clauses(column))
     yield from _together(
         (column.name, clause)
@@ -211,7 +212,7 @@ def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
 
 
 def _still(columns: Sequence[Column], joint: str) -> Iterator[str]:
-    """Columns of a joint that stand still: all of them, or while others move."""
+    """Yield sentences on a joint that does not move, or on constant columns while others change."""
     still = [column for column in columns if len(column.values) and np.ptp(column.values) == 0]
     moving = [column for column in columns if column not in still]
     if still and not moving:
@@ -226,7 +227,7 @@ def _still(columns: Sequence[Column], joint: str) -> Iterator[str]:
 
 def _doubtful_clauses(column: Column) -> Iterator[str]:
     is_torque = column.place[0] == TORQUE
-    inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps where a motion begins and ends
+    inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps at both ends of a motion
     time, values = column.time[inner], column.values[inner]
     yield from (clause for _, clause in column_faults(time, time, values))
     if is_torque:
@@ -234,7 +235,7 @@ def _doubtful_clauses(column: Column) -> Iterator[str]:
 
 
 def _cut(column: Column) -> Iterator[str]:
-    """Noisy readings that come to an end at the same largest, or smallest, value again and again."""
+    """Yield sentences on noisy readings that saturate at the largest or smallest value."""
     quantization = Quantization.of(column.time, column.values)
     if not np.median(quantization.noise) > NOISY * np.ptp(column.values):
         return
@@ -252,26 +253,26 @@ def _cut(column: Column) -> Iterator[str]:
 
 
 INTERPOLATION = 3
-"""Degree of the spline between samples that are not on the grid."""
+"""Degree of the spline that resamples a column."""
 
 EVEN = 1e-6
-"""Deviation of stamps from even ones, in steps, that needs no interpolation."""
+"""Deviation of time stamps from the grid, in sampling intervals, below which no interpolation is needed."""
 
 
 class Record(NamedTuple):
-    """A record on an even grid, SI units, joint side of the gears.
+    """A recording on a uniform grid, in SI units on the joint side of the gears.
 
     Attributes:
-        path: of the file.
-        source: the file as it was read.
-        time: (samples,), s, from the first row of the file on.
-        q: positions of the joints, (samples, joints), NaN throughout where there are none.
-        theta: positions of the motors, (samples, joints, 2), as above; of a motor that moves with its joint
-            the joint's if it was not recorded.
-        tau_motor: torques of the motors, (samples, joints, 2).
-        columns: names in the file, by variable.
-        unused: names of columns that were not needed.
-        doubts: likely faults of it, sentences.
+        path: path of the file.
+        source: file as read.
+        time: times, (samples,) in s since the first row of the file.
+        q: joint positions, (samples, joints); columns without data are NaN.
+        theta: motor positions, (samples, joints, 2), NaN without data; the joint position for a motor of a
+            joint without springs, unless its own was recorded.
+        tau_motor: motor torques, (samples, joints, 2).
+        columns: names in the file, by variable, joint and motor.
+        unused: names of columns that were not required.
+        doubts: likely faults, as sentences.
     """
 
     path: str
@@ -286,16 +287,16 @@ class Record(NamedTuple):
 
 
 def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED) -> Record:
-    """Read a record, a CSV file with columns as `vsacli export` names them, at rates of their own.
+    """Read a recording, a CSV file with columns named as by `vsacli export`, each at its own rate.
 
     Args:
-        robot: that was recorded.
-        path: the file.
-        mapping: assignment of columns with other names.
+        robot: recorded robot.
+        path: path of the file.
+        mapping: mapping of other column names.
 
     Raises:
-        InputError: there is no such column, a unit is one of something else, times do not ascend, or there
-            are faults with which nothing can be fitted.
+        InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
+            prevent a fit.
     """
     columns, unused, source = recorded_columns(robot, path, mapping)
     faults = list(stopping_faults(columns, robot))
@@ -326,10 +327,10 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
 
 
 def check_distinct(records: Sequence[Record]) -> None:
-    """Refuse a record that is there twice: the same noise would seem to confirm itself.
+    """Check that recordings differ; a copy would confirm its own noise.
 
     Raises:
-        InputError: two have the same numbers, whatever their files are called.
+        InputError: two recordings have the same values.
     """
     for before, record in combinations(records, 2):
         pairs = (before.q, record.q), (before.theta, record.theta), (before.tau_motor, record.tau_motor)
@@ -339,7 +340,7 @@ def check_distinct(records: Sequence[Record]) -> None:
 
 
 def _grid(columns: Sequence[Column]) -> FloatArray:
-    """Return even times at the rate of the fastest column, over the span of all columns."""
+    """Return uniform times at the rate of the fastest column, over the time span common to all columns."""
     fastest = max(columns, key=lambda column: (len(column.time) - 1) / np.ptp(column.time))
     step = float(np.ptp(fastest.time)) / (len(fastest.time) - 1)
     start = max(float(column.time[0]) for column in columns)
@@ -348,7 +349,7 @@ def _grid(columns: Sequence[Column]) -> FloatArray:
 
 
 def _on_grid(column: Column, time: FloatArray) -> FloatArray:
-    """Values at the times of the grid: samples if they are there, else a spline through them."""
+    """Return values at the times of the grid: samples if they lie on it, otherwise a spline through them."""
     from scipy.interpolate import make_interp_spline
 
     step = float(time[1] - time[0])
@@ -360,10 +361,10 @@ def _on_grid(column: Column, time: FloatArray) -> FloatArray:
 
 
 def complete_joints(robot: Robot, record: Record) -> tuple[int, ...]:
-    """Indices of the joints of which all was recorded.
+    """Return the indices of the joints with all required columns.
 
     Raises:
-        InputError: of a joint some columns are there and others are missing, or no joint is complete.
+        InputError: a joint with motor columns lacks others, or no joint is complete.
     """
     found, problems = [], []
     for index, joint in enumerate(robot.joints):

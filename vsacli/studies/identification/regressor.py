@@ -1,11 +1,11 @@
 """The regressor Y of tau_e = Y pi, with pi the inertial parameters of all links, and its base parameters.
 
-Standard inertial parameters are ten of each link, in its frame: m; m c, with c the centre of mass; and the
+Each link has ten standard inertial parameters, in its frame: m; m c, with c the center of mass; and the
 inertia tensor about the frame's origin (W. Khalil, E. Dombre, Modeling, Identification and Control of Robots,
-2002, section 9.2). Base parameters are those combinations that torques tell apart: columns of Y at random
-motions are taken one after the other, base to tip; one that is a combination of those before it is regrouped
-into them (M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of Robotic
-Systems 8 (1991)). So each keeps the name of the parameter that it begins with, whatever rounding does.
+2002, section 9.2). Base parameters are the combinations that torques distinguish: columns of Y at random
+motions are processed one after the other, base to tip; a column that is a combination of previous ones is
+regrouped into them (M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
+Robotic Systems 8 (1991)). So each base parameter is named after its first parameter, in spite of rounding.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.independence import first_independent, in_words, shares_of
 
 SYMBOLS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
-"""Symbols of the parameters of a link, in their order."""
+"""Symbols of the parameters of a link, in order."""
 
 UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
-"""Units of these."""
+"""Units of the parameters of a link."""
 
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 """Entries of a symmetric tensor in the order of the parameters."""
 
 
 def parameters_of(link: Link) -> FloatArray:
-    """Standard inertial parameters of a link, (10,)."""
+    """Return the standard inertial parameters of a link, (10,)."""
     com = np.array(link.com)
     about_origin = link.inertia.tensor + link.mass * steiner(com)
     return np.concatenate(([link.mass], link.mass * com, _entries(about_origin)))
 
 
 def link_of(parameters: FloatArray) -> Link:
-    """Return the link of standard inertial parameters, (10,), with a mass.
+    """Return the link with standard inertial parameters, (10,).
 
     Raises:
-        InvalidRecordError: its inertia about its centre of mass has a negative eigenvalue, or its mass is not
+        InvalidRecordError: the inertia about the center of mass has a negative eigenvalue, or the mass is not
             positive.
     """
     mass, com = float(parameters[0]), parameters[1:4] / parameters[0]
@@ -71,7 +71,7 @@ def names(robot: Robot) -> list[str]:
 
 
 def steiner(point: FloatArray) -> FloatArray:
-    """Inertia about the origin of a unit of mass at a point, (3, 3)."""
+    """Return the inertia about the origin of a unit mass at a point, (3, 3)."""
     return np.asarray(point @ point * np.eye(3) - np.outer(point, point))
 
 
@@ -93,18 +93,18 @@ _POINT_INERTIAS = (
     SymmetricTensor(1, 0, 1, 0, 0, 0),
     SymmetricTensor(1, 1, 0, 0, 0, 0),
 )
-"""About the origin, of a unit of mass at the unit distance along each axis."""
+"""Inertias about the origin of a unit mass at unit distance along each axis."""
 
 
 @dataclass(frozen=True)
 class Regressor(RowKernel):
-    """The recursion (36)-(58) of links with one unit of one parameter each; the rest of the robot is without.
+    """The recursion (36)-(58), run once per parameter with one unit of it and no other inertia.
 
-    Inputs are q, dq, ddq of the joints; outputs the torques by joint and parameter. Traced, what the runs
-    have in common is computed once, and derivatives of torques not at all.
+    Inputs are q, dq, ddq of the joints; outputs are the torques by joint and parameter. Tracing computes
+    common parts of the runs once and omits derivatives of torques.
 
     Attributes:
-        robot: whose rows, base and gravity count.
+        robot: robot that gives the DH rows, the base and gravity.
     """
 
     robot: Robot
@@ -116,7 +116,7 @@ class Regressor(RowKernel):
 
     @property
     def results(self) -> RowLayout:
-        """Y, joint by joint."""
+        """Regressor Y, (joints, 10 joints)."""
         joints = len(self.robot.joints)
         return RowLayout({"Y": (joints, len(SYMBOLS) * joints)})
 
@@ -129,11 +129,11 @@ class Regressor(RowKernel):
         return [torque for of_joint in zip(*columns, strict=True) for torque in of_joint]
 
     def _of_link(self, moving: int, given: Motion) -> Iterator[list[Scalar]]:
-        """Torques of the joints by each parameter of a link."""
+        """Yield the torques of the joints per unit of each parameter of a link."""
         alone = self._torques(moving, given, 1, ZERO, _NO_INERTIA)
         yield alone
         for axis, inertia in zip(_AXES, _POINT_INERTIAS, strict=True):
-            # a unit of mass there, less what it has of m and of the inertia about the origin
+            # torque per unit of m c: a unit mass at c = axis, minus its shares of m and of the inertia
             central = SymmetricTensor(*(-entry for entry in inertia))
             yield list(map(sub, self._torques(moving, given, 1, axis, central), alone))
         for place in range(len(_NO_INERTIA)):
@@ -143,7 +143,7 @@ class Regressor(RowKernel):
     def _torques(
         self, moving: int, given: Motion, mass: int, com: Vector, inertia: SymmetricTensor
     ) -> list[Scalar]:
-        """Torques of the joints by a link alone; joints beyond it bear nothing."""
+        """Return the torques of all joints for one link alone; joints beyond it carry nothing."""
         joints = self.robot.joints
         *before, last = [
             link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, damping=0)
@@ -159,13 +159,13 @@ class Regressor(RowKernel):
 
 
 def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-    """Y(q, q', q'') with tau_e = Y pi, friction and damping left out.
+    """Return Y(q, q', q'') with tau_e = Y pi, without friction and damping.
 
     Args:
-        robot: whose rows, base and gravity count.
-        q: positions of the joints, (samples, joints).
-        dq: their velocities.
-        ddq: their accelerations.
+        robot: robot that gives the DH rows, the base and gravity.
+        q: joint positions, (samples, joints).
+        dq: joint velocities, (samples, joints).
+        ddq: joint accelerations, (samples, joints).
 
     Returns:
         Y, (joints, 10 joints, samples), N m (N) per kg, kg m, kg m^2.
@@ -176,43 +176,44 @@ def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> F
 
 
 SAMPLES_A_LINK = 30
-"""Random poses, speeds and accelerations: three for each parameter, and a row of each joint."""
+"""Random samples of position, velocity and acceleration per link: three per parameter; each sample gives one
+row per joint."""
 
 SEED = 0
 """Seed of the random motions, so that the same robot has the same base parameters each time."""
 
 STRUCTURAL = 1e-9
-"""Distance of a column from a combination of others, over its norm, below which it is one. Of the robots that
-come along dependent columns are below 1e-15, the others above 0.3."""
+"""Relative distance of a column from the span of others below which it is dependent. For the bundled robots,
+dependent columns are below 1e-15, the others above 0.3."""
 
 PREFERRED = ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my", "Iyy", "mz", "m")
-"""Parameters of a link in the order in which they are kept: with revolute joints the last three are regrouped
-into the link before."""
+"""Parameters of a link in the order in which they are kept: with revolute joints, the last three are
+regrouped into the previous link."""
 
 
 class BaseParameters(NamedTuple):
     """Combinations of the standard parameters of all links.
 
     Attributes:
-        kept: standard parameter that each begins with, (base,), ascending.
-        shares: of all standard parameters in each, (base, parameters).
+        kept: index of the first standard parameter of each combination, (base,), ascending.
+        shares: factors of all standard parameters in each combination, (base, parameters).
     """
 
     kept: IndexArray
     shares: FloatArray
 
     def of(self, parameters: FloatArray) -> FloatArray:
-        """Values from standard parameters, (..., parameters)."""
+        """Return base parameters, (..., base), from standard parameters, (..., parameters)."""
         values: FloatArray = parameters @ self.shares.T
         return values
 
     def names(self, names: Sequence[str]) -> list[str]:
-        """Return the name of the first parameter of each; with a star if others are regrouped into it."""
+        """Return the name of each combination's first parameter, with a star if it has others."""
         alone = np.count_nonzero(self.shares, axis=1) == 1
         return [f"{names[at]}{'' if one else '*'}" for at, one in zip(self.kept, alone, strict=True)]
 
     def words(self, place: int, names: Sequence[str]) -> str:
-        """Return the sum that one stands for, e.g. `shoulder.Izz + 0.09 elbow.m`."""
+        """Return a combination as a sum in words, e.g. `shoulder.Izz + 0.09 elbow.m`."""
         first, factors = int(self.kept[place]), self.shares[place]
         others = ((int(at), float(factors[at])) for at in np.flatnonzero(factors) if at != first)
         return in_words([(first, 1.0), *others], names)

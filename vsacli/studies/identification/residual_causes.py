@@ -1,7 +1,7 @@
-"""Causes that could explain residuals: a sensor that is off, or a law missing in the file.
+"""Possible causes of residuals: a wrong sensor, or a law that is missing in the file.
 
-Each is some columns that would be added to the equations if it were true. Friction and springs of unknown
-laws are sums of a few functions of velocity and deflection, enough to see that something is missing.
+Each cause is a set of columns to add to the equations. Unknown laws of friction and springs are sums of a few
+functions of velocity and deflection, which suffice to detect that something is missing.
 """
 
 from __future__ import annotations
@@ -23,42 +23,40 @@ from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recordings import MOTOR, TORQUE
 
 STEP = 1e-4
-"""Error of a position, rad (m), with which the search for it begins."""
+"""Initial error of a position, rad (m), in the search for it."""
 
 FARTHEST = 0.1
-"""Largest error of a position, rad (m), that is plausible: six degrees are seen when an arm is set up."""
+"""Largest plausible error of a position, rad (m): six degrees are noticed when an arm is set up."""
 
 SMALL = 0.1
-"""Largest bias of a torque that is plausible, over the largest that was measured, and half of the largest
-error of a gain. Larger ones are told as columns that are something else; otherwise a large one is a stopgap
-for a spring of another law."""
+"""Largest plausible bias of a torque relative to the largest measured torque, and half of the largest
+plausible gain error. Other checks find larger ones; here a large one would mask a spring with another law."""
 
 PASSES = 3
-"""Times the error is found; the second differs from the third by less than its standard error."""
+"""Number of estimates of the error; the second differs from the third by less than its standard error."""
 
 SLOW = 0.1
-"""Share of the largest speed within which Stribeck's friction has fallen by a factor e: of bearings and gears
-it falls within the slowest tenth of their speed (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit,
-Automatica 30 (1994))."""
+"""Share of the largest speed at which Stribeck friction has fallen by a factor e: in bearings and gears it
+falls within the slowest tenth of their speed (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica
+30 (1994))."""
 
 DEGREE = 4
 """Degree of the polynomial of the deflection.
 
-Together with the linear and cubic terms of most files, other kinds of hardening or softening springs show in
-terms of even degree.
+Most files have linear and cubic terms; terms of even degree detect other kinds of hardening and softening.
 """
 
 
 class Cause(NamedTuple):
-    """Something that is not in the equations.
+    """A possible cause of residuals that is not in the equations.
 
     Attributes:
-        name: the motor, or link, whose equations it changes.
-        words: sentence with places for name and size; of several columns it has no size.
-        columns: of each record, (rows, columns).
-        unit: of the size.
-        largest: size up to which it is plausible.
-        neutral: size added to the result: a gain is a ratio to 1.
+        name: motor or link whose equations it changes.
+        words: sentence with placeholders for name and size; a cause with several columns has no size.
+        columns: columns for each recording, (rows, columns).
+        unit: unit of the size.
+        largest: largest plausible size.
+        neutral: value added to the size in the sentence: 1 for a gain, which is a ratio.
     """
 
     name: str
@@ -88,10 +86,10 @@ def causes(
     """Return possible causes of residuals of a joint's motors, or of all links.
 
     Args:
-        robot: the robot.
+        robot: robot as in its file.
         found: solution of the equations.
-        records: to which they were fitted.
-        equations: of these, at the result.
+        records: fitted recordings.
+        equations: equations of the recordings at the solution.
     """
     if found.system.title == LINKS:
         return list(_of_links(robot, records, equations))
@@ -108,7 +106,7 @@ def _of_motors(
     recorded = {name: motor for motor, name in enumerate(names) if name in found.fit.residual_rms}
     behind = joint.actuator.has(VARIABLES["phi"])[: len(names)]
     deflections = [_deflections(behind, each, index) for each in records]
-    pulls = np.where(np.mean(np.hstack(deflections), axis=1) < 0, -1.0, 1.0)  # of a pair, against each other
+    pulls = np.where(np.mean(np.hstack(deflections), axis=1) < 0, -1.0, 1.0)  # opposite signs in a pair
     pulled = [pulls[:, None] * each for each in deflections]
     alike: dict[int, list[Cause]] = {}
     for name, motor in recorded.items():
@@ -131,7 +129,7 @@ def _of_motors(
 
 
 def _deflections(behind: Sequence[bool], signals: Signals, index: int) -> FloatArray:
-    """Deflections of motors behind a spring, of others the positions, (motors, samples)."""
+    """Return the deflections of motors behind a spring and the positions of others, (motors, samples)."""
     theta, q = signals.theta[:, index, : len(behind)].T, signals.q[:, index]
     return np.where(np.array(behind)[:, None], theta - q, theta)
 
@@ -163,11 +161,12 @@ def _gain(name: str, own: Sequence[BoolArray], equations: Sequence[Equations]) -
 def _frictions(
     name: str, own: Sequence[BoolArray], records: Sequence[Signals], speeds: Sequence[FloatArray]
 ) -> Iterator[Cause]:
-    """Quadratic friction, and dry and Stribeck's: apart, since fewer columns show less more surely."""
+    """Yield quadratic friction, then dry and Stribeck friction."""
+    # separate causes, since a test with fewer columns detects smaller effects
     largest = max(float(np.max(np.abs(each), initial=0.0)) for each in speeds) or 1.0
     scaled = [each / largest for each in speeds]
     yield _law(FRICTION, name, own, records, [(v * np.abs(v))[None] for v in scaled])
-    dry = [np.sign(v) for v in scaled]  # as of the file, so that it adds nothing where that is fitted
+    dry = [np.sign(v) for v in scaled]  # the law of the file, so that it adds nothing where that is fitted
     falling = [sign * np.exp(-np.abs(v) / SLOW) for sign, v in zip(dry, scaled, strict=True)]
     yield _law(FRICTION, name, own, records, [np.stack(each) for each in zip(dry, falling, strict=True)])
 
@@ -179,7 +178,7 @@ def _law(
     records: Sequence[Signals],
     terms: Sequence[FloatArray],
 ) -> Cause:
-    """Return a cause by functions of the motion, (terms, samples) a recording, filtered like all columns."""
+    """Return a cause from functions of the motion, (terms, samples) for each recording, filtered."""
     columns = []
     for there, signals, of_record in zip(own, records, terms, strict=True):
         rows = np.zeros((len(there), len(of_record)))
@@ -190,12 +189,12 @@ def _law(
 
 
 def _polynomial_terms(positions: Sequence[FloatArray], place: int, sign: float) -> list[FloatArray]:
-    """Legendre polynomials of one of some positions over the range of all, (terms, samples) of each record.
+    """Return Legendre polynomials of one position over the range of all, (terms, samples) per recording.
 
     Args:
-        positions: (positions, samples) of each record.
-        place: of the one.
-        sign: with which the torque acts.
+        positions: positions in each recording, (positions, samples).
+        place: index of the position.
+        sign: sign with which the torque acts.
     """
     low, high = min(float(each.min()) for each in positions), max(float(each.max()) for each in positions)
     half = (high - low) / 2 or 1.0
@@ -206,10 +205,10 @@ def _polynomial_terms(positions: Sequence[FloatArray], place: int, sign: float) 
 def _by_zero(
     found: Solution, records: Sequence[Signals], equations: Sequence[Equations], index: int, motor: int
 ) -> list[FloatArray]:
-    """Return the effect of an error of a motor's position on the prediction, over that error, (rows, 1).
+    """Return the change of the prediction per error of a motor's position, (rows, 1) for each recording.
 
-    Springs are not linear in it, and the numbers found are wrong by it: so it is a secant over the error that
-    fits best, with the numbers that go with it.
+    Springs are nonlinear in the error, and it makes identified parameters wrong. So the slope is a secant
+    over the best-fitting error, at the parameters that belong to it.
     """
     values, error = found.predicting, STEP
     columns: list[FloatArray] = []

@@ -1,4 +1,4 @@
-"""A recording compared with the result it was meant to be: when it begins, and how far apart both are."""
+"""Comparison of a recording with a result: alignment in time, and the error figures of each signal."""
 
 from __future__ import annotations
 
@@ -30,14 +30,13 @@ from vsacli.studies.measured.measured_columns import (
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, interpolated
 
 POSITIONS = ("q", "theta")
-"""Variables by which a recording is aligned if it has any: torques depend on the model, positions were
-commanded."""
+"""Variables preferred for the alignment: positions were commanded, while torques depend on the model."""
 
 OTHER_UNIT = 100
-"""Ratio of durations of recording and result from which the times may be in another unit."""
+"""Ratio of the durations of recording and result above which the times may be in another unit."""
 
 SAME_LAG = 0.2
-"""Relative distance of lags up to which they are one, which the clock may have."""
+"""Relative difference up to which lags are equal and may be an offset between clocks."""
 
 
 def compare(
@@ -50,10 +49,11 @@ def compare(
 
     Args:
         result: a result or simulation, or the path of its file.
-        recording: a CSV file with a column `time` and columns named as `vsacli export` names them, at times
-            of its own; a unit in brackets may follow a name. Cells may be empty where a column has no sample.
-        begins_at: when the result begins, s from the first row of the recording; looked for if None.
-        columns: a file with the mapping of columns with other names.
+        recording: CSV file with a column `time` and columns named as by `vsacli export`, at its own times; a
+            unit in brackets may follow a name. Cells may be empty where a column has no sample.
+        begins_at: time in the recording at which the result begins, s since the first row; found from the
+            signals if None.
+        columns: file that maps other column names.
 
     Raises:
         InputError: the recording has no column of the result or a wrong unit, its times do not ascend, it
@@ -99,7 +99,7 @@ def compare(
 
 
 def _variables(result: StoredResult) -> dict[str, Variable]:
-    """Variables by their plain names; of a simulation the actual values, not the commanded ones."""
+    """Return the variables by plain name; for a simulation, actual values instead of commanded ones."""
     found: dict[str, Variable] = {}
     for name in result.variables:
         plain = name.removesuffix(measured("")).removesuffix(actual(""))
@@ -117,7 +117,7 @@ def _most_direct(recorded: Recording) -> tuple[Recording, list[str]]:
 
 
 def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatArray]:
-    """Times and values of a signal, without the rows in which it has none."""
+    """Return times and values of a signal, without rows in which it has none."""
     there = np.isfinite(signal.values)
     if np.count_nonzero(there) < FEWEST_SAMPLES and not there.all():
         message = f"column {signal.column!r} has {np.count_nonzero(there)} numbers; leave it out"
@@ -126,7 +126,7 @@ def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatAr
 
 
 def _interpolated(result: StoredResult, signals: Sequence[Measured]) -> list[Computed]:
-    """Return each computed signal as a function of the time from the beginning of the result."""
+    """Return each computed signal as a function of the time since the start of the result."""
     found, time = [], result.time - result.time[0]
     names = {signal.place.variable for signal in signals}
     stored = {name: np.asarray(result.read(name), dtype=float) for name in names}
@@ -156,12 +156,12 @@ def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path)
 
 
 def _group(signal: Measured) -> tuple[str, str]:
-    """Columns of a group may have been exchanged for each other."""
+    """Return the key of a group of columns that may have been exchanged with each other."""
     return signal.place.variable, signal.place.unit
 
 
 def _other_unit(pairing: Pairing) -> str:
-    """Return the doubt that times are in another unit than seconds, by the ratio of durations."""
+    """Return a hint that times may not be in seconds, if the durations differ much; otherwise ""."""
     lasts = float(pairing.time[-1])
     if 1 / OTHER_UNIT < lasts / pairing.duration < OTHER_UNIT:
         return ""
@@ -170,7 +170,7 @@ def _other_unit(pairing: Pairing) -> str:
 
 
 def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
-    """Return the part of the result that the recording covers, s."""
+    """Return the duration of the part of the result that the recording covers, s."""
     covered = min(float(time[-1]), duration) - max(float(time[0]), 0.0)
     rows = np.count_nonzero((time >= 0) & (time <= duration))
     if rows < FEWEST_SAMPLES:
@@ -185,7 +185,7 @@ def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
 def _agreements(
     result: StoredResult, recorded: Recording, pairings: Sequence[Pairing], alignment: Alignment
 ) -> tuple[Agreement, ...]:
-    """Return the comparison of every column with the result."""
+    """Return the agreement of every column with the result."""
     groups = [_group(signal) for signal in recorded.signals]
     places = exchanged_places(pairings, groups, alignment.begins_at)
     followed = [
@@ -246,7 +246,7 @@ def _alignment_notes(alignment: Alignment) -> Iterator[str]:
 
 
 def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]:
-    """Yield the note that all signals but positions lag equally, as with a joint off its command."""
+    """Yield a note if all signals but positions lag equally, as if joints did not follow their commands."""
     others = [signal for signal in signals if not signal.variable.startswith(POSITIONS)]
     lags = [signal.lag for signal in others if math.isfinite(signal.lag)]
     middle = float(np.median(lags)) if lags else math.nan

@@ -1,4 +1,4 @@
-"""Agreement of measured signals with computed ones: figures of each, and the report as text and as JSON."""
+"""Agreement of measured with computed signals: error figures of each, and the report as text and as JSON."""
 
 from __future__ import annotations
 
@@ -14,32 +14,31 @@ from vsacli.base.tables import ReportText
 from vsacli.documents.source import Source
 
 Still: TypeAlias = Literal["computed", "measured"]
-"""The signal that does not move beyond rounding or noise."""
+"""Signal that does not change beyond rounding or noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Agreement(Published):
-    """Measured minus computed, over the samples of the recording for which something was computed.
+    """The agreement of a measured with a computed signal; errors are measured minus computed values.
 
     Attributes:
-        column: of the recording.
-        variable, joint, motor: of the result; motor is None for variables of joints.
-        unit: of the figures.
-        samples: how many were compared.
-        rms: root mean square of the error.
-        share: that, relative to the root mean square of the result.
-        worst, worst_time: largest error in size, with its sign, and when, s from the beginning of the result.
-        offset, gain: of the straight line measured = offset + gain computed, at its lag.
-        lag: how much later than the others it follows best, s.
-        correlation: of both, at the lag.
-        time, computed, measured: (samples,) of all that.
-        offset_error, gain_error, lag_error: standard errors. These, and what they are of, are NaN where the
-            samples do not determine them, as of signals that hold still.
-        follows: column whose computed values it follows instead of its own, if columns are exchanged.
-        still: "computed" if that does not move beyond rounding or the noise of the recording, "measured" if
-            only
-            the recording does not; None if both move.
-        left_out: samples far from all others, without which the line was found.
+        column: column of the recording.
+        variable, joint, motor: place in the result; motor is None for variables of joints.
+        unit: unit of the figures.
+        samples: number of compared samples.
+        rms: rms error.
+        share: rms error relative to the rms computed value.
+        worst, worst_time: error of largest size, with its sign, and its time, s since the result's start.
+        offset, gain: coefficients of the line measured = offset + gain computed, at the lag.
+        lag: delay of the measured signal against the alignment of all signals, s.
+        correlation: correlation of measured and computed values at the lag.
+        time, computed, measured: times and values of the compared samples, (samples,).
+        offset_error, gain_error, lag_error: standard errors. A value and its error are NaN if the samples do
+            not determine them, for example for constant signals.
+        follows: column whose computed values the signal follows instead of its own, if columns are exchanged.
+        still: "computed" if the computed signal does not change beyond rounding or the noise of the
+            recording, "measured" if only the recording does not; None if both change.
+        left_out: number of outliers that the line fit ignores.
     """
 
     column: str
@@ -84,7 +83,7 @@ def straight_line(computed: FloatArray, measured: FloatArray) -> tuple[float, fl
 
 
 SHOWN_LAG = 5e-4
-"""Lag, s, from which on it may be one of clocks."""
+"""Smallest common lag, s, that is reported as a possible offset between clocks."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +92,14 @@ class Comparison(Published):
 
     Attributes:
         result, recording: paths of the files.
-        begins_at: time of the recording at which the result begins, s from its first sample.
-        begins_at_error: standard error of that, s; NaN if it was given.
-        found: whether that was found from the signals.
-        duration: of the result, s.
-        compared: how much of it the recording covers, s.
-        signals: a record of each column that was compared.
-        notes: likely slips, and columns not compared.
-        sources: the recording as it was read; not in JSON.
+        begins_at: time in the recording at which the result begins, s since the first sample.
+        begins_at_error: standard error of `begins_at`, s; NaN if it was given.
+        found: whether `begins_at` was found from the signals.
+        duration: duration of the result, s.
+        compared: duration of the part that the recording covers, s.
+        signals: agreement of each compared column.
+        notes: likely mistakes, and columns that were not compared.
+        sources: recording as read; not in JSON.
     """
 
     result: str
@@ -126,7 +125,7 @@ class Comparison(Published):
         return str(self.as_text())
 
     def as_text(self) -> ReportText:
-        """Return the report in its parts."""
+        """Return the report in parts."""
         return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
 
     def _headline(self) -> str:

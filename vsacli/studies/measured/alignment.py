@@ -1,11 +1,11 @@
 """Start of the computed motion in a recording: the shift at which measured signals follow computed ones.
 
-Clocks of a laboratory start before the motion, and a recording may end before it or be cut out of its middle.
-Two steps find the shift. A search over all shifts takes the one at which the columns together leave least
-unexplained (`likeness.py`), each column's part of which is bounded. Then each column says by how much it lags
-behind that shift, with offset and gain of its own (`line_fit.py`), and the columns that agree are averaged,
-weighted by their standard errors. So neither offsets, units and signs nor a minority of columns that are late
-or exchanged move the result.
+Laboratory clocks start before the motion, and a recording may end before it or be cut out of its middle. The
+shift is found in two steps. A search over all shifts selects the one at which the columns together leave the
+smallest unexplained part (`pairing.py`); the part of each column is bounded. Then the lag of each column
+behind that shift is fitted, with its own offset and gain (`line_fit.py`), and the lags of columns that agree
+are averaged, weighted by their standard errors. So neither offsets, units and signs nor a minority of delayed
+or exchanged columns affect the result.
 """
 
 from __future__ import annotations
@@ -30,41 +30,40 @@ from vsacli.studies.measured.pairing import (
 )
 
 MOST_POINTS = 200_000
-"""Points of the grid on which the shift is looked for first; the computed signal is known between them."""
+"""Largest number of grid points of the first search; refinement evaluates the signal between them."""
 
 EXPLAINED = 0.5
 """Share of the variance that the best shift must explain in half of the columns."""
 
 FEWEST_COVERED = 0.5
-"""Share of the result, or of the recording if that is shorter, over which both must overlap."""
+"""Smallest overlap, as a share of the result or of the recording, whichever is shorter."""
 
 AS_GOOD = 0.5
-"""Difference of the logarithms of what two shifts leave unexplained, up to which one is as good as the
-other."""
+"""Difference in the log of the unexplained part up to which two shifts are equally good."""
 
 OWN_WIDTH = 0.05
-"""Share of the duration around a shift that belongs to the same minimum."""
+"""Distance between shifts, as a share of the duration, within which they belong to the same minimum."""
 
 MOST_CANDIDATES = 5
-"""Minima of the search that are looked at closely."""
+"""Number of minima of the search that are refined."""
 
 LONGEST_STEP = 3.0
-"""Steps between samples of a column, in usual ones, beyond which nothing is known between them."""
+"""Gap between samples of a column, in median intervals, that is not interpolated."""
 
 ROUNDS = 3
-"""Rounds in which the columns vote on their lag; the second answer hardly differs from the first."""
+"""Number of rounds that estimate the common lag; the second hardly differs from the first."""
 
 APART = 3.5
-"""Distance from the middle, in deviations, from which on a column does not count."""
+"""Distance from the median, in standard deviations, from which on a column is ignored."""
 
 
 class Alignment(NamedTuple):
     """The place of the result in the recording.
 
     Attributes:
-        begins_at: time of the recording, s, at which the result begins; negative if that is before it.
-        error: standard error, s; NaN if it was given, or no column says.
-        others: further times that explain nearly as much, as in periodic motions.
+        begins_at: time in the recording at which the result begins, s; negative if it begins earlier.
+        error: standard error, s; NaN if the time was given, or no column determines it.
+        others: further times that explain nearly as much, as for periodic motions.
     """
 
     begins_at: float
@@ -72,13 +71,13 @@ class Alignment(NamedTuple):
     others: tuple[float, ...] = ()
 
 
-@np.errstate(all="ignore")  # numbers too large, or too few, explain nothing
+@np.errstate(all="ignore")  # columns with huge values, or few of them, explain nothing
 def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | None:
-    """Return the shift that explains most; None if there is none that explains half, or nothing moves.
+    """Return the shift that explains most; None if no shift explains half, or nothing moves.
 
     Args:
-        pairings: all columns that may say something.
-        groups: for each, the property shared with columns it may have been exchanged with.
+        pairings: pairings of the columns to align.
+        groups: group of each column; columns of a group may be exchanged with each other.
     """
     moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
     pairings = [pairing for pairing, moves in zip(pairings, moving, strict=True) if moves]
@@ -97,7 +96,7 @@ def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | 
 
 
 def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]]:
-    """Shifts of the lowest minima, lowest first, and those besides the first that are as good."""
+    """Return the shifts of the lowest minima in order, and those that are as good as the first."""
     step = _step(pairings)
     shifts, left = _on_grid(pairings, step)
     minima = np.flatnonzero((left < np.roll(left, 1)) & (left <= np.roll(left, -1)) & (left < 0))
@@ -112,13 +111,13 @@ def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]
 
 
 def _step(pairings: Sequence[Pairing]) -> float:
-    """Return the step of the grid: that of the most frequent column, unless finer than the grid allows."""
+    """Return the step of the grid: the shortest sampling interval, unless the grid would be too large."""
     span = pairings[0].duration + max(float(pairing.time[-1]) for pairing in pairings)
     return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MOST_POINTS)
 
 
 def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
-    """Shifts, and the unexplained part at each, the mean of all columns."""
+    """Return the shifts of the grid, and the mean unexplained part of all columns at each."""
     grid = np.arange(0.0, pairings[0].duration + step / 2, step)
     last = max(float(pairing.time[-1]) for pairing in pairings)
     recorded = np.arange(0.0, last + step / 2, step)
@@ -152,7 +151,7 @@ def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> Float
 
 
 def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
-    """Return which points of a grid lie between consecutive samples."""
+    """Return a mask of the grid points between consecutive samples without a gap."""
     steps = np.diff(time)
     follows = np.append(steps <= LONGEST_STEP * np.median(steps), True)
     before = np.clip(np.searchsorted(time, recorded, side="right") - 1, 0, len(time) - 1)
@@ -160,7 +159,7 @@ def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
 
 
 def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Sums of first[i] second[i + shift], for shifts from 1 - len(first) to len(second) - 1."""
+    """Return the sums of first[i] second[i + shift] for shifts from 1 - len(first) to len(second) - 1."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     size = next_fast_len(len(first) + len(second) - 1, real=True)
@@ -174,7 +173,7 @@ def _refined(
     """Refine a candidate between the points of the grid.
 
     Returns:
-        The unexplained part, its shift, and the pairings with exchanged columns put right.
+        Unexplained part, refined shift, and pairings with exchanged columns corrected.
     """
     from scipy.optimize import minimize_scalar
 
@@ -209,7 +208,7 @@ def _left(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> fl
 
 
 def _explained(pairing: Pairing, shift: float) -> float:
-    """Share of the variance of the measured values that a line explains where both overlap."""
+    """Return the share of the variance of measured values that a line explains in the overlap."""
     moments = moments_of(pairing.overlap(shift)[0], tame(pairing.measured))
     computed, measured, product = moments.spreads()
     if moments.samples < FEWEST_SAMPLES or not computed * measured > 0:
@@ -231,9 +230,9 @@ def _agreed(pairings: Sequence[Pairing], shift: float) -> tuple[float, float]:
 
 
 def _average(fits: Sequence[LineFit]) -> tuple[float, float] | None:
-    """Weighted mean of the lags of columns that agree, and its standard error; None if there is no column.
+    """Return the weighted mean lag of columns that agree, and its standard error; None without columns.
 
-    Where lags scatter more than their errors say, all errors are wider by that scatter.
+    If lags scatter more than their errors explain, all errors are increased by that scatter.
     """
     if not fits:
         return None
@@ -245,7 +244,7 @@ def _average(fits: Sequence[LineFit]) -> tuple[float, float] | None:
     wide = np.sqrt(errors**2 + max(0.0, scatter**2 - float(np.median(errors)) ** 2) + of_middle**2)
     kept = np.abs(lags - middle) <= APART * wide
     if 2 * np.count_nonzero(kept) <= len(fits):
-        kept[:] = True  # where no majority agrees, nobody is wrong
+        kept[:] = True  # without a majority, no column can be called wrong
     return _mean_of_effects(lags[kept], errors[kept])
 
 
@@ -256,9 +255,9 @@ def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
 
 
 def _mean_of_effects(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Mean of values that scatter beyond their errors, and its error.
+    """Return the mean of values that scatter beyond their errors, and its standard error.
 
-    R. DerSimonian, N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7 (1986).
+    See R. DerSimonian, N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7 (1986).
     """
     weights = 1 / errors**2
     mean = float(weights @ values / weights.sum())

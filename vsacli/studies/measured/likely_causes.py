@@ -1,4 +1,4 @@
-"""Likely causes of a signal that does not agree: a wrong unit, sign, side of the gear, or column."""
+"""Likely causes of a disagreement: a wrong unit, sign, side of the gear, or column."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from vsacli.studies.measured.agreement import Agreement
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Pairing, exactness, moments_of, tame, unlikeness
 
 SAVED = math.log(4.0)
-"""Logarithm by which each exchanged column has to leave less unexplained than under its own name."""
+"""Required decrease of the log of the unexplained part of each column by an exchange."""
 
 LEFT = math.log(0.1)
-"""Logarithm of the largest unexplained part."""
+"""Largest log of the unexplained part of an exchanged column."""
 
 REVERSED = 0.25
-"""Share of the squared errors of an exchange below which opposite signs explain the columns better. Torques
-of two motors that pull against each other are nearly each other's negatives, so that both explain much."""
+"""Ratio of squared errors, with opposite signs to with an exchange, below which the former explains columns
+better. Torques of two motors that pull against each other are nearly opposite, so that both explain much."""
 
 
 def exchanged_places(pairings: Sequence[Pairing], groups: Sequence[object], shift: float) -> list[int]:
-    """Return for each column the index of the one that it follows: its own, unless they are exchanged.
+    """Return, for each column, the index of the column whose computed signal it follows.
 
-    Columns are held against all computed signals of their group, over their own samples, so that rows that
-    one of them lacks do not matter.
+    It is the column's own index unless columns are exchanged. Each column is compared with all computed
+    signals of its group over its own samples, so that empty cells in other columns do not matter.
 
     Args:
-        pairings: of all columns.
-        groups: for each, the property shared with columns it may have been exchanged with.
-        shift: time of the recording, s, at which the result begins.
+        pairings: pairings of all columns.
+        groups: group of each column; columns of a group may be exchanged with each other.
+        shift: time in the recording at which the result begins, s.
     """
     places = list(range(len(pairings)))
     for group in dict.fromkeys(groups):
@@ -50,12 +50,12 @@ def exchanged_places(pairings: Sequence[Pairing], groups: Sequence[object], shif
 def exchanged(
     measured: Sequence[FloatArray], exact: Sequence[float], computed: Callable[[int], Sequence[FloatArray]]
 ) -> list[tuple[int, int]]:
-    """Indices of the columns that are exchanged, each with that of the signal which it follows.
+    """Return the indices of exchanged columns, each with the index of the signal that it follows.
 
     Args:
         measured: values of each column.
-        exact: of each, the share of its variance below which nothing counts as unexplained.
-        computed: all signals at the times of the column with an index.
+        exact: smallest unexplained share of the variance that counts, for each column.
+        computed: function that returns all signals at the times of a column, given by index.
     """
     if len(measured) < 2:
         return []
@@ -82,7 +82,7 @@ def _reversed(
     return opposite < REVERSED * exchange
 
 
-@np.errstate(all="ignore")  # signals that hold still explain nothing
+@np.errstate(all="ignore")  # constant signals explain nothing
 def _costs(measured: FloatArray, exact: float, computed: Sequence[FloatArray]) -> FloatArray:
     """Return the unexplained part of measured values for each computed signal, (signals,)."""
     moments = [moments_of(each, tame(measured)) for each in computed]
@@ -93,27 +93,29 @@ def _costs(measured: FloatArray, exact: float, computed: Sequence[FloatArray]) -
 
 
 ALIKE = 0.98
-"""Coefficient of correlation from which on the gain says something about units and signs."""
+"""Correlation coefficient from which on the gain is evidence of wrong units and signs."""
 
 NEAR = 0.05
-"""Relative distance at which a gain is taken for that of a likely cause."""
+"""Relative distance of a gain from that of a likely cause."""
 
 SURE = 5.0
-"""Standard errors from which on a gain or an offset is named; of a million right columns one has that."""
+"""Deviation in standard errors from which on a gain or an offset is reported; one in a million correct
+columns exceeds it."""
 
 NOTABLE = 0.02
-"""Gain less 1, or offset over the range, from which on it is named: few models are better."""
+"""Deviation of a gain from 1, or ratio of an offset to the range, from which on it is reported: few models
+are better."""
 
 WILD = 20.0
-"""Largest error, in root mean squares of the others, from which on samples that were left out are named."""
+"""Ratio of the largest error to the rms of the others from which on outliers are reported."""
 
 
 def likely_causes(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
-    """Yield sentences on the likely slips of signals that do not agree, each naming its column.
+    """Yield sentences on the likely causes of disagreements, each naming its column.
 
     Args:
-        signals: of a recording.
-        gear_ratios: of the motor that each is of, NaN if it is of none or not known.
+        signals: agreements of a recording.
+        gear_ratios: gear ratio of the motor of each signal; NaN without a motor, or if unknown.
     """
     for signal, ratio in zip(signals, gear_ratios, strict=True):
         if signal.follows is None:
@@ -130,10 +132,10 @@ def likely_causes(signals: Sequence[Agreement], gear_ratios: Sequence[float]) ->
 
 
 def _gains_of_causes(gear_ratio: float) -> Mapping[str, float]:
-    """Return words for gains that slips of units, signs or sides of a gear make.
+    """Return the gains that wrong units or sides of a gear cause, by clause.
 
     Args:
-        gear_ratio: of the motor that the signal is of, NaN if it is of none or not known.
+        gear_ratio: gear ratio of the signal's motor; NaN without a motor, or if unknown.
     """
     slips = {
         "is in degrees": 180 / math.pi,
@@ -149,7 +151,7 @@ def _gains_of_causes(gear_ratio: float) -> Mapping[str, float]:
 
 
 def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
-    """Yield the likely cause of a signal that does not agree."""
+    """Yield sentences on the likely cause of a signal's disagreement."""
     if not agreement.samples:
         yield f"{agreement.column} has no computed value: its joint is infeasible or singular throughout"
         return
@@ -179,7 +181,7 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
 
 
 def _offset(agreement: Agreement) -> Iterator[str]:
-    """Yield a sentence on an offset that is known and large."""
+    """Yield a sentence on an offset that is significant and large."""
     turns = agreement.offset / (2 * math.pi)
     whole = abs(turns) > 1 / 2 and abs(turns - round(turns)) < NEAR
     if agreement.unit == "rad" and whole and abs(agreement.gain - 1) < NEAR:

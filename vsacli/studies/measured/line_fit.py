@@ -1,14 +1,15 @@
 """The straight line of a measured signal over a computed one, with its lag, and standard errors of all three.
 
-The model is measured(t) = offset + gain computed(t - shift - lag). Gauss-Newton finds the three together;
-single samples far outside what the others leave are taken out. Standard errors are the larger of those of
-white and of colored residuals, and contain the error of interpolation of the computed signal.
+The model is measured(t) = offset + gain computed(t - shift - lag). The Gauss-Newton method finds the three
+together, without outliers. Standard errors are the larger of those for white and for colored residuals, and
+contain the interpolation error of the computed signal.
 
-What noise of any color does to unknowns is what the scores, slope times residual, have at frequency 0.
-Autocovariances weighted by lag (W. K. Newey, K. D. West, Econometrica 55 (1987)) smear that over a wide band,
-and derivatives of noise have much more there: errors came out 2 to 30 times too large. A few cosines do not:
-E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, "HAR inference: recommendations for practice", Journal of
-Business & Economic Statistics 36 (2018), section 3. Of white residuals it is the usual covariance.
+The effect of colored noise on unknowns is the spectral density of the scores, slope times residual, at
+frequency 0. Autocovariances weighted by lag (W. K. Newey, K. D. West, Econometrica 55 (1987)) average it over
+a wide band, in which derivatives of noise have much more power: errors came out 2 to 30 times too large. A
+few cosines avoid this: E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, "HAR inference: recommendations
+for practice", Journal of Business & Economic Statistics 36 (2018), section 3. For white residuals the result
+is the usual covariance.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from vsacli.studies.measured.agreement import Still
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, LARGEST, Pairing, noise, tame
 
 COSINES = 24
-"""Cosines of a record that count. With 8 the errors themselves were too uncertain (87 % within two of them);
-with 80, of 3000 samples, those of pure derivatives of noise came out 5 times too large."""
+"""Number of cosines of a recording. With 8, the errors themselves were too uncertain (87 % within two of
+them); with 80 for 3000 samples, those for pure derivatives of noise came out 5 times too large."""
 
 SAMPLES_A_COSINE = 4
 """Smallest number of samples for a cosine, so that the cosines of short recordings remain the lowest ones."""
@@ -40,58 +41,57 @@ def covariance_of_sum(scores: FloatArray) -> tuple[FloatArray, int]:
 
 
 def count_of_cosines(samples: int) -> int:
-    """Return how many cosines count in a record of this many samples."""
+    """Return the number of cosines for a recording with this many samples."""
     return min(COSINES, -(-samples // SAMPLES_A_COSINE), max(samples - 1, 1))
 
 
 LAG_SHARE = 0.05
-"""Share of the duration within which a lag is looked for."""
+"""Largest lag, as a share of the duration."""
 
 MOST_STEPS = 20
-"""Largest number of Gauss-Newton steps; from shifts of the search it takes 3 to 6."""
+"""Limit on Gauss-Newton steps; 3 to 6 suffice from the shifts of the search."""
 
 SMALL_STEP = 0.01
-"""Step, in standard errors of the lag, after which it is found."""
+"""Step of the lag, in standard errors, at which it has converged."""
 
 WILD = 5.0
-"""Deviations beyond which a residual is left out; of normal noise that is less than one in a million."""
+"""Residual of an outlier in standard deviations; less than one in a million of normal noise exceeds it."""
 
 NINE_OF_TEN = 0.9, 1.645
-"""Share of the residuals that tells their deviation, and the bound of that share of normal ones in
-deviations."""
+"""Quantile of the absolute residuals that determines their standard deviation, and this quantile of a normal
+distribution in standard deviations."""
 
 FEW = 0.02
-"""Share of the samples that is left out at most; motion that the line does not explain is no wild sample."""
+"""Largest share of outliers among the samples; motion that the line does not explain is not an outlier."""
 
 NEAR_LARGEST = 2.0
-"""Times the largest residual but for those few, up to which a residual is like the others."""
+"""Ratio to the largest residual without these few up to which a residual is not an outlier."""
 
 TRIALS = 4
-"""Rounds in which the line and the samples that count are found in turn."""
+"""Number of rounds that alternate between the line and its outliers."""
 
 SIGNIFICANT = 5.0
-"""Standard errors from which on a gain is one."""
+"""Gain in standard errors above which it is significant."""
 
 VAGUE = 0.2
-"""Standard error of a gain from which on it says nothing."""
+"""Standard error of a gain above which the gain is undetermined."""
 
 CONSTANT = 1e-6
-"""Deviation of a recording, over that of the result, below which it is constant in any unit."""
+"""Ratio of standard deviations, recording to result, below which a recording is constant in any unit."""
 
 RESTS = 0.2
-"""Deviation of a recording that does not follow, over that of the result, below which it does not
-move."""
+"""Ratio of the standard deviations below which a recording without a significant gain does not move."""
 
 
 class LineFit(NamedTuple):
     """A line through measured over computed values; NaN where the samples do not determine it.
 
     Attributes:
-        offset, gain: of the line.
-        lag: how much later than the shift the measured signal follows, s.
-        offset_error, gain_error, lag_error: standard errors.
-        correlation: of measured and computed values, at the lag.
-        used: which samples of the recording counted, (samples,).
+        offset, gain: coefficients of the line.
+        lag: delay of the measured signal beyond the shift, s.
+        offset_error, gain_error, lag_error: standard errors of offset, gain and lag.
+        correlation: correlation of measured and computed values at the lag.
+        used: mask of the samples of the recording without outliers, (samples,).
     """
 
     offset: float = math.nan
@@ -105,7 +105,7 @@ class LineFit(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """Least squares at one lag: unknowns, their covariance, and the residual."""
+    """A least-squares solution at one lag: unknowns, covariance, correlation, and mask of used samples."""
 
     unknowns: FloatArray
     covariance: FloatArray
@@ -113,13 +113,13 @@ class _Step(NamedTuple):
     used: BoolArray
 
 
-@np.errstate(all="ignore")  # columns without any relation end in infinite errors, which say so
+@np.errstate(all="ignore")  # unrelated columns have infinite standard errors, as they should
 def fit_line(pairing: Pairing, shift: float) -> LineFit:
-    """Return the line, with a lag if the samples determine one, else without.
+    """Return the line, with a lag if the samples determine one.
 
     Args:
         pairing: computed and measured values.
-        shift: time of the recording, s, at which the result begins.
+        shift: time in the recording at which the result begins, s.
     """
     at_shift = _step(pairing, shift)
     if at_shift is None:
@@ -141,22 +141,22 @@ def _lagging(pairing: Pairing, shift: float, start: _Step) -> tuple[_Step, float
             return None
         if abs(change) <= SMALL_STEP * error:
             return step, lag
-    return (step, lag) if abs(change) <= error else None  # samples at the ends come and go
+    return (step, lag) if abs(change) <= error else None  # may alternate as samples enter at the ends
 
 
 def _lag_error(pairing: Pairing, step: _Step) -> float:
-    """Standard error of a lag, to which interpolation of the computed signal adds."""
+    """Return the standard error of a lag, with the interpolation error of the computed signal."""
     slope = pairing.computed.slope(np.linspace(0.0, pairing.duration, len(pairing.time)))
     return math.hypot(math.sqrt(step.covariance[2, 2]), pairing.computed.error / math.sqrt(np.mean(slope**2)))
 
 
 def _step(pairing: Pairing, shift: float, gain: float | None = None) -> _Step | None:
-    """Least squares at a shift; None if there are too few samples, or they do not tell the unknowns apart.
+    """Return the least-squares solution at a shift; None if samples do not determine the unknowns.
 
     Args:
         pairing: computed and measured values.
-        shift: time of the recording, s, at which the result begins.
-        gain: about which the change of the shift is the third unknown; without it there are two.
+        shift: time in the recording at which the result begins, s.
+        gain: gain at which to linearize in a change of the shift, the third unknown; None for two unknowns.
     """
     computed, there = pairing.overlap(shift)
     if np.count_nonzero(there) < FEWEST_SAMPLES:
@@ -180,7 +180,7 @@ def _step(pairing: Pairing, shift: float, gain: float | None = None) -> _Step | 
 
 
 def _usual_rows(design: FloatArray, tamed: FloatArray, measured: FloatArray) -> BoolArray | None:
-    """Rows whose residuals are like the others; None if no line goes through them."""
+    """Return a mask of the rows without outliers; None if rows do not determine a line."""
     share, bound = NINE_OF_TEN
     few = max(1, math.ceil(FEW * len(design)))
     kept, values = np.ones(len(design), dtype=bool), tamed
@@ -195,7 +195,7 @@ def _usual_rows(design: FloatArray, tamed: FloatArray, measured: FloatArray) -> 
 
 
 def _solved(design: FloatArray, values: FloatArray) -> FloatArray | None:
-    """Least squares by columns of one size; None if the columns do not differ."""
+    """Return the least-squares solution with scaled columns; None if the columns are dependent."""
     sizes = np.linalg.norm(design, axis=0)
     if len(design) <= design.shape[1] or not np.all(sizes > 0):
         return None
@@ -204,7 +204,7 @@ def _solved(design: FloatArray, values: FloatArray) -> FloatArray | None:
 
 
 def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
-    """Return the covariance of the unknowns, of white or of colored residuals, whichever is larger."""
+    """Return the covariance of the unknowns for white or for colored residuals, whichever is larger."""
     sizes = np.linalg.norm(design, axis=0)
     scaled = design / sizes
     inverse = np.linalg.inv(scaled.T @ scaled)
@@ -214,17 +214,17 @@ def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
     meat, cosines = covariance_of_sum(scaled * residual[:, None])
     colored = inverse @ meat @ inverse * (len(design) / freedom)
     slow = float(covariance_of_sum(residual[:, None])[0][0, 0]) / squares
-    rough = cosines / max(cosines - 2, 1)  # variance of Student's t, since so few cosines tell roughly
+    rough = cosines / max(cosines - 2, 1)  # variance of Student's t, for the few degrees of freedom
     fitted = cosines / max(
         cosines - design.shape[1], 1
-    )  # the line takes the slowest part of the noise with it
+    )  # the fit removes the slowest part of the noise from the residual
     ratio = np.maximum(np.diag(colored) / np.maximum(np.diag(white), np.finfo(float).tiny), slow * fitted)
     larger = np.sqrt(np.maximum(1.0, rough * ratio))
     return np.asarray(white * np.outer(larger, larger) / np.outer(sizes, sizes))
 
 
 def _line(pairing: Pairing, step: _Step, lag: float) -> LineFit:
-    """Return a line with its standard errors, to which interpolation adds; a lag of NaN is unknown."""
+    """Return a line with its standard errors, including interpolation; a lag of NaN is unknown."""
     offset, gain = (float(each) for each in step.unknowns[:2])
     error, deviations = pairing.computed.error, np.sqrt(np.diag(step.covariance))
     return LineFit(
@@ -240,12 +240,12 @@ def _line(pairing: Pairing, step: _Step, lag: float) -> LineFit:
 
 
 def still_signal(pairing: Pairing, shift: float, fit: LineFit) -> Still | None:
-    """Return the signal that does not move beyond rounding or noise; None if both move.
+    """Return which signal does not change beyond rounding or noise; None if both change.
 
     Args:
         pairing: computed and measured values.
-        shift: time of the recording, s, at which the result begins.
-        fit: the line through them.
+        shift: time in the recording at which the result begins, s.
+        fit: line through the values.
     """
     if not pairing.computed.moves:
         return "computed"
@@ -256,12 +256,12 @@ def still_signal(pairing: Pairing, shift: float, fit: LineFit) -> Still | None:
     if abs(fit.gain) > SIGNIFICANT * fit.gain_error:
         return None
     if not fit.gain_error < VAGUE and follows**2 <= noise(tame(pairing.measured)):
-        return "computed"  # so little that a recording with this noise cannot tell
+        return "computed"  # its change is below the noise of the recording
     return "measured" if moved < RESTS * follows else None
 
 
 def root_mean_square(values: FloatArray) -> float:
-    """Return the root mean square of values of any size; NaN of none."""
+    """Return the root mean square of values of any size; NaN without values."""
     largest = float(np.abs(values).max(initial=0.0))
     if not values.size or largest == 0:
         return largest if values.size else math.nan

@@ -31,7 +31,7 @@ class Jointed(Protocol):
 
     @property
     def joint_types(self) -> tuple[str, ...]:
-        """Their types."""
+        """Types of the joints."""
         ...
 
     @property
@@ -48,13 +48,13 @@ class Place(NamedTuple):
     """The place of a column.
 
     Attributes:
-        variable: name of the variable it is compared with or stands for.
-        joint: its index.
-        motor: 1 or 2, None if the variable is none of motors.
-        unit: of numbers without a unit of their own.
+        variable: name of the variable that the column stands for.
+        joint: index of the joint.
+        motor: 1 or 2; None for variables of joints.
+        unit: unit of values if the column names none.
         gear: factor to the joint side of the gear.
-        rank: how directly it shows the motion of the robot; of columns that stand for the same the highest
-            counts.
+        rank: rank by how directly the column shows the motion of the robot; of columns for the same variable
+            the highest counts.
     """
 
     variable: str
@@ -66,7 +66,7 @@ class Place(NamedTuple):
 
     @property
     def target(self) -> tuple[str, int, int | None]:
-        """Variable, joint and motor, without how it is written."""
+        """Variable, joint and motor."""
         return self.variable, self.joint, self.motor
 
 
@@ -75,9 +75,9 @@ class Measured:
     """A recorded signal.
 
     Attributes:
-        column: its name in the recording.
-        place: its variable, joint and motor.
-        values: (samples,), SI units, joint side of the gear.
+        column: name in the recording.
+        place: variable, joint and motor.
+        values: values, (samples,), SI units on the joint side of the gear.
     """
 
     column: str
@@ -86,13 +86,13 @@ class Measured:
 
 
 class Recording(NamedTuple):
-    """The recording of some variables.
+    """A recording of some variables.
 
     Attributes:
-        time: (samples,), s, from the first sample on.
-        signals: in the order of the variables, then of the joints.
-        others: names of the columns that are none of these variables, or are not to be read.
-        table: the file.
+        time: times, (samples,) in s since the first sample.
+        signals: signals in the order of the variables, then of the joints.
+        others: names of columns that are not among these variables, or are ignored by the mapping.
+        table: table of the file.
     """
 
     time: FloatArray
@@ -104,17 +104,17 @@ class Recording(NamedTuple):
 def read_recording(
     path: str | Path, places: Mapping[str, Place], owner: str, mapping: ColumnMapping
 ) -> Recording:
-    """Return the columns of a CSV file that have a place, NaN in cells that are empty.
+    """Return the columns of a CSV file that have a place, with NaN in empty cells.
 
     Args:
-        path: a file with a column `time`, and columns named as `vsacli export` names them, or by the number
-            of the joint, `q1` for the first; a unit in brackets may follow any name.
-        places: by the names that columns may have, see `known_columns`.
-        owner: whose variables they are, for sentences.
-        mapping: assignment of columns with other names.
+        path: file with a column `time`, and columns named as by `vsacli export`, or by the number of the
+            joint, `q1` for the first; a unit in brackets may follow any name.
+        places: places by possible names of columns, see `known_columns`.
+        owner: owner of the variables, for messages.
+        mapping: mapping of other column names.
 
     Raises:
-        InputError: there is no such column, a unit is one of something else, or the times do not ascend.
+        InputError: no column has a place, a unit does not fit its variable, or the times do not ascend.
     """
     table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
     headings = [split_heading(column) for column in table.columns]
@@ -144,13 +144,13 @@ def read_recording(
 
 
 def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:
-    """Names that columns may have, each with its rank and the variable that it stands for.
+    """Yield possible names of columns, each with its rank and the variable that it stands for.
 
-    Sensor readings, `q_measured`, take precedence over actual values of a simulation, `q_actual`, and those
+    Sensor readings, `q_measured`, take precedence over actual values of a simulation, `q_actual`, and these
     over the plain name, which may be the command.
 
     Args:
-        variables: by their plain names.
+        variables: variables by plain name.
     """
     for plain, variable in variables.items():
         for rank, name in enumerate((plain, actual(plain), measured(plain))):
@@ -158,11 +158,11 @@ def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Var
 
 
 def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) -> dict[str, Place]:
-    """Return every name that a column may have of variables of joints.
+    """Return the places of all columns of joint variables, by possible name.
 
     Args:
-        jointed: the subject of the recording.
-        named: names of variables in columns, with rank and variable, as `stand_ins` makes them.
+        jointed: subject of the recording.
+        named: names of variables in columns, with rank and variable, as from `stand_ins`.
     """
     return {
         column: place
@@ -179,7 +179,7 @@ def preferred(signals: Iterable[Measured]) -> dict[tuple[str, int, int | None], 
 
 
 def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterator[tuple[str, Place]]:
-    """Names of the columns of a variable, of those joints and motors that have it."""
+    """Yield names and places of the columns of a variable, for the joints and motors that have it."""
     of_motors = "motor" in variable.dims
     for joint, there in enumerate(jointed.existing(variable)):
         unit = variable.quantity.unit(jointed.joint_types[joint])
@@ -220,13 +220,14 @@ def _factor(unit: str | None, expected: str) -> float:
     return 1.0 if unit is None else conversion_factor(unit, expected)
 
 
-@np.errstate(over="ignore")  # beyond the largest number there is no sample
+@np.errstate(over="ignore")  # an overflow to infinity means a missing sample
 def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 
 def _elapsed(table: Table, factor: float) -> FloatArray:
-    """Times from the first sample on, s; stamps since 1970 lose nothing."""
+    """Return the times since the first sample, s."""
+    # subtraction before scaling: stamps since 1970 lose no digits
     names = [split_heading(column)[0] for column in table.columns]
     stamps = table.values[:, names.index(TIME)]
     if len(stamps) < 2:

@@ -1,10 +1,9 @@
-"""Pairs of a computed signal and its measured values: whether either moves, and how unlike both are.
+"""Pairs of a computed signal and its measured values: whether either changes, and how much they differ.
 
-Measured values may equal computed ones, or be a straight line of them: wrong offsets, units and gains make
-one, and a sensor mounted the other way round a falling one. A line fits many a piece of a smooth motion, so
-it has to explain ten times more than equality does, and a falling one ten times more than a rising one. The
-logarithm of what stays unexplained bounds what a single column can say, so that a minority of wrong columns
-does not decide.
+Measured values may equal computed ones or be a linear function of them: wrong offsets, units and gains make a
+rising line, a reversed sensor a falling one. A line fits many parts of a smooth motion, so it must explain
+ten times more than equality does, and a falling line ten times more than a rising one. The difference is the
+logarithm of the unexplained part, which is bounded, so that a minority of wrong columns does not decide.
 """
 
 from __future__ import annotations
@@ -18,39 +17,39 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 
 FEWEST_SAMPLES = 4
-"""Samples by which two signals can be compared."""
+"""Smallest number of samples for a comparison of two signals."""
 
 ROUNDING = 1e-8
-"""Share of the largest value of a variable, over all joints, below which changes are rounding. Torques of
-joints at rest change by 1e-16 to 1e-12 of it, and 1e-8 of a motion is below the resolution of any sensor."""
+"""Share of a variable's largest value over all joints below which changes are rounding. Torques of joints at
+rest change by 1e-16 to 1e-12 of it, and 1e-8 of a motion is below the resolution of any sensor."""
 
 WIDEST = 3.0
-"""Range of values in the search, in ranges of nearly all samples: single wild samples count no more than
-their neighbors."""
+"""Limit of values in the search beyond the range of nearly all samples, in units of this range, so that
+outliers count little."""
 
 LARGEST = 1e100
-"""Values beyond are no measurements; the search sees the bound, since their squares would overflow."""
+"""Limit of measured values, whose squares would overflow otherwise."""
 
 ENOUGH = 20_000
-"""Samples that tell where about the shift is, and which columns are exchanged."""
+"""Number of samples that suffices to find the approximate shift and exchanged columns."""
 
 NEARLY_ALL = (0.02, 0.98)
 """Quantiles between which nearly all samples lie."""
 
 NORMAL_MEDIAN = 0.6745
-"""Median of the size of normal values, in standard deviations."""
+"""Median of the absolute value of a normal variable, in standard deviations."""
 
 
 class Computed(NamedTuple):
     """A computed signal.
 
     Attributes:
-        at: values at times from the beginning of the result, NaN outside it and next to samples without a
-            value.
-        slope: derivatives at such times.
-        error: root mean square error of interpolation.
-        spread: root mean square deviation from the mean.
-        moves: whether it does, beyond rounding.
+        at: function that returns values at times since the start of the result, NaN outside it and next to
+            samples without a value.
+        slope: function that returns derivatives at such times.
+        error: rms error of interpolation.
+        spread: standard deviation.
+        moves: whether it changes beyond rounding.
     """
 
     at: Callable[[FloatArray], FloatArray]
@@ -64,10 +63,10 @@ class Pairing(NamedTuple):
     """A computed signal and its measurement.
 
     Attributes:
-        computed: the signal.
-        duration: of the result, s.
-        time: of the measured values, s, ascending.
-        measured: (samples,).
+        computed: computed signal.
+        duration: duration of the result, s.
+        time: ascending times of the measured values, (samples,) in s.
+        measured: measured values, (samples,).
     """
 
     computed: Computed
@@ -76,18 +75,18 @@ class Pairing(NamedTuple):
     measured: FloatArray
 
     def thinned(self) -> Pairing:
-        """Return the same with at most `ENOUGH` samples."""
+        """Return the pairing with at most `ENOUGH` samples."""
         every = -(-len(self.time) // ENOUGH)
         return self._replace(time=self.time[::every], measured=self.measured[::every])
 
     def overlap(self, shift: float) -> tuple[FloatArray, BoolArray]:
-        """Computed values at the measured times if the result begins at `shift`, and where there are any."""
+        """Return computed values at the measured times for a shift, and a mask of those that exist."""
         computed = self.computed.at(self.time - shift)
         return computed, np.isfinite(computed)
 
 
 def tame(values: FloatArray) -> FloatArray:
-    """Measured values, wild ones moved to the bounds suggested by the others."""
+    """Return measured values with outliers clipped to a range around the others."""
     limited = np.clip(values, -LARGEST, LARGEST)
     low, high = np.quantile(limited, NEARLY_ALL)
     room = WIDEST * (high - low)
@@ -95,18 +94,18 @@ def tame(values: FloatArray) -> FloatArray:
 
 
 def noise(values: FloatArray) -> float:
-    """Variance of the white noise of tame values, from their second differences."""
+    """Return the variance of the white noise of clipped values, from their second differences."""
     second = np.abs(np.diff(values, 2))
     return float(np.median(second) / NORMAL_MEDIAN) ** 2 / 6 if second.size else 0.0
 
 
 def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Computed:
-    """Return a stored signal as a function of the time from its beginning.
+    """Return a stored signal as a function of the time since its start.
 
     Args:
-        time: of the samples, (samples,), s, the first at 0.
-        values: (samples,), NaN where there is none.
-        largest: value of the variable in size, over all joints.
+        time: times of the samples, (samples,) in s, the first being 0.
+        values: values, (samples,), NaN where there is none.
+        largest: largest absolute value of the variable over all joints.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -134,7 +133,8 @@ def _nowhere(times: FloatArray) -> FloatArray:
 
 
 def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
-    """Root mean square error of a cubic spline: that of every second sample, which is 16 times larger."""
+    """Return the rms error of a cubic spline."""
+    # a spline through every second sample has a 16 times larger error, which the other samples show
     from scipy.interpolate import make_interp_spline
 
     rounding = float(np.finfo(float).eps * np.abs(values).max())
@@ -148,27 +148,27 @@ def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
 
 
 PRICE = math.log(10.0)
-"""Price of a line, and once more of a falling one, in logarithms of the unexplained part."""
+"""Penalty for a line, applied twice to a falling one, on the logarithm of the unexplained part."""
 
 EXACT = 1e-5
-"""Share of the variance below which nothing counts as unexplained: the filter of a sensor may do that."""
+"""Smallest unexplained share of the variance that counts, since the filter of a sensor may cause as much."""
 
 FLAT = 1e-9
-"""Share of the variance of a recording below which sums of transforms are only rounding."""
+"""Share of the variance of a recording below which sums of transforms are rounding."""
 
 NOISIEST = 0.1
-"""Largest such share. Where samples are few, motion looks like noise."""
+"""Largest share of the variance attributed to noise, since motion with few samples looks like noise."""
 
 
 class Moments(NamedTuple):
-    """Sums over the samples that computed and measured values have in common; arrays for many shifts.
+    """Sums over the common samples of computed and measured values, as arrays for many shifts.
 
     Attributes:
-        samples: how many.
-        computed, measured: sums of the values, each less a constant.
-        computed2, measured2, product: sums of their squares and products.
-        apart: constant of the measured values less that of the computed ones.
-        measured_variance: of all measured values.
+        samples: number of samples.
+        computed, measured: sums of the values, each minus a constant.
+        computed2, measured2, product: sums of squares and products of these.
+        apart: constant of the measured values minus that of the computed ones.
+        measured_variance: variance of all measured values.
     """
 
     samples: FloatArray
@@ -181,7 +181,7 @@ class Moments(NamedTuple):
     measured_variance: float
 
     def spreads(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Sums of squares of both about their means, and of their products."""
+        """Return the sums of squares of both about their means, and of their products."""
         return (
             self.computed2 - self.computed**2 / self.samples,
             self.measured2 - self.measured**2 / self.samples,
@@ -189,13 +189,13 @@ class Moments(NamedTuple):
         )
 
     def squared_error(self) -> FloatArray:
-        """Sum of squares of measured minus computed values."""
+        """Return the sum of squares of measured minus computed values."""
         errors = self.computed2 - 2 * self.product + self.measured2
         return errors + 2 * self.apart * (self.measured - self.computed) + self.samples * self.apart**2
 
 
 def moments_of(computed: FloatArray, tamed: FloatArray) -> Moments:
-    """Sums of computed values, NaN where there are none, and of measured ones at the same times."""
+    """Return the sums of computed values, where these are not NaN, and measured ones at the same times."""
     there = np.isfinite(computed)
     middle = float(np.mean(computed[there])) if there.any() else 0.0
     center = float(np.mean(tamed)) if tamed.size else 0.0
@@ -214,12 +214,12 @@ def moments_of(computed: FloatArray, tamed: FloatArray) -> Moments:
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def unlikeness(moments: Moments, exact: float, scale: FloatArray | float | None = None) -> FloatArray:
-    """Logarithm of the unexplained share, with the price of a line; 0 where nothing is explained.
+    """Return the log of the unexplained share, with the penalty for a line; 0 if nothing is explained.
 
     Args:
-        moments: of both signals.
-        exact: share below which nothing counts as unexplained.
-        scale: sum of squares of which errors are shares; of the computed values if None.
+        moments: sums of both signals.
+        exact: smallest share that counts.
+        scale: sum of squares to which errors are relative; that of the computed values if None.
     """
     computed, measured, product = moments.spreads()
     moving = (measured > FLAT * moments.samples * moments.measured_variance) & (computed > 0)
@@ -232,6 +232,6 @@ def unlikeness(moments: Moments, exact: float, scale: FloatArray | float | None 
 
 
 def exactness(tamed: FloatArray) -> float:
-    """Share of the variance of measured values that their noise leaves unexplained, `EXACT` at least."""
+    """Return the share of the variance of measured values that is noise, at least `EXACT`."""
     variance = float(np.var(tamed))
     return min(NOISIEST, max(EXACT, noise(tamed) / variance)) if variance > 0 else EXACT

@@ -1,7 +1,7 @@
-"""The constraints of every search: margin and limits of each sample, judged as a run judges them.
+"""The constraints of every search: margin and limits at each sample, judged exactly as a run judges them.
 
-Limits of recorded motions count beyond the uncertainty of the recording. The attainable range of the
-stiffness follows from margin, limits of stiffness and limits of deflection.
+`Acceptance` is the rule, `RecordedLimits` its allowance for the noise of recordings. `admissible_stiffness`
+is the range that margin, stiffness limits and deflection limits leave to a joint.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.trajectory import Trajectory
 
 RESERVED = ("dq", "dtheta", "tau_motor", "current", "voltage")
-"""Variables that may be beyond a limit between steps that keep it, and that a search can keep clear of it."""
+"""Variables that can exceed a limit between samples that keep it, and that a search can keep away from it."""
 
 
 STRICTER = (0.0, 0.0, 0.0, 1e-6, 1e-4, 0.01)
-"""Shares by which the rule is stricter, one search after the other. What has the margin at the steps may fall
-short of it between them; instants at which it does count from then on, so that two searches do as a rule."""
+"""Relative tightening of the rule in successive searches. A result that is accepted at its samples can be
+refused between them; the refused instants count in the next search, so that two searches usually suffice."""
 
 _Found = TypeVar("_Found")
 
 
 class ImpossibleError(VsacliError):
-    """No change of a kind fixes a motion.
+    """Error: no change of a kind fixes a motion.
 
     Attributes:
-        reasons: why, in clauses; one for each joint that cannot be fixed.
+        reasons: reasons as clauses, one for each joint that cannot be fixed.
     """
 
     def __init__(self, *reasons: str) -> None:
@@ -58,15 +58,16 @@ class ImpossibleError(VsacliError):
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The rule by which samples of a robot are accepted: a margin of `near_singular`, and every limit kept.
+    """The rule by which samples are accepted: a margin of at least `near_singular`, and every limit kept.
 
     Attributes:
-        robot: the robot.
-        near_singular: the margin.
-        recorded: how limits are judged if the task was recorded.
-        reserve: share of each limit of `RESERVED` that is kept clear of.
-        ignored: joints that do not count, by index.
-        between: instants between the steps that count as well, since the start of the task as it is, s.
+        robot: robot that executes the samples.
+        near_singular: required margin.
+        recorded: allowance for the noise of a recorded task.
+        reserve: required clearance to the limits of `RESERVED`, as a share of each limit.
+        ignored: indices of joints that do not count.
+        between: instants between samples that count as well, as times since the start of the unchanged
+            task, s.
     """
 
     robot: Robot
@@ -77,17 +78,17 @@ class Acceptance:
     between: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
 
     def stricter(self, share: float) -> Acceptance:
-        """Return the same with a margin that is larger by a share, which is kept clear of limits as well."""
+        """Return the rule with a margin that is larger by a share, and with this share as the reserve."""
         return replace(self, near_singular=(1 + share) * self.near_singular, reserve=share)
 
     def confirmed(
         self, attempt: Callable[[Acceptance], tuple[_Found, FloatArray | None]]
     ) -> tuple[_Found, bool]:
-        """Search until a run confirms the result; return it, and whether it did.
+        """Search with ever stricter rules until a run confirms the result; return it and whether one did.
 
         Args:
-            attempt: searches by a rule; returns the result, and instants, as in `between`, at which a run
-                of that falls short, or None. They count in the next search.
+            attempt: search by a rule, and a run of its result; returns the result, and the instants, as in
+                `between`, at which the run refuses it, or None. They count in the next search.
         """
         between = self.between
         for share in STRICTER:
@@ -98,7 +99,7 @@ class Acceptance:
         return found, False
 
     def refused(self, part: TaskSamples) -> BoolArray:
-        """Return the steps that are not accepted, (samples, joints)."""
+        """Return a mask of the samples that are not accepted, (samples, joints)."""
         block = compute_block(self.robot, part.motion, self.near_singular)
         values = map(block.of_joint, range(len(self.robot.joints)))
         by_joint = [
@@ -110,7 +111,7 @@ class Acceptance:
         return refused
 
     def parts(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[TaskSamples]:
-        """Yield the samples of a task, or of a slower one, in blocks; then the instants between samples."""
+        """Yield all samples of a motion, stretched by a factor or not, in blocks; then those of `between`."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
             yield TaskSamples.of(trajectory, start, start + samples, factor)
@@ -118,25 +119,25 @@ class Acceptance:
             yield TaskSamples.between(trajectory, self.between, factor)
 
     def watched(self, trajectory: Trajectory, steps: int) -> TaskSamples:
-        """Return at most this many samples of a task, and the instants between samples that count."""
+        """Return at most this many samples of a motion, and all of `between`."""
         parts = [evenly_chosen(trajectory, steps)]
         if self.between.size:
             parts.append(TaskSamples.between(trajectory, self.between))
         return joined(parts)
 
     def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
-        """Return the joints with any step that is not accepted, (joints,)."""
+        """Return a mask of the joints with a sample that is not accepted, (joints,)."""
         joints: BoolArray = np.any(
             [np.any(self.refused(part), axis=0) for part in self.parts(trajectory, factor)], axis=0
         )
         return joints
 
     def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
-        """Return the steps of one joint that are not accepted, (samples,)."""
+        """Return a mask of the samples of one joint that are not accepted, (samples,)."""
         return self._refused(joint, self._driven(joint, load), load.instants)
 
     def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
-        """Return how each joint, by index, exceeds a limit of its position at any speed, if it does."""
+        """Return the violation of a position limit, which no timing changes, by index of the joint."""
         found: dict[int, Trouble] = {}
         for part in self.parts(trajectory):
             for index, joint in enumerate(self.robot.joints):
@@ -147,30 +148,30 @@ class Acceptance:
         return found
 
     def reasons(self, part: TaskSamples) -> tuple[str, ...]:
-        """Return the worst trouble of each joint that is not accepted throughout."""
+        """Return the worst violation of each joint with a refused sample, as clauses."""
         joints = enumerate(zip(self.robot.joints, part.loads(self.robot), strict=True))
         found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
         return tuple(reason for reason in found if reason)
 
     def trouble(self, joint: Joint, load: Load) -> Trouble | None:
-        """Return the worst that is wrong with the steps of one joint; None if they are accepted."""
+        """Return the worst violation among the samples of one joint; None if all are accepted."""
         values = self._driven(joint, load)
         of_limits = self._limit_trouble(joint, values, load.time, load.instants)
         return self._reach_trouble(joint, load, values) or of_limits
 
     def reason(self, joint: Joint, load: Load) -> str:
-        """Return the same in a clause; empty if they are accepted."""
+        """Return the worst violation of one joint as a clause; "" if all samples are accepted."""
         trouble = self.trouble(joint, load)
         return "" if trouble is None else trouble.clause(joint)
 
     def path_reason(self, joint: Joint, load: Load) -> str:
-        """Return a limit that the motion itself exceeds at any stiffness, as a clause; "" without one."""
+        """Return a position or velocity limit that the motion exceeds, as a clause; "" if there is none."""
         values = {"q": load.command.q, "dq": load.command.dq}
         trouble = self._limit_trouble(joint, values, load.time, load.instants)
         return "" if trouble is None else trouble.clause(joint)
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
-        """All variables of one joint, by name."""
+        """Return all variables of one joint, by name."""
         return {**load.command.arrays(), **drive(joint, load.command, self.near_singular)}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
@@ -182,7 +183,7 @@ class Acceptance:
         return refused | self._near_limits(joint, values)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
-        """Return the steps at which a reserve is used up, (samples,)."""
+        """Return a mask of the samples closer to a limit than the reserve, (samples,)."""
         near = np.zeros(len(values["flags"]), dtype=np.bool_)
         for check in limit_checks(joint) if self.reserve else ():
             if check.variable in RESERVED:
@@ -206,7 +207,7 @@ class Acceptance:
     def _limit_trouble(
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
     ) -> Trouble | None:
-        """Return the first kind of limit that is exceeded, of those on variables that were computed."""
+        """Return the worst violation of the first limit that the given variables exceed, if there is one."""
         flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint32))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
@@ -218,16 +219,16 @@ class Acceptance:
 
 
 class Trouble(NamedTuple):
-    """The worst step at which a joint is not accepted.
+    """The worst violation of a bound at a joint.
 
     Attributes:
-        variable: name in results of the variable beyond a bound.
-        whose: the same in words.
-        time: when, s.
-        value: of the variable there.
-        bound: that it is beyond; NaN if no stiffness carries the elastic torque.
-        unit: of both.
-        of_load: whether the bound follows from the load, else it is a limit of the robot.
+        variable: name in results of the variable that violates the bound.
+        whose: variable in words.
+        time: time of the worst sample, s.
+        value: value of the variable at that time.
+        bound: violated bound; NaN if no stiffness carries the elastic torque.
+        unit: unit of value and bound.
+        of_load: whether the bound follows from the load; otherwise it is a limit of the robot.
     """
 
     variable: str
@@ -239,7 +240,7 @@ class Trouble(NamedTuple):
     of_load: bool = False
 
     def clause(self, joint: Joint) -> str:
-        """Return the trouble, with its joint."""
+        """Return the violation as a clause that names the joint."""
         when = f"at t = {self.time:.3f} s"
         if math.isnan(self.bound):
             whatever = "" if math.isnan(self.value) else " at any stiffness"
@@ -254,35 +255,35 @@ class Trouble(NamedTuple):
 
 
 def stiffness_text(joint: Joint, value: float) -> str:
-    """Return a stiffness with its unit."""
+    """Return a stiffness with its unit, as text."""
     return f"{value:.6g} {units.STIFFNESS.unit(joint.type)}"
 
 
 SAME_STIFFNESS = 1e-9
-"""Relative difference of stiffnesses that may be rounding."""
+"""Relative difference up to which stiffnesses are equal but for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedLimits:
-    """The uncertainty of limits by the recorded signals of a task, at any timing and stiffness.
+    """The allowance for uncertain recorded signals in the check of limits, at any timing and stiffness.
 
-    A run computes deviations at some times and is linear in between; here the same times count, so that both
-    say the same of a step. They are computed only where the answer depends on them.
+    A run computes standard deviations at probed times and interpolates them linearly. The same times are used
+    here, so that search and run agree on every sample; deviations that cannot change the result are skipped.
 
     Attributes:
-        trajectory: the task as it is.
+        trajectory: unchanged motion of the task.
     """
 
     trajectory: Trajectory
 
     def flags(self, robot: Robot, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
-        """Return the flags of steps of one joint, (samples,), with the limits that are certainly exceeded.
+        """Return the flags of one joint, (samples,), with only the limits that are certainly exceeded.
 
         Args:
-            robot: the robot.
-            joint: of it, perhaps with another preload.
-            values: variables of the joint, among them `flags` with all limits that seem to be exceeded.
-            instants: where the steps stand in the task.
+            robot: robot of the task.
+            joint: joint of the robot, perhaps with the other preload.
+            values: variables of the joint, with `flags` that ignore the uncertainty.
+            instants: times of the samples in the task.
         """
         flags: FlagArray = np.array(values["flags"])
         if not self._estimates:
@@ -306,9 +307,9 @@ class RecordedLimits:
     def _deviations(
         self, robot: Robot, joint: Joint, stiffness: FloatArray | None, instants: Instants
     ) -> dict[str, AnyArray]:
-        """Standard deviations of the variables of a joint by name, (samples,) or (2, samples).
+        """Return standard deviations of the variables of a joint, (samples,) or (2, samples), by name.
 
-        NaN where none may be stated.
+        They are NaN where the uncertainty cannot be stated.
         """
         elapsed = instants.time - self.trajectory.start
         before = np.clip(np.searchsorted(self._probed, elapsed) - 1, 0, len(self._probed) - 2)
@@ -326,7 +327,7 @@ class RecordedLimits:
     def _change(
         self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants
     ) -> FloatArray:
-        """Return the addition to the stiffness of a joint, (samples,)."""
+        """Return the deviation of a joint's stiffness from the command, (samples,), without rounding."""
         if stiffness is None or STIFFNESS.key not in joint.commanded:
             return np.zeros(len(instants.time))
         asked = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]
@@ -335,14 +336,14 @@ class RecordedLimits:
     def _probe(
         self, robot: Robot, index: int, elapsed: FloatArray, factor: FloatArray, change: FloatArray
     ) -> dict[str, AnyArray]:
-        """Deviations of the variables of one joint at times of the task that is passed so slowly."""
+        """Return standard deviations of one joint at times of the task, slowed down and with a change."""
         motion = self.trajectory.at(self.trajectory.start + elapsed)
         motion = motion.mapped(motion.time, lambda array, order: array / factor[:, None] ** order)
         motion.commanded[STIFFNESS.key][:, index] += change
         covariances = {}
         for signal, estimate in self._estimates.items():
             covariance = estimate.covariance(elapsed)
-            if signal is STIFFNESS:  # what is added makes it a command
+            if signal is STIFFNESS:  # with an addition, stiffness is a command and no longer a recording
                 covariance[index][..., change != 0] = 0.0
             orders = np.arange(signal.orders)
             covariances[signal] = covariance / factor ** np.add.outer(orders, orders)[..., None]
@@ -355,21 +356,21 @@ class RecordedLimits:
 
 
 BISECTIONS = 50
-"""Bisections of a share of 0 to 1: down to rounding."""
+"""Bisections of the interval 0 to 1, down to rounding."""
 
 
 class Range(NamedTuple):
-    """Smallest and largest admissible stiffness, (samples,); none where low > high or low is NaN."""
+    """Admissible stiffness, minimum and maximum, (samples,); none where low > high or low is NaN."""
 
     low: FloatArray
     high: FloatArray
 
 
 def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
-    """Return the admissible stiffness at every instant of a load, whose low end always exists.
+    """Return the admissible stiffness at every instant of a load; `low` is never NaN.
 
     Raises:
-        ImpossibleError: no stiffness fixes the joint, or it has none to choose.
+        ImpossibleError: no stiffness fixes the joint, or its stiffness cannot be chosen.
     """
     variable_stiffness_actuator(joint)
     if reason := acceptance.path_reason(joint, load):
@@ -384,7 +385,7 @@ def variable_stiffness_actuator(joint: Joint) -> Actuator:
     """Return the actuator of a joint, if its stiffness can be chosen.
 
     Raises:
-        ImpossibleError: the actuator has none to choose.
+        ImpossibleError: the stiffness cannot be chosen.
     """
     if "stiffness" not in joint.actuator.commanded:
         raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
@@ -392,14 +393,14 @@ def variable_stiffness_actuator(joint: Joint) -> Actuator:
 
 
 def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -> Range:
-    """Stiffness that keeps the margin, the joint's stiffness limit and the deflection limits.
+    """Return the stiffness range that keeps the margin, the stiffness limits and the deflection limits.
 
     The margin min(sigma - lower, upper - sigma)/sigma >= m means lower/(1-m) <= sigma <= upper/(1+m).
 
     Args:
-        joint: with springs and limits.
-        command: its elastic torque counts, and its stiffness as a scale.
-        near_singular: the margin m.
+        joint: joint with springs and limits.
+        command: command that gives the elastic torque; its stiffness serves as a scale only.
+        near_singular: margin m.
     """
     actuator = variable_stiffness_actuator(joint)
     corridor = actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
@@ -412,10 +413,10 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
 
 
 def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray) -> FloatArray:
-    """Return the stiffness from `lower` on up to which both deflections keep their limit.
+    """Return the largest stiffness above `lower` at which both deflections keep their limits, by bisection.
 
-    With the stiffness grows the preload: phi_1 increases and phi_2 decreases, or the other way round. What is
-    halved is a share x of 0 to 1, which maps to all stiffness above `lower`.
+    Preload grows with stiffness: phi_1 increases and phi_2 decreases, or vice versa. The bisected x maps
+    0..1 to all stiffness above `lower`, as lower + scale x/(1 - x).
     """
     limits = np.array(actuator.max_deflections)[:, None]
     kept, broken = np.zeros_like(lower), np.ones_like(lower)

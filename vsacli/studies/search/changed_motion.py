@@ -1,4 +1,4 @@
-"""Trajectories with another stiffness, with divided steps, or slower at the rate of a recording."""
+"""Trajectories with another stiffness, more finely sampled, or slowed down at the rate of a recording."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times, Unifor
 from vsacli.trajectory.trajectory import Trajectory
 
 NOTHING: Mapping[int, FloatArray] = MappingProxyType({})
-"""No change of any component."""
+"""Changes of no component."""
 
 
 def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]) -> Trajectory:
-    """Return a trajectory with constants added to the stiffness of joints, given by index, N m/rad (N/m).
+    """Return a trajectory with constants added to the stiffness of joints, N m/rad (N/m) by joint index.
 
-    A stiffness that is a formula stays one, and one to which nothing is added stays as it is.
+    A stiffness in closed form remains in closed form; if all constants are zero, it remains unchanged.
     """
     stiffness = trajectory.commanded[STIFFNESS.key]
     if not any(constants.values()):
@@ -46,12 +46,12 @@ def with_stiffness(trajectory: Trajectory, stiffness: Profile) -> Trajectory:
 
 
 def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
-    """Return a trajectory with the same steps, whose stiffness is recorded at them.
+    """Return a trajectory at the same times, with its stiffness given as values at the samples.
 
     Args:
-        trajectory: the trajectory to change.
-        changes: for joints by index the addition to the stiffness, its rate and its second derivative at the
-            steps, (3, steps), N m/rad (N/m) per s^k.
+        trajectory: trajectory to change.
+        changes: addition to the stiffness with its first two derivatives at the samples, (3, samples),
+            N m/rad (N/m) per s^k, by joint index.
     """
     time = trajectory.times.block(0, trajectory.samples)
     stiffness = _at_steps(STIFFNESS, trajectory.commanded[STIFFNESS.key], trajectory, changes)
@@ -59,10 +59,8 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
 
 
 def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
-    """Return the same, but what was recorded at other times than the steps is known at the steps alone.
-
-    All that a file records has the same times, and the stiffness has those of the steps.
-    """
+    """Return the trajectory with each resampled recording replaced by its values at the samples."""
+    # all recorded signals of a file have the same times, and the stiffness has those of the samples
     resampled = {signal for signal, estimate in trajectory.estimates.items() if estimate.resampled}
 
     def known(signal: Signal, profile: Profile) -> Profile:
@@ -74,7 +72,7 @@ def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
 def _at_steps(
     signal: Signal, profile: Profile, trajectory: Trajectory, changes: Mapping[int, FloatArray] = NOTHING
 ) -> HermiteSpline:
-    """Return a signal known at the steps with all its derivatives, and something added to some components."""
+    """Return a signal given by values and derivatives at the samples, with `changes` added by component."""
     elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
     rows = profile.samples(0, trajectory.samples, elapsed).copy()
     for component, change in changes.items():
@@ -93,7 +91,7 @@ def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajecto
 
 
 def rate_of(trajectory: Trajectory) -> float | None:
-    """Return the steps per second, also of a recording whose stamps are even; None if they are not."""
+    """Return the sample rate in Hz, also of a recording with even time stamps; None if they are uneven."""
     times = trajectory.times
     if isinstance(times, UniformTimes | ResampledTimes):
         return times.rate
@@ -101,16 +99,17 @@ def rate_of(trajectory: Trajectory) -> float | None:
 
 
 def with_kept_rate(trajectory: Trajectory, factor: float, rate: float | None) -> tuple[Trajectory, float]:
-    """Return a recording that becomes slower with steps at a rate, and by which factor it is still slower.
+    """Return a recording resampled for a slow-down, and the factor by which it remains to be slowed down.
 
-    A record without derivatives is kept, and resampled as by `rate` in a file. One with derivatives, which
-    `rate` would leave out, is recorded anew at the steps. Declared motions keep their rate by themselves, and
-    what is known at its samples alone has no other steps; both are returned as they are.
+    A recording without derivatives is kept and resampled, as with `rate` in a file. A recording with
+    derivatives, which `rate` would drop, is replaced by values and derivatives at the new samples. Motions in
+    closed form already have the rate, and signals known only at their samples cannot be resampled; both are
+    returned unchanged.
 
     Args:
-        trajectory: the recorded one.
-        factor: by which it is to be passed more slowly.
-        rate: steps per second; None if there is no such rate.
+        trajectory: recorded trajectory.
+        factor: factor of the slow-down.
+        rate: sample rate, Hz; None if the recording has no uniform rate.
     """
     if rate is None or not isinstance(trajectory.times, RecordedTimes) or not trajectory.known_between:
         return trajectory, factor
@@ -136,7 +135,7 @@ def _has_derivatives(trajectory: Trajectory) -> bool:
 
 
 def _resampled(profile: Profile, start: float) -> Profile:
-    """Return a record whose fit counts; what was changed at the samples is fitted through its values."""
+    """Return a profile that is resampled from a fit; values at samples are interpolated by a new fit."""
     if isinstance(profile, HermiteSpline):
         samples = Samples(
             signal=profile.signal,
@@ -151,14 +150,15 @@ def _resampled(profile: Profile, start: float) -> Profile:
 
 
 PARTS = (1, 2, 4, 8, 16)
-"""Parts into which steps are divided, one after the other. A reader takes samples with all derivatives for
-one function if the highest one is nearly a line between samples; pieces of one step take eight parts."""
+"""Subdivisions of the sampling intervals, tried in this order. A reader takes samples with all derivatives
+for one function if the highest derivative is nearly linear between them; splines with a piece per interval
+require eight."""
 
 
 def as_one_function(trajectory: Trajectory) -> Trajectory:
-    """Return a trajectory with its steps divided, if they have to be so that a file describes it.
+    """Return a trajectory with subdivided sampling intervals, if a file describes it only so.
 
-    Where a signal comes from a fit, or is not known between its samples, steps stay as they are.
+    A trajectory with a fitted signal, or one that is known only at its samples, is returned unchanged.
     """
     if trajectory.estimates or not trajectory.known_between:
         return trajectory
@@ -167,7 +167,7 @@ def as_one_function(trajectory: Trajectory) -> Trajectory:
 
 
 def reads_back(trajectory: Trajectory) -> bool:
-    """Return whether all signals that are recorded at the steps are taken for one function by a reader."""
+    """Return whether a reader takes each signal given at the samples for one function between them."""
     return all(
         belong_together(profile.time, profile.rows)
         for _, profile in trajectory.profiles()
@@ -176,7 +176,7 @@ def reads_back(trajectory: Trajectory) -> bool:
 
 
 def _divided(trajectory: Trajectory, parts: int) -> Trajectory:
-    """Return the same functions at more steps; formulas stay formulas."""
+    """Return the same functions sampled more finely; closed forms remain closed forms."""
     steps = trajectory.times.block(0, trajectory.samples)
     shares = np.arange(parts) / parts
     time = np.append((steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel(), steps[-1])

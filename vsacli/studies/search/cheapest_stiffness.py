@@ -1,4 +1,4 @@
-"""The cheapest stiffness along a fixed motion, along which joints do not depend on each other."""
+"""The stiffness of least cost along a fixed motion; there, joints can be optimized one by one."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ from vsacli.studies.search.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
 SEARCHES = 10
-"""Searches of a joint: a constant, some starts, finer and finer splines; not all of them may be needed."""
+"""Largest number of inner searches of a joint: a constant, several starts, finer and finer splines."""
 
 
 class Countdown:
-    """Tells of searches as they are done, of `SEARCHES` in all whatever their number."""
+    """Progress of one joint or timing: it reports `SEARCHES` searches in all, however many there are."""
 
     def __init__(self, progress: Callable[[int], object]) -> None:
         self._progress, self._left = progress, SEARCHES
 
     def count(self) -> None:
-        """One is done."""
+        """Report one search."""
         if self._left:
             self._left -= 1
             self._progress(1)
 
     def finish(self) -> None:
-        """All are."""
+        """Report the searches that were not needed."""
         self._progress(self._left)
         self._left = 0
 
 
 TIME, TIMING, BOTH = "time", "timing", "both"
-"""Words for minimizing the time, and for varying more than the stiffness."""
+"""Words for minimizing the time, and for varying the timing or both timing and stiffness."""
 
 
 def varied_joints(robot: Robot, vary: str) -> list[int]:
-    """Return the joints whose stiffness varies, by index.
+    """Return the indices of the joints whose stiffness varies.
 
     Raises:
-        InputError: there are none, although it is to vary, or there is no such word.
+        InputError: `vary` is unknown, or the stiffness is to vary and no joint has one to choose.
     """
     if vary not in (STIFFNESS.key, TIMING, BOTH):
         raise InputError.one(f"what varies must be 'stiffness', {TIMING!r} or {BOTH!r}, not {vary!r}")
@@ -64,20 +64,20 @@ def varied_joints(robot: Robot, vary: str) -> list[int]:
 
 
 def check_timing_varies(vary: str) -> None:
-    """Refuse to minimise the time where the timing does not vary.
+    """Check that the timing varies, as minimizing the time requires.
 
     Raises:
-        InputError: it does not.
+        InputError: only the stiffness varies.
     """
     if vary == STIFFNESS.key:
         raise InputError.one(f"time is what {TIMING!r} varies for, or {BOTH!r}, not {vary!r}")
 
 
 def chosen_joints(robot: Robot) -> list[int]:
-    """Return the joints whose stiffness is commanded, by index.
+    """Return the indices of the joints whose stiffness is commanded.
 
     Raises:
-        InputError: there are none.
+        InputError: no joint has a stiffness to choose.
     """
     chosen = [index for index, joint in enumerate(robot.joints) if STIFFNESS.key in joint.actuator.commanded]
     if not chosen:
@@ -86,10 +86,10 @@ def chosen_joints(robot: Robot) -> list[int]:
 
 
 def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criterion:
-    """Return the criterion for joints, by index, if it can be computed.
+    """Return the criterion of a name, after a check that it can be computed for the joints.
 
     Raises:
-        InputError: it cannot, or there is no such criterion.
+        InputError: the name is unknown, or a joint lacks a parameter.
     """
     if name not in CRITERIA:
         raise InputError.one(f"what is minimised must be one of {', '.join(CRITERIA)}, not {name!r}")
@@ -100,20 +100,20 @@ def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criteri
 
 
 def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
-    """Return times since the start, s, at which a run misses margin or limits; None if it keeps them.
+    """Return times since the start, s, at which a run misses margin or limits, also between samples.
 
-    Between the steps, too; empty if it is the self-check alone that fails.
+    None means that it keeps them; an empty array means that only the self-check fails.
     """
     task = Task(Acceptance(what.robot, what.margin), trajectory)
     return task.falls_short(Remedy(0.0, what.robot, trajectory))
 
 
 HALVES = 2
-"""Parts into which a load divides each step on its own."""
+"""Subdivisions of each sampling interval in a load without further instants."""
 
 LOOKED_AT = 3000
-"""Instants of a period at which bounds are looked at, at least: with 8 for each piece of the spline, a search
-along 15 steps fell short between them five times."""
+"""Smallest number of instants of a period at which bounds are checked: with 8 for each piece of the spline, a
+search along 15 sampling intervals was refused between its instants five times."""
 
 
 def cheapest_stiffness(
@@ -133,7 +133,7 @@ def cheapest_stiffness(
 
 
 class Found(NamedTuple):
-    """The profiles that were found, by index of the joint, and the trajectory with the best of them."""
+    """The best profiles and best constants, by joint index, and the trajectory with the best profiles."""
 
     best: dict[int, Profile]
     constant: dict[int, Profile | None]
@@ -144,11 +144,11 @@ class CheapestStiffness:
     """A search for the best stiffness of all joints.
 
     Args:
-        acceptance: the rule for every step.
-        trajectory: the motion.
-        criterion: the minimized quantity.
-        seed: of the starts that are drawn.
-        progress: is told how many searches are done.
+        acceptance: acceptance rule for every sample.
+        trajectory: motion, which is kept.
+        criterion: objective.
+        seed: seed of the random starts.
+        progress: function to call with the number of further searches that are done.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class CheapestStiffness:
         """Search until a run of the result keeps every limit between its samples as well.
 
         Raises:
-            ImpossibleError: with the reason of each joint for which nothing was found.
+            ImpossibleError: nothing was found; the error has the reason of each joint.
         """
 
         def attempt(rule: Acceptance) -> tuple[Found, FloatArray | None]:
@@ -185,10 +185,10 @@ class CheapestStiffness:
         return found
 
     def best(self, acceptance: Acceptance) -> Found:
-        """Search with a rule, at whose instants between the steps every profile keeps all limits as well.
+        """Return the best profiles under a rule, whose instants between samples count for every joint.
 
         Raises:
-            ImpossibleError: with the reason of each joint for which nothing was found.
+            ImpossibleError: nothing was found; the error has the reason of each joint.
         """
         robot, reasons = acceptance.robot, list(self._reasons_of_others())
         loads = joint_loads(robot, self._trajectory, self._joints, between=self._between(acceptance))
@@ -206,7 +206,7 @@ class CheapestStiffness:
         return Found(best, constant, changed)
 
     def optima(self, found: Found) -> dict[str, JointOptimum]:
-        """Return the result for each joint, by name, with the costs of runs."""
+        """Return the result of each joint, by name, with costs computed by runs."""
         joints = self._acceptance.robot.joints
         constants = {index: each for index, each in found.constant.items() if each is not None}
         trajectories = self._trajectory, self._with_stiffness(constants), found.trajectory
@@ -228,7 +228,7 @@ class CheapestStiffness:
         return optima
 
     def _reasons_of_others(self) -> Sequence[str]:
-        """Return the trouble of joints without a stiffness to choose."""
+        """Return the violations of joints without a stiffness to choose, as clauses."""
         robot = self._acceptance.robot
         others = [index for index in range(len(robot.joints)) if index not in self._joints]
         loads = joint_loads(robot, self._trajectory, others)
@@ -239,9 +239,10 @@ class CheapestStiffness:
         return [reason for reason in reasons if reason]
 
     def _between(self, acceptance: Acceptance) -> FloatArray:
-        """Instants between the steps, since the start: of coarse steps many, and those of the rule.
+        """Return instants between samples: dense ones if samples are few, and those of the rule.
 
-        Of a joint whose load repeats itself the first period counts, so that instants are there as well.
+        They are times since the start, s. Only the first period of a periodic load is optimized, so instants
+        of later periods are also mapped to the first.
         """
         trajectory, counts = self._trajectory, {max(count, 1) for count in self._periods.values()}
         shortest, longest = ((trajectory.samples - 1) // count for count in (max(counts), min(counts)))
@@ -256,7 +257,7 @@ class CheapestStiffness:
         return type(self._criterion)(repeating=self._periods[index] > 0)
 
     def _of_joint(self, acceptance: Acceptance, index: int, load: Load) -> tuple[Profile | None, Profile]:
-        """Return the best constant, if there is one, and the best profile over a period of a joint."""
+        """Return the best constant, if there is one, and the best profile of a joint over one period."""
         steps = np.arange(len(load.time))[load.steps][: self._steps_of_period(index) + 1]
         period = replace(load.at(slice(steps[-1] + 1)), steps=steps)
         search = StiffnessSearch(
@@ -276,7 +277,7 @@ class CheapestStiffness:
         return (self._trajectory.samples - 1) // max(self._periods[index], 1)
 
     def _with_stiffness(self, profiles: Mapping[int, Profile]) -> Trajectory:
-        """Return the motion with other stiffness profiles of joints, by index."""
+        """Return the motion with other stiffness profiles, given by joint index."""
         commanded = self._trajectory.block(0, self._trajectory.samples).commanded
         changes = {}
         for index, profile in profiles.items():

@@ -1,8 +1,8 @@
 """Search over slow-down, stiffness and preload together, for the combination of least cost.
 
-Given the factor of the slow-down, the demand of the links is known; given that, corridor and limits of a
-joint do not depend on the other joints. So the search has one dimension, along which joints are fixed one by
-one.
+The factor of the slow-down determines the link torques, and with these the attainable range and the limits of
+a joint do not depend on the other joints. So the search is one-dimensional, over the factor; at each factor,
+joints are fixed one by one.
 """
 
 from __future__ import annotations
@@ -26,28 +26,27 @@ from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FA
 from vsacli.studies.search.task import Combination, Form, Task, constant_change, preload_path
 
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
-"""Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
+"""Pairs of a factor and the relative stride of the scan up to it: fine strides for small slow-downs."""
 
 MOST_ROUNDS = 20
-"""Rounds of adding samples that refuse a change accepted by the watched ones; two or three are usual."""
+"""Limit on rounds that add samples refusing a change that watched ones accept; two or three are usual."""
 
 SAME_CORRIDOR = 1e-6
-"""Relative difference of two corridors that may be rounding."""
+"""Relative difference up to which the ends of attainable ranges are equal but for rounding."""
 
 PRELOAD_GAIN = 0.9
-"""Share to which the other preload must bring down the change of a joint, so that it is worth its while."""
+"""Share of a joint's cost below which the other preload must bring it to be preferred."""
 
 
 class CombinedSearch:
     """A search for the combination of changes that fixes a motion.
 
-    It looks at some samples, which others that refuse the result join. Changes that help at a factor are
-    kept.
+    Some samples are watched; others that refuse a result join them. Results are cached by factor.
 
     Args:
-        task: motion to fix, rule, and cost.
-        form: of the changes of stiffness.
-        preloads: whether joints may take the other preload.
+        task: motion to fix, acceptance rule, and cost.
+        form: search for the stiffness change of a joint.
+        preloads: whether joints may change to the other preload.
     """
 
     def __init__(self, task: Task, form: Form = constant_change, *, preloads: bool = False) -> None:
@@ -60,19 +59,19 @@ class CombinedSearch:
 
     @property
     def exchangeable(self) -> bool:
-        """Whether the other preload of some joint may be worth trying."""
+        """Whether the other preload of some joint makes a difference."""
         return any(len(choices) > 1 for choices in self._choices)
 
     def smallest(self) -> Combination | None:
-        """Return the combination of least cost; confirmed on all steps if its changes are constants."""
+        """Return the combination of least cost, confirmed at all samples if its changes are constants."""
         return self._confirmed(self._smallest)
 
     def fastest(self) -> Combination | None:
-        """Return the combination with the least slow-down, as above."""
+        """Return the combination with the least slow-down, confirmed in the same way."""
         return self._confirmed(self._fastest)
 
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
-        # along a recording, limits count beyond its noise: only a whole evaluation says what is refused
+        # limits allow for the noise of a recording, which the quick test in `_ruled_out` does not know
         if not self._impossible and not self.task.trajectory.estimates:
             self._impossible |= self._ruled_out()
         for _ in range(MOST_ROUNDS):
@@ -84,12 +83,12 @@ class CombinedSearch:
         return None
 
     def _watch(self, part: TaskSamples) -> None:
-        """Let these samples judge from now on."""
+        """Watch these samples from now on, and discard results that were found for others."""
         self._watched, self._path = part, PathCommands(self.task.acceptance.robot, part.motion)
         self._found: dict[int, Combination] = {}
 
     def _refused(self, found: Combination) -> TaskSamples | None:
-        """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
+        """Return samples that refuse constant changes, from the first block with any, as commanded."""
         acceptance = self.task.acceptance_with(found)
         change = np.zeros(self.task.trajectory.joints)
         change[list(found.constants)] = list(found.constants.values())
@@ -100,7 +99,7 @@ class CombinedSearch:
         return None
 
     def _fastest(self) -> Combination | None:
-        """Return the combination with the least factor that scan and bisection find."""
+        """Return the combination with the smallest factor found by scan and bisection."""
         refused = self._factors.first - 1
         for number in self._scanned():
             if self._at(number) is not None:
@@ -114,7 +113,7 @@ class CombinedSearch:
         return self._at(number)
 
     def _smallest(self) -> Combination | None:
-        """Return the combination of least cost: a scan, then ever shorter steps to either side."""
+        """Return the combination of least cost, by a scan and then ever shorter steps to either side."""
         best, at, cost = None, 0, self.task.cost
         for number in self._scanned():
             if best is not None and cost.of_factor(self._factors.factor(number)) >= best.size:
@@ -144,7 +143,7 @@ class CombinedSearch:
         return best
 
     def _at(self, number: int) -> Combination | None:
-        """Return the combination that fixes every joint at a factor, if there is one."""
+        """Return the combination that fixes every joint at the factor of a number, or None."""
         if number in self._impossible:
             return None
         if number not in self._found:
@@ -156,9 +155,9 @@ class CombinedSearch:
         return self._found[number]
 
     def _ruled_out(self) -> set[int]:
-        """Return numbers of scanned factors at which a few steps show that nothing helps.
+        """Return numbers of scanned factors at which a few samples already exclude every stiffness.
 
-        Many factors are tried at once, which costs hardly more than one of them.
+        Many factors are evaluated in one call, which costs hardly more than a single one.
         """
         few = self._watched.select(evenly(len(self._watched.factor), FIRST_STEPS))
         numbers, found = list(self._scanned()), set[int]()
@@ -172,7 +171,7 @@ class CombinedSearch:
         return found
 
     def _refusing(self, part: TaskSamples) -> BoolArray:
-        """Return the steps at which no stiffness of some joint is accepted, (samples,)."""
+        """Return a mask of the samples at which some joint is refused at any stiffness, (samples,)."""
         acceptance = self.task.acceptance
         impossible = np.zeros(len(part.factor), dtype=np.bool_)
         loads = part.loads(acceptance.robot)
@@ -193,7 +192,7 @@ class CombinedSearch:
         """Return the changes of all joints at a factor.
 
         Raises:
-            ImpossibleError: some joint is refused whatever its stiffness.
+            ImpossibleError: some joint is refused at any stiffness.
         """
         acceptance = self.task.acceptance
         watched = self._watched
@@ -213,7 +212,7 @@ class CombinedSearch:
         )
 
     def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
-        """Cost, preload and change of stiffness of one joint; the preload is empty if it stays as it is."""
+        """Return cost, preload ("" if unchanged) and change of stiffness of one joint."""
         if index in self.task.acceptance.ignored:
             return 0.0, "", np.zeros(len(load.time))
         asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
@@ -239,7 +238,7 @@ class CombinedSearch:
         return self.form(acceptance, joint, load)
 
     def _scanned(self) -> Iterator[int]:
-        """Yield the numbers of the factors at which a search looks."""
+        """Yield the numbers of the scanned factors."""
         number = self._factors.first
         while number < self._factors.last:
             yield number
@@ -253,11 +252,12 @@ class CombinedSearch:
 
 
 def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
-    """Return the variants of each joint by the word for its preload, "" if unchanged.
+    """Return the variants of each joint by preload; the key "" is the unchanged joint.
 
     Args:
-        robot: the robot.
-        watched: some steps; the other preload is a choice if it makes a difference there. None: no choice.
+        robot: robot with the joints.
+        watched: samples at which the other preload must make a difference to be a variant; None for no
+            other preload.
     """
     choices = [{"": joint} for joint in robot.joints]
     if watched is None:
@@ -272,7 +272,7 @@ def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]
 
 
 def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
-    """Return whether two preloads of an actuator are mirror images, as those of like springs are."""
+    """Return whether the preloads of an actuator are mirror images, as those of equal springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
     asked = command.tau_e, command.commanded["stiffness"], command.q

@@ -1,4 +1,7 @@
-"""Objectives: rms or peak of the motor torques, energy, heat in the windings; also over a run."""
+"""Objectives: rms or peak of the motor torques, energy, copper loss.
+
+Each `Criterion` is a sum of integrands for the interior-point method, and a number computed from a run.
+"""
 
 from __future__ import annotations
 
@@ -30,15 +33,15 @@ if TYPE_CHECKING:
 
 
 Values = Dual | FloatArray
-"""(instants,), which may carry derivatives."""
+"""Arrays (instants,), which may carry derivatives."""
 
 SMOOTHINGS = (0.1, 0.01, 1e-3)
-"""Shares of the mean power over which the positive part of power is smoothed, one after the other: with
-the last, a cost is overestimated by at most half as much, and the place of the optimum moves by less."""
+"""Widths over which the positive part of power is smoothed in successive searches, relative to the mean
+power. The last one overestimates a cost by at most half as much, and moves the optimum by less."""
 
 
 class Scale(NamedTuple):
-    """Scale of a cost in its unit, its duration, s, and its smoothing."""
+    """Size of a cost in its unit, duration in s, and smoothing relative to the mean power."""
 
     cost: float = 1.0
     duration: float = 1.0
@@ -50,17 +53,17 @@ UNSCALED = Scale()
 
 @dataclass(frozen=True)
 class Criterion:
-    """A cost of a joint: an integral over time, or a level that bounds something.
+    """A cost of a joint: an integral over time, or a level that bounds values from above.
 
     Attributes:
-        name: as on the command line.
-        words: for reports.
-        quantity: its quantity.
-        relative: whether joints, taken together, count relative to their cost as commanded.
-        over_time: places of the integrands that are integrated over time; others count at instants.
-        levels: rows besides those of the motion: 1 if the cost is a level that bounds something, else 0.
-        smoothings: how much it is smoothed, one search after the other.
-        repeating: whether the motion ends as it begins, on its way.
+        name: name on the command line.
+        words: name in reports.
+        quantity: physical quantity of the cost.
+        relative: whether the costs of several joints are compared relative to their commanded costs.
+        over_time: indices of the integrands that are integrated over time; others are summed over instants.
+        levels: number of unknowns besides the motion: 1 if the cost is a level, otherwise 0.
+        smoothings: smoothing of the cost in successive searches.
+        repeating: whether the motion is periodic.
     """
 
     name: ClassVar[str]
@@ -73,20 +76,20 @@ class Criterion:
     repeating: bool = False
 
     def check(self, joint: Joint) -> None:
-        """Refuse a joint of which it cannot be computed.
+        """Check that the cost can be computed for a joint.
 
         Raises:
-            InputError: something is not given.
+            InputError: the joint lacks a parameter.
         """
 
     def integrands(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
         """Return the integrands of the scaled cost, each (instants,).
 
         Args:
-            joint: the joint.
-            driven: motion and torques of its motors.
-            level: the further row, if there is one, scaled in the same way.
-            scale: of the cost.
+            joint: joint whose cost it is.
+            driven: motion and torques of the joint's motors.
+            level: level, in the scale of the cost, if the cost is one.
+            scale: scale of the cost.
         """
         raise NotImplementedError
 
@@ -96,43 +99,43 @@ class Criterion:
         return weights
 
     def bound_count(self, joint: Joint) -> int:  # noqa: ARG002
-        """Number of `bounds`."""
+        """Return the number of `bounds`."""
         return 0
 
     def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
-        """Return values that a level keeps from being positive, each (instants,)."""
+        """Return bounds, each (instants,), which a sufficiently large level makes negative."""
         return ()
 
     def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """The cost itself, in its unit."""
+        """Return the cost, in its unit."""
         raise NotImplementedError
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """Return the scale of the cost: its value for some motion."""
+        """Return a scale for the cost from its value for some motion."""
         return self.of(joint, driven, time)
 
     def of_run(self, result: Result, index: int) -> float:
-        """Return the cost of a joint, by index, over the steps of a run; NaN if any is out of reach."""
+        """Return the cost of a joint, by index, over a run; NaN if any sample is infeasible."""
         raise NotImplementedError
 
     def together(self, costs: Sequence[float]) -> float:
-        """Return the cost of all joints, relative to the commanded costs if these are relative."""
+        """Combine the costs of all joints, or their ratios to the commanded costs."""
         return math.fsum(costs)
 
 
 class NoCost(Criterion):
-    """The cost where something else is minimized."""
+    """A cost of zero, for searches that minimize the time."""
 
     over_time = ()
 
     def integrands(
         self, _joint: Joint, _driven: OfJoint, _level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
-        """Return the integrands of the scaled cost, each (instants,)."""
+        """Return no integrand."""
         return ()
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """None."""
+        """Return no weights, (0, instants)."""
         return np.zeros((0, len(time)))
 
 
@@ -140,7 +143,7 @@ NO_COST = NoCost()
 
 
 class Torque(Criterion):
-    """Root mean square over time and the motors of the joint."""
+    """Root mean square of the motor torques over time and the motors of the joint."""
 
     name = "torque"
     words = "rms motor torque"
@@ -148,38 +151,38 @@ class Torque(Criterion):
     relative = True
 
     def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The mean square."""
+        """Return the mean square of the motor torques."""
         torques = _of_motors(joint, driven["tau_motor"])
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """Return the weights of a mean."""
+        """Return the weights of a mean over time."""
         weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
         return weights
 
     def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """N m (N)."""
+        """Return the rms torque, N m (N)."""
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
 
     def of_run(self, result: Result, index: int) -> float:
-        """N m (N); by trapezoids between the steps."""
+        """Return the rms torque, N m (N), by the trapezoidal rule."""
         square = np.mean(_torques_of(result, index) ** 2, axis=0)
         return math.sqrt(float(self.weights(result.time)[0] @ square))
 
     def together(self, costs: Sequence[float]) -> float:
-        """Root mean square."""
+        """Return the root mean square of the costs."""
         return math.hypot(*costs) / math.sqrt(len(costs))
 
 
 class Copper(Criterion):
-    """Heat in the windings of the motors of the joint."""
+    """Copper loss of the motors of the joint."""
 
     name = "copper"
     words = "heat in the windings"
 
     def check(self, joint: Joint) -> None:
-        """Refuse motors without resistance."""
+        """Check that the motors have a resistance."""
         if not all(joint.has(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
             raise InputError.one(
                 f"the motors of {joint.name} have no resistance, without which their heat is not known; give "
@@ -187,25 +190,25 @@ class Copper(Criterion):
             )
 
     def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The power of all windings."""
+        """Return the copper loss of all motors."""
         return [sum(_of_motors(joint, driven["copper_loss"])) / scale.cost]
 
     def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """J."""
+        """Return the heat, J."""
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
 
     def of_run(self, result: Result, index: int) -> float:
-        """J, as in the report of the run."""
+        """Return the heat in the report of the run, J."""
         heat = result.report.joints[index].energy.copper_loss
         return math.nan if heat is None else heat
 
 
 class Energy(Criterion):
-    """Positive work of the motors of the joint, without energy recovered.
+    """Positive work of the motors of the joint, without energy recovery.
 
-    Unless the motion repeats itself, the energy in its springs at the start counts as well: someone loaded
-        them.
+    Unless the motion is periodic, the energy in the springs at the start counts as well, since loading them
+    required it.
     """
 
     name = "energy"
@@ -213,30 +216,30 @@ class Energy(Criterion):
     smoothings = SMOOTHINGS
 
     def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The positive part of each power, smoothed; and the energy in the springs."""
+        """Return the smoothed positive part of the motor power, and the energy in the springs."""
         width = scale.smoothing * scale.cost / scale.duration
         powers = _of_motors(joint, driven["motor_power"])
         positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
         return [sum(positive) / scale.cost, driven["elastic_energy"] / scale.cost]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """Return an integral, and the value at the start."""
+        """Return the weights of an integral over time, and of the value at the start."""
         loaded = np.zeros_like(time)
         loaded[0] = 0.0 if self.repeating else 1.0
         return np.stack([trapezoidal(time), loaded])
 
     def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """J."""
+        """Return the energy, J."""
         spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven["motor_power"]))
         return float(np.sum(self.weights(time) * np.stack([spent, driven["elastic_energy"]])))
 
     def of_run(self, result: Result, index: int) -> float:
-        """J, as in the report of the run."""
+        """Return the positive work in the report of the run and the initial spring energy, J."""
         spent = result.report.joints[index].energy.spent
         return spent if self.repeating else spent + float(result.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
-        """Return the absolute work of the motors: their positive work may be nothing."""
+        """Return the absolute work of the motors, since their positive work may be zero."""
         passed = sum(map(np.abs, _of_motors(joint, driven["motor_power"])))
         return float(trapezoidal(time) @ passed) or 1.0
 
@@ -254,41 +257,41 @@ class Peak(Criterion):
     def integrands(
         self, _joint: Joint, _driven: OfJoint, level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
-        """The level."""
+        """Return the level."""
         return [level]
 
     def weights(self, time: FloatArray) -> FloatArray:
-        """Return the weights of a mean."""
+        """Return equal weights of sum one, so that the cost is the level."""
         return np.full((1, len(time)), 1 / len(time))
 
     def bound_count(self, joint: Joint) -> int:
-        """Two a motor."""
+        """Return two bounds for each motor."""
         return 2 * joint.actuator.motor_count
 
     def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
-        """The torques, either way."""
+        """Return the excess of each torque, in both directions, over the level."""
         torques = _of_motors(joint, driven["tau_motor"])
         return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
 
     def of(self, joint: Joint, driven: OfJoint, _time: FloatArray) -> float:
-        """N m (N)."""
+        """Return the peak torque, N m (N)."""
         return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven["tau_motor"])))
 
     def of_run(self, result: Result, index: int) -> float:
-        """N m (N)."""
+        """Return the peak torque, N m (N)."""
         return float(np.abs(_torques_of(result, index)).max())
 
     def together(self, costs: Sequence[float]) -> float:
-        """Return the largest."""
+        """Return the largest cost."""
         return max(costs)
 
 
 CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, Copper, Peak)}
-"""Criteria of the stiffness, by name."""
+"""Criteria by name."""
 
 
 def trapezoidal(time: FloatArray) -> FloatArray:
-    """Weights of the trapezoidal rule, (instants,), s."""
+    """Return the weights of the trapezoidal rule, (instants,) in s."""
     halves = np.diff(time) / 2
     weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
     return weights
@@ -298,14 +301,14 @@ ENDS_OF_CORRIDOR = "lower end of the corridor", "upper end of the corridor"
 
 
 def limit_names(checks: Sequence[LimitCheck]) -> list[str]:
-    """Return words for the `limit_bounds`."""
+    """Return the names of the `limit_bounds`."""
     return [check.flag.quantity_of(check.motor) for check in checks for _ in _finite_ends(check)]
 
 
 def limit_bounds(
     checks: Sequence[LimitCheck], of_joint: Mapping[str, Any], clearance: float
 ) -> Iterator[Any]:
-    """Yield how far variables are beyond limits less a clearance, relative to these."""
+    """Yield the excess of variables over their limits relative to the limits, plus the clearance."""
     for check in checks:
         for sign, bound in _finite_ends(check):
             size = abs(bound) or 1.0
@@ -313,17 +316,17 @@ def limit_bounds(
 
 
 def _finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
-    """Yield the ends of a range that bound anything, each with the direction that is outside."""
+    """Yield the finite ends of a range, each after the sign of the direction that leads outside."""
     yield from ((sign, end) for sign, end in zip((-1.0, 1.0), check.range, strict=True) if np.isfinite(end))
 
 
 def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Joint:
-    """Return the joint with an actuator that takes a stiffness that carries derivatives.
+    """Return a copy of a joint whose actuator accepts a stiffness that carries derivatives.
 
     Args:
-        joint: the joint.
-        directions: of derivatives; one more a motor serves phi.
-        moving_corridor: whether the ends of the corridor carry derivatives, too.
+        joint: joint to copy.
+        directions: number of derivatives that the stiffness carries; each motor adds one for phi.
+        moving_corridor: whether the ends of the attainable range carry derivatives as well.
     """
     carrying = apart(joint)
     implicit = ImplicitSolution(joint.actuator, carrying.actuator, directions + joint.actuator.motor_count)
@@ -333,50 +336,50 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
 
 
 def _of_motors(joint: Joint, variable: Any) -> list[Any]:
-    """Return the rows of the motors there are."""
+    """Return the rows of the motors that the joint has."""
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
 
 
 def _torques_of(result: Result, index: int) -> FloatArray:
-    """Return the torques of the motors of a joint at the steps of a run, (motors, steps)."""
+    """Return the motor torques of a joint over a run, (motors, samples)."""
     torques: FloatArray = result.tau_motor[:, index].T[: result.robot.joints[index].actuator.motor_count]
     return torques
 
 
 def run_costs(robot: Robot, trajectory: Trajectory, criteria: Mapping[int, Criterion]) -> dict[int, float]:
-    """Return the costs of joints, by index, over the steps of a run; NaN where any is out of reach."""
+    """Return the costs of a run, by joint index; NaN for a joint with an infeasible sample."""
     result = inverse_dynamics(robot, trajectory)
     return {index: criterion.of_run(result, index) for index, criterion in criteria.items()}
 
 
 def asked_size(joint: Joint, load: Load, criterion: Criterion) -> float:
-    """Return the scale of the cost of a load as commanded; NaN if it is out of reach."""
+    """Return the scale of the cost of a load as commanded; NaN if it is infeasible."""
     steps = load.at(load.steps)
     return criterion.size(joint, drive(joint, steps.command), steps.time)
 
 
 ROUGH_GAP = 1e-5
-"""Increase of the cost by bounds after a search from far; a tenth of the difference that two starts may
-have."""
+"""Last barrier of a search from a distant start, as an increase of the cost by the bounds: a tenth of the
+difference within which two starts count as equal."""
 
 
 class Costed(Protocol):
-    """Anything with a cost that can be smoothed."""
+    """A part of a problem with a cost that can be smoothed."""
 
     criterion: Criterion
     scale: Scale
 
 
 def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Sequence[Costed]) -> Minimum:
-    """Return a minimum of a cost that is smoothed less and less, far from it at least.
+    """Return a minimum of a cost; a cold search smooths it less and less.
 
-    From far it is found as well as comparing starts takes; a warm search goes on from the best of these.
+    A cold search is as accurate as the comparison of starts requires; a warm one continues from the best.
 
     Args:
-        problem: the sum of the costs, with bounds.
+        problem: sum of the costs, with bounds.
         start: unknowns that keep all bounds.
-        gap: increase of the cost by bounds at the first barrier.
-        costed: parts with these costs, all by one criterion.
+        gap: increase of the cost by the bounds at the first barrier; above `WARM_GAP` the search is cold.
+        costed: parts of the problem with these costs, all with the same criterion.
     """
     smoothings = costed[0].criterion.smoothings
     cold = gap > WARM_GAP

@@ -1,4 +1,4 @@
-"""A fix as files: the trajectory, a CSV table for signals without formula, the robot with another preload."""
+"""A fix as files: the trajectory, a CSV table for signals without a formula, a robot with another preload."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
-    """Return the YAML file, which is always written, and the CSV file and the robot file beside it."""
+    """Return the paths of the YAML file, which is always written, and of the CSV file and the robot file."""
     document = Path(path)
     return document, document.with_suffix(".csv"), document.with_name(f"{document.stem}-robot.yaml")
 
 
 def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
-    """Refuse a YAML path that cannot be written, or beside which the others cannot.
+    """Check that a fix can be written to a YAML path and to the other `fixed_paths`.
 
     Raises:
-        InputError: it does not end in .yaml or .yml.
-        StorageError: as `Outputs.file`.
+        InputError: the path does not end in .yaml or .yml.
+        StorageError: see `Outputs.file`.
     """
     if Path(path).suffix not in (".yaml", ".yml"):
         raise InputError.one("the fixed trajectory is a YAML file; give a name that ends in .yaml", path)
@@ -49,14 +49,14 @@ def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
 
 
 def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
-    """Write the trajectory of a remedy, and its robot if that has another preload.
+    """Write the trajectory of a fix, and its robot if that has another preload.
 
-    Signals stay formulas where they are; else they are recorded at the steps with all their derivatives, in a
-    CSV file of the same stem. The robot file is that of the robot with the preload changed.
+    Signals in closed form remain formulas; the others are written to a CSV file of the same stem, at the
+    samples and with all derivatives. The robot file is a copy of the user's file with the preload changed.
 
     Raises:
-        InputError, StorageError: as `check_fixed_target`, or the robot file cannot be changed so, or the disk
-            fails.
+        InputError, StorageError: see `check_fixed_target`; or the robot file does not admit the change, or
+            writing fails.
     """
     document, table, robot = fixed_paths(path)
     trajectory, names = remedy.declared, remedy.robot.joint_names
@@ -78,7 +78,7 @@ def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
 
 
 def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
-    """Return the keys and values that declare each signal; signals without formula refer to the table."""
+    """Return the keys and values that declare each signal; signals without a formula refer to the table."""
     profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
     chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
     profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
@@ -97,7 +97,7 @@ def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]
 
 
 def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
-    """Return the choices given for the fit of a recording."""
+    """Return the options of a recording's fit that were given, by key."""
     if estimate is None:
         return {}
     chosen = estimate.choice
@@ -109,7 +109,7 @@ def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
 def _document(
     trajectory: Trajectory, factor: float, declared: Mapping[Signal, dict[str, Any]]
 ) -> Iterator[str]:
-    """Lines of the trajectory file."""
+    """Yield the lines of the trajectory file."""
     yield f"format: {FORMAT}\n"
     yield f"name: {for_yaml(trajectory.name)}\n"
     if factor != 1:
@@ -126,7 +126,7 @@ def _document(
 
 
 def _in_one_line(content: Any) -> str:
-    """Content as YAML in flow style, words without quotes."""
+    """Return content as YAML in flow style, with identifiers unquoted."""
     match content:
         case dict():
             return "{" + ", ".join(f"{key}: {_in_one_line(each)}" for key, each in content.items()) + "}"
@@ -140,7 +140,7 @@ def _in_one_line(content: Any) -> str:
 def _write_table(
     trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
 ) -> None:
-    """Records that were fitted, as they were; of other signals value and derivatives at the steps."""
+    """Write fitted recordings as they were recorded, and other signals with derivatives at the samples."""
     records = {signal: each.record.columns for signal, each in trajectory.estimates.items()}
     names = [name for signal in recorded for name in records.get(signal, signal.names)]
     raw = {name: rows for columns in records.values() for name, rows in columns.items()}
@@ -158,7 +158,7 @@ def _write_table(
 
 
 def _stamps(trajectory: Trajectory) -> FloatArray:
-    """Return the times of recorded signals: those of the samples, or of a recording if these differ."""
+    """Return the times of the table: those of a resampled recording, otherwise those of the samples."""
     for estimate in trajectory.estimates.values():
         if estimate.resampled:
             return estimate.record.start + estimate.record.time
@@ -170,9 +170,9 @@ def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
 
 
 def robot_text(remedy: Remedy, folder: Path) -> str:
-    """Return the text of the robot's file with the preloads of a remedy, as it stands in a folder.
+    """Return the text of the robot's file with the preloads of a fix, for a file in `folder`.
 
-    Everything else, comments too, stays as the user wrote it; paths lead to the same files.
+    Everything else, comments included, remains as the user wrote it; paths still refer to the same files.
 
     Raises:
         InputError: the robot was not read from a file, or its text does not admit the change.

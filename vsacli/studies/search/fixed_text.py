@@ -1,8 +1,8 @@
-"""The text of a trajectory file with a fix in it: changed values are replaced in place, all else is kept.
+"""The user's trajectory file with a fix applied: changed values are replaced in place, all else is kept.
 
-Comments, layout, units and names of joints stay as the user wrote them. Not every file can be changed so, for
-example one whose values are shared by aliases; so the text is read again, and counts only if it says what the
-fix is. Profiles in closed form are declared by the keys and values of `formula`.
+Comments, layout, units and joint names remain as the user wrote them. Not every file admits this, for example
+if aliases share values; so the new text is read back and used only if it reproduces the fix at every sample.
+Profiles in closed form are declared by the keys and values of `formula`.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.trajectory import Trajectory
 
 SAME_TRANSITION = 1e-9
-"""Largest relative difference of transitions that are rounded differently."""
+"""Largest relative difference of transition times that are equal but for rounding."""
 
 
 def formula(profile: Profile) -> dict[str, Any] | None:
-    """Return the keys and values that declare a profile over its span; None if there is no formula of it."""
+    """Return the keys and values that declare a profile over its span; None if it has no formula."""
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
             return {"type": "polynomial", "degree": degree, "start": _values(start), "end": _values(end)}
@@ -62,7 +62,7 @@ def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
 
 
 def _sequence(chain: Chain) -> dict[str, Any] | None:
-    """Return a motion in parts, each with its duration; where it stands still it dwells."""
+    """Return the keys of a sequence: its parts with their durations, constant ones as dwells."""
     parts = []
     for part in chain.parts:
         declared = formula(part)
@@ -75,7 +75,7 @@ def _sequence(chain: Chain) -> dict[str, Any] | None:
 
 
 def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
-    """Return the changes between levels that last equally long; None if the parts are something else."""
+    """Return the transitions of a step profile, which have equal durations; None for another chain."""
     changes = [part for part in chain.parts if isinstance(part, RestToRest)]
     held = [part for part in chain.parts if isinstance(part, Constant)]
     durations = list(map(_length, changes))
@@ -89,7 +89,7 @@ def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
 
 
 def _steps(chain: Chain) -> dict[str, Any] | None:
-    """Levels with changes between them."""
+    """Return the keys of a step profile: levels, start times and duration of its transitions."""
     changes = changes_of_steps(chain)
     if changes is None:
         return None
@@ -112,23 +112,23 @@ def _values(values: Sequence[float]) -> list[float | None]:
 
 
 SAME = 1e-9
-"""Relative difference of numbers that are equal up to rounding, as limits admit it."""
+"""Relative difference up to which values are equal but for rounding; limits tolerate it."""
 
 CLOSE = 1e-8
-"""Share of the peak of a variable by which the text may miss it: rounding, and four derivatives of that."""
+"""Share of a variable's peak by which the text may miss it: rounding, amplified by four derivatives."""
 
 DIGITS = 12
-"""Digits of numbers that are written in place of others."""
+"""Significant digits of the new values."""
 
 Values = dict[str, Any]
 
 
 class TableFile(NamedTuple):
-    """A table that stands beside the text, in which the stiffness is recorded.
+    """The table with the stiffness, next to the trajectory file.
 
     Attributes:
-        name: of the file.
-        write: writes it to a stream.
+        name: file name.
+        write: function that writes the table to a stream.
     """
 
     name: str
@@ -136,12 +136,12 @@ class TableFile(NamedTuple):
 
 
 def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | None:
-    """Return the user's file with the fix in it, as it stands in a folder; None if it cannot be changed so.
+    """Return the text of the user's file with the fix applied; None if the file does not admit it.
 
     Args:
-        remedy: the fix.
-        table: with the stiffness, if that is no formula any more.
-        folder: where the text will stand.
+        remedy: fix to apply.
+        table: table with the stiffness, if it no longer has a formula.
+        folder: folder of the new file.
     """
     asked = remedy.asked
     source = None if asked is None else next(iter(asked.sources), None)
@@ -162,7 +162,7 @@ def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | 
 
 
 def _candidates(remedy: Remedy, asked: Trajectory, text: str) -> Iterator[Values]:
-    """Values by path that may declare the fix: other times, or `slow_down` if that is not enough."""
+    """Yield values by path that may declare the fix: first with other times, then with `slow_down`."""
     root, names = root_of(text), remedy.robot.joint_names
     fixed = remedy.declared
     named = {"name": fixed.name}
@@ -183,7 +183,7 @@ def _duration(root: Node, asked: Trajectory, fixed: Trajectory) -> Values:
 
 
 def _changed(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
-    """Return the numbers of formulas that differ, by path, where the text has them."""
+    """Return the values of formulas that differ, by path, where the text has them."""
     values: Values = {}
     for signal, profile in _profiles(asked).items():
         old, new = formula(profile), formula(_profiles(fixed)[signal])
@@ -204,7 +204,7 @@ def _profiles(trajectory: Trajectory) -> dict[Signal, Profile]:
 def _differences(
     node: Node, path: str, old: Any, new: Any, names: Sequence[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Paths below one, with new values: single values where the text has them, else all of a list."""
+    """Yield paths below `path` and their new values: single values if the text has them, else whole lists."""
     if isinstance(old, dict):
         for key, value in old.items():
             below = node_at(node, key)
@@ -226,7 +226,7 @@ def _differences(
 
 
 def _same(old: Any, new: Any) -> bool:
-    """Return whether numbers, or lists of them, are the same but for rounding."""
+    """Return whether numbers, or lists of them, are equal but for rounding."""
     if isinstance(old, list):
         return all(map(_same, old, new))
     if isinstance(old, float | int) and isinstance(new, float | int):
@@ -235,7 +235,7 @@ def _same(old: Any, new: Any) -> bool:
 
 
 def _shared(values: list[Any]) -> Any:
-    """One number for all joints, or one each."""
+    """Return one number if it holds for all joints, else the list."""
     given = [None if value is None else _rounded(value) for value in values]
     return given[0] if all(value == given[0] for value in given) else given
 
@@ -246,7 +246,7 @@ def _rounded(value: float) -> float | int:
 
 
 def _with(text: str, values: Values, table: TableFile | None) -> str:
-    """Return the text with values; with a table the stiffness is recorded, and the times come from there."""
+    """Return the text with new values; with a table, stiffness and times come from the table."""
     if table is None:
         return edited(text, values)
     values = {key: value for key, value in values.items() if not key.startswith("stiffness.")}
@@ -260,7 +260,7 @@ def _with(text: str, values: Values, table: TableFile | None) -> str:
 
 
 def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool:
-    """Return whether a text in place of the user's file gives the fix at every sample."""
+    """Return whether a text in place of the user's file reproduces the fix at every sample."""
     with temporary_folder() as place:
         copies = {path: str(place / "text")}
         (place / "text").write_text(text, encoding="utf-8")

@@ -1,4 +1,8 @@
-"""Fixes of a task: each kind of change alone, the combinations worth choosing from, and the causes."""
+"""Fixes of an infeasible task: each kind of change alone, combinations to choose from, and the causes.
+
+A search finds changes that samples accept; a run confirms each one, and instants at which it fails count as
+samples of the next search.
+"""
 
 from __future__ import annotations
 
@@ -34,26 +38,26 @@ from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 SIMPLER_SHARE = 1.05
-"""Ratio up to which a larger fix with fewer kinds of change is still worth more."""
+"""Size ratio up to which a larger fix with fewer kinds of change is preferred."""
 
 FASTER_SHARE = 0.8
-"""Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
+"""Share of the extra duration of another fix below which a larger fix of the same kinds is worth offering."""
 
 
 def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
-    """Return the smallest changes after which every step has the margin and keeps every limit.
+    """Return the smallest changes after which every sample has the margin and keeps every limit.
 
-    Slow-down, constant change and other profile of the stiffness each on its own, and combinations of them to
-    choose from, also with another preload. Each is recomputed over all steps and confirmed.
+    Slow-down, constant stiffness change, other stiffness profile and longer transition are tried alone, then
+    combinations of them to choose from, also with the other preload. A run over all samples confirms each.
 
     Args:
-        robot: the robot.
-        trajectory: the commanded motion.
-        near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
+        robot: robot that executes the motion.
+        trajectory: commanded motion.
+        near_singular: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
 
     Raises:
-        InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is no
-            possible margin.
+        InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is not a
+            valid margin.
         TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
@@ -84,14 +88,14 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
 
 
 class _Tried(NamedTuple):
-    """Results of searches by name, fixes worth choosing, and those that fall short between samples."""
+    """Results of searches by name, fixes to choose from, and fixes that a run refused between samples."""
 
     found: Mapping[str, list[Remedy] | NotPossible]
     chosen: list[Remedy]
     failed: list[Remedy]
 
     def part(self, name: str) -> Any:
-        """Return the only change of the fix that a search of `ALONE` found, or why there is none."""
+        """Return the only change of the fix that a search of `ALONE` found, or the reasons for none."""
         found = self.found.get(name)
         if not isinstance(found, list):
             return found
@@ -101,19 +105,19 @@ class _Tried(NamedTuple):
 
     @staticmethod
     def slower(fixes: Sequence[Remedy]) -> bool:
-        """Return whether one of some fixes slows the motion down."""
+        """Return whether any of the fixes slows the motion down."""
         return any(each.longer > 0 for each in fixes)
 
 
 def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
-    """Search for fixes of the joints that have one; instants at which they fall short join in."""
+    """Search for fixes of all joints that can be fixed."""
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))
         return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
     asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
     tried = _searched(asked)
-    # steps between the samples may exceed a limit of the position that these keep, at whatever speed
+    # new samples between the recorded ones may exceed a position limit that these keep, at any speed
     lost = not tried.chosen or (tried.slower(tried.failed) and not tried.slower(tried.chosen))
     if lost and isinstance(task.trajectory.times, RecordedTimes):
         at_samples = _searched(replace(asked, keeps_rate=False))
@@ -122,10 +126,7 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
 
 
 def _searched(asked: Task) -> _Tried:
-    """Return the result of searches in which instants that fall short join the samples.
-
-    A search is repeated only if a fix that it found falls short.
-    """
+    """Run all searches; repeat those whose fix a run refuses, with the refused instants as samples."""
     searches = {**ALONE, **COMBINED}
     if not has_transitions(asked.trajectory):
         del searches["transition"]
@@ -178,7 +179,7 @@ def _other_preloads(task: Task) -> Iterator[Remedy]:
 
 
 def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:
-    """Yield the remedies with profiles that slow down as these combinations do, as far as there are any."""
+    """Yield fixes with profiles at the slow-downs of these combinations, where profiles are found."""
     factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
     for found in factors.values():
         with suppress(ImpossibleError):
@@ -186,7 +187,7 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Re
 
 
 _Search = Callable[[Task], Iterable[Remedy]]
-"""Function from a task to fixes that hold at its samples, or an ImpossibleError."""
+"""Search for fixes of a task that its samples accept; raises ImpossibleError if there are none."""
 
 ALONE: Mapping[str, _Search] = {
     "slow_down": _slow_down,
@@ -194,24 +195,24 @@ ALONE: Mapping[str, _Search] = {
     "stiffness_profile": lambda task: [task.with_profiles(AS_IT_IS)],
     "transition": lambda task: [task.with_transition()],
 }
-"""Searches for one kind of change, by its name in `Suggestions`."""
+"""Searches for one kind of change, by the name of the kind in `Suggestions`."""
 
 COMBINED: Mapping[str, _Search] = {
     "constants": _constants,
     "profiles": _profiles,
     "preloads": _other_preloads,
 }
-"""Searches for fixes that may take several kinds of change."""
+"""Searches for fixes that may combine several kinds of change."""
 
 
 def _worth_choosing(
     candidates: Iterable[Remedy], task: Task, confirmed: list[Remedy]
 ) -> tuple[list[Remedy], list[Remedy], FloatArray]:
-    """Return fixes that a run confirms and no simpler one replaces, another preload last.
+    """Select the fixes that a run confirms and that no simpler fix replaces.
 
     Returns:
-        These; those that a run does not confirm, since they fall short between the steps; and when these do,
-        as times since the start of the task, s.
+        Selected fixes, those with another preload last; fixes that a run refused between samples; and the
+        instants at which it did, as times since the start of the task, s.
     """
     chosen: list[Remedy] = []
     failed: list[Remedy] = []
@@ -228,7 +229,7 @@ def _worth_choosing(
 
 
 def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
-    """Return whether a remedy has nothing for it that another one, no more complicated, has not."""
+    """Return whether another fix with the same or fewer kinds of change makes this one superfluous."""
     if beside.kinds < remedy.kinds:
         return beside.size <= SIMPLER_SHARE * remedy.size
     faster = remedy.longer < FASTER_SHARE * beside.longer
@@ -236,7 +237,7 @@ def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
 
 
 def causes(task: Task) -> Iterator[tuple[int, Cause]]:
-    """Index and cause of each joint with a step that is not accepted."""
+    """Yield the index of each joint with a refused sample, and the cause."""
     acceptance = task.acceptance
     refused = np.flatnonzero(acceptance.refused_joints(task.trajectory)).tolist()
     steps = acceptance.watched(task.trajectory, WATCHED_STEPS)
@@ -253,7 +254,7 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
 
 
 def is_fixable(task: Task, index: int) -> bool:
-    """Return whether a joint on its own can be fixed, by any kind of change."""
+    """Return whether any kind of change fixes a joint, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
     if CombinedSearch(alone, preloads=True).smallest() is not None:
@@ -267,7 +268,7 @@ def is_fixable(task: Task, index: int) -> bool:
 
 
 def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> tuple[str, bool]:
-    """Return the cause, and whether it is sure that something helps."""
+    """Return the cause as a clause, and whether it implies that some change helps."""
     at_rest = acceptance.trouble(joint, resting)
     if at_rest is None:
         worst = acceptance.trouble(joint, moving)
@@ -287,7 +288,7 @@ def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> 
 
 
 def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
-    """Return the limit that the softest constant stiffness exceeds, in a clause; empty if there is none."""
+    """Return, as a clause, the limit that the softest admissible constant exceeds; "" if there is none."""
     try:
         offset = lowest_offset(acceptance, joint, resting)
     except ImpossibleError:
@@ -302,7 +303,7 @@ def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
 
 
 def _what(trouble: Trouble, *, resting: bool = False) -> str:
-    """Return the exceeded bound, and when."""
+    """Return the exceeded bound and the time, as a clause."""
     when = f"at t = {trouble.time:.3f} s" + (", even at rest" if resting else "")
     if math.isnan(trouble.bound):
         return f"its springs cannot carry the elastic torque {when}"

@@ -1,9 +1,9 @@
 """A local minimum of a smooth cost under smooth inequalities, by a primal-dual interior-point method.
 
-Newton's method on the perturbed conditions of Karush, Kuhn and Tucker, from one point that keeps all bounds
-to the next, with a line search on the barrier function (Nocedal & Wright, "Numerical Optimization", 2nd ed.,
-chapter 19; Forsgren & Gill, SIAM Journal on Optimization 8, 1998). The barrier falls as soon as
-its problem is solved well enough (Waechter & Biegler, Mathematical Programming 106, 2006, equation 7).
+Newton's method solves the perturbed Karush-Kuhn-Tucker conditions; every iterate is strictly inside all
+bounds, with a line search on the barrier function (Nocedal & Wright, "Numerical Optimization", 2nd ed.,
+chapter 19; Forsgren & Gill, SIAM Journal on Optimization 8, 1998). The barrier parameter is reduced once its
+problem is solved well enough (Waechter & Biegler, Mathematical Programming 106, 2006, equation 7).
 """
 
 from __future__ import annotations
@@ -17,80 +17,80 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 
 FIRST_GAP, LAST_GAP = 0.1, 1e-7
-"""Increase of the cost by all bounds together, at the first and at the last barrier; costs are about one."""
+"""Increase of the cost by all bounds together at the first and at the last barrier; costs are about 1."""
 
 WARM_GAP = 1e-3
-"""The same to begin with near a minimum: a wide barrier would drive the search away from it."""
+"""First gap of a search that starts near a minimum: a larger barrier would drive it away."""
 
 NEARLY_SOLVED = 0.1
-"""Share of the gap that a Newton step may still gain when the next barrier's turn has come."""
+"""Share of the gap below which the gain of a Newton step ends a barrier problem."""
 
 CENTRED = 10.0
-"""Multiples of the barrier parameter to which products of bounds and multipliers come near it by then."""
+"""Largest deviation of slack times multiplier from the barrier parameter then, as a multiple of it."""
 
 SAFEGUARD = 1e5
-"""Factor by which products may be off at all: Waechter's equation 16, with less freedom."""
+"""Largest ratio of a multiplier to its central value: equation 16 of Waechter & Biegler, but tighter."""
 
 FOUND = 100.0
-"""Multiples of the last gap that may be left to gain, gap and Newton step together, at a minimum."""
+"""Remaining gain at a minimum, gap plus Newton step, as a multiple of the last gap."""
 
 PATIENCE, STALLED = 8, 1e-5
-"""Steps that together lower the cost by less than this share of it, after which bounds are too curved."""
+"""Number of steps, and the relative change of the cost within them below which the search has stalled."""
 
 TO_BOUNDARY = 0.995
-"""Share of the way to where a bound or a multiplier vanishes that a step may go."""
+"""Share of the way to a zero of a slack or a multiplier that a step may cover."""
 
 ARMIJO = 1e-4
-"""Share of the decrease that the slope foretells with which a step is content."""
+"""Required share of the decrease that the slope predicts, in the line search."""
 
 SHORTEST_STEP = 1e-10
-"""Share of a step below which the search gives up: rounding hides the gain."""
+"""Share of a step below which the line search gives up, since rounding hides the gain."""
 
 MOST_ADDED = 1e6
-"""Multiple of its diagonal that a matrix may get to be positive definite; steps go down the gradient then."""
+"""Largest multiple of its diagonal added to a matrix to make it definite; it is gradient descent by then."""
 
 MOST_STEPS = 200
-"""Steps; twenty to forty are usual."""
+"""Limit on steps; twenty to forty are usual."""
 
 
 class Point(Protocol):
-    """Cost and bounds of unknowns, with their derivatives there; see `Problem`."""
+    """Cost and bounds at given unknowns, with their derivatives; see `Problem`."""
 
     cost: float
     bounds: FloatArray
     gradient: FloatArray
 
     def changes(self, step: FloatArray) -> FloatArray:
-        """Return the changes of the bounds with a step, to first order, (bounds,)."""
+        """Return the first-order changes of the bounds with a step, (bounds,)."""
 
     def pull(self, weights: FloatArray) -> FloatArray:
-        """Return the sum of the gradients of the bounds, each times its weight, (unknowns,)."""
+        """Return the weighted sum of the gradients of the bounds, (unknowns,)."""
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
-        """Hessian of the cost plus multipliers times bounds, plus their gradients' squares times stiffening.
+        """Return the Hessian of the Lagrangian plus the sum of stiffening * g g^T over gradients g of bounds.
 
-        If `convex`, with a positive semidefinite part in place of the first.
+        If `convex`, the Hessian is replaced by a positive semidefinite part of it.
         """
 
 
 class Problem(Protocol):
-    """A cost, and bounds each of which shall not be positive."""
+    """A cost, and bounds that must not be positive."""
 
     def values(self, unknowns: FloatArray) -> tuple[float, FloatArray]:
-        """Cost and bounds; not finite where they are not defined."""
+        """Return cost and bounds; they are not finite where they are undefined."""
 
     def at(self, unknowns: FloatArray) -> Point:
-        """Return the same with derivatives."""
+        """Return cost and bounds with derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """The end of a search, which keeps all bounds.
+    """The end of a search, strictly inside all bounds.
 
     Attributes:
-        unknowns: (unknowns,).
-        cost: there.
-        found: whether the conditions for a minimum hold, as well as was asked for.
+        unknowns: unknowns at the end, (unknowns,).
+        cost: cost at the end.
+        found: whether the conditions for a minimum hold to the requested accuracy.
     """
 
     unknowns: FloatArray = field(repr=False)
@@ -106,15 +106,15 @@ def minimise(
     stalled: float = STALLED,
     enough: Callable[[FloatArray], bool] = lambda _: False,
 ) -> Minimum:
-    """Search from a start that keeps all bounds, none of them exactly.
+    """Search for a minimum from a start strictly inside all bounds.
 
     Args:
-        problem: cost and bounds of the order of one.
-        start: (unknowns,).
-        gap: what bounds may raise the cost by at the first barrier; `WARM_GAP` near a minimum.
-        last: the same at the last barrier.
-        stalled: share of the cost that some steps together must gain for the search to go on.
-        enough: whether unknowns are good enough to end the search.
+        problem: problem with cost and bounds of the order of one.
+        start: initial unknowns, (unknowns,).
+        gap: increase of the cost by the bounds at the first barrier; `WARM_GAP` near a minimum.
+        last: increase of the cost by the bounds at the last barrier.
+        stalled: relative change of the cost within `PATIENCE` steps below which the search ends.
+        enough: test of unknowns that ends the search early.
     """
     point, unknowns = problem.at(start), start
     count = max(len(point.bounds), 1)
@@ -142,13 +142,13 @@ def minimise(
 
 
 def _stalled(costs: Sequence[float], share: float) -> bool:
-    """Return whether the last steps changed hardly anything."""
+    """Return whether the cost has hardly changed in the last `PATIENCE` steps."""
     recent = costs[-PATIENCE - 1 :]
     return len(recent) > PATIENCE and max(recent) - min(recent) < share * abs(recent[-1])
 
 
 class _Step(NamedTuple):
-    """A step of unknowns and multipliers; the former shall gain half of `gain` in the barrier function."""
+    """A step of unknowns and multipliers; its predicted decrease of the barrier function is `gain`/2."""
 
     unknowns: FloatArray
     multipliers: FloatArray
@@ -156,7 +156,7 @@ class _Step(NamedTuple):
 
 
 class _Newton:
-    """Newton's steps from a point, for any barrier parameter."""
+    """Newton steps from a point, for any barrier parameter."""
 
     def __init__(self, point: Point, multipliers: FloatArray) -> None:
         self._point, self._multipliers, self._slack = point, multipliers, -point.bounds
@@ -164,7 +164,7 @@ class _Newton:
         self.factor = _factor(point, multipliers, self._stiffening)
 
     def step(self, barrier: float) -> _Step:
-        """Return the step of both, whose part for the unknowns the Cholesky factor solves."""
+        """Return the step; multipliers are eliminated, and the Cholesky factor solves for the unknowns."""
         from scipy.linalg import cho_solve
 
         assert self.factor is not None
@@ -176,15 +176,15 @@ class _Newton:
         return _Step(unknowns, multipliers, float(right @ unknowns))
 
     def centred(self, barrier: float) -> bool:
-        """Return whether products of bounds and multipliers are near the barrier parameter."""
+        """Return whether all products of slack and multiplier are near the barrier parameter."""
         off = np.abs(self._slack * self._multipliers - barrier)
         return bool(off.max(initial=0.0) <= CENTRED * barrier)
 
 
 def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool] | None:
-    """Return the factor of Newton's matrix if positive definite, else of a convex one with a small addition.
+    """Return the Cholesky factor of Newton's matrix, or of a convex one plus a multiple of its diagonal.
 
-    None if that is not possible: numbers overflow, or nothing depends on some unknown.
+    Return None if that fails, because values overflow or nothing depends on some unknown.
     """
     from scipy.linalg import LinAlgError, cho_factor
 
@@ -202,10 +202,7 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 def _line_search(
     problem: Problem, point: Point, unknowns: FloatArray, step: _Step, barrier: float
 ) -> float | None:
-    """Return the share of the step that lowers the barrier function and keeps the bounds.
-
-    None if none does.
-    """
+    """Return a share of the step that lowers the barrier function inside the bounds, or None."""
     merit = point.cost - barrier * float(np.log(-point.bounds).sum())
     share = _share_to_boundary(-point.bounds, -point.changes(step.unknowns))
     rounding = 1e-14 * max(1.0, abs(merit))
@@ -220,13 +217,13 @@ def _line_search(
 
 
 def _moved(multipliers: FloatArray, step: FloatArray, central: FloatArray) -> FloatArray:
-    """Multipliers after a step, positive and not too far from the central ones."""
+    """Return the multipliers after a step, positive and within `SAFEGUARD` of the central ones."""
     moved = multipliers + _share_to_boundary(multipliers, step) * step
     return np.clip(moved, central / SAFEGUARD, central * SAFEGUARD)
 
 
 def _share_to_boundary(values: FloatArray, step: FloatArray) -> float:
-    """Return the share of a step after which positive values are positive still."""
+    """Return the share of a step, at most 1, after which positive values remain positive."""
     falling = step < 0
     shares = -TO_BOUNDARY * values[falling] / step[falling]
     return float(min(1.0, shares.min(initial=1.0)))

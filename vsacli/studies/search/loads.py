@@ -1,4 +1,4 @@
-"""Samples of a task, slower or with another stiffness; the load of each joint at them, and its periods."""
+"""Samples of a task, slowed down or stiffened; the load of each joint at these samples, and its periods."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Instants(NamedTuple):
-    """Times of samples in the trajectory of the task.
+    """Times of samples in the unchanged trajectory of a task.
 
     Attributes:
-        time: of that trajectory as it is, (samples,) in s.
-        factor: by which it is passed more slowly there, (samples,).
+        time: times in the unchanged trajectory, (samples,) in s.
+        factor: factor of the slow-down at each sample, (samples,).
     """
 
     time: FloatArray
     factor: FloatArray
 
     def at(self, steps: IndexArray | slice) -> Instants:
-        """Return some of them."""
+        """Return the instants with the given indices."""
         return Instants(self.time[steps], self.factor[steps])
 
 
 class TaskSamples(NamedTuple):
-    """Some steps of a task, as they are or changed.
+    """Some samples of a task, unchanged or changed.
 
     Attributes:
-        motion: with the times of the task as it is.
-        factor: by which it is passed more slowly, (samples,).
+        motion: motion at the samples, with the times of the unchanged task.
+        factor: factor of the slow-down at each sample, (samples,).
     """
 
     motion: Motion
@@ -49,7 +49,7 @@ class TaskSamples(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> TaskSamples:
-        """Return the steps start..stop-1 of a task, or of one that was stretched by a factor."""
+        """Return the samples start..stop-1 of a task, or of a task stretched by a factor."""
         motion = trajectory.block(start, stop)
         if factor != 1:
             motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
@@ -57,12 +57,12 @@ class TaskSamples(NamedTuple):
 
     @classmethod
     def between(cls, trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> TaskSamples:
-        """Instants between the steps of a task, or of one that was stretched by a factor.
+        """Return instants between the samples of a task, or of a task stretched by a factor.
 
         Args:
-            trajectory: the task, or the stretched one.
-            elapsed: since the start of the task as it is, s.
-            factor: of the stretching.
+            trajectory: trajectory of the task, stretched if `factor` is not 1.
+            elapsed: times since the start of the unchanged task, s.
+            factor: factor by which the trajectory is stretched.
         """
         motion = motion_between(trajectory, elapsed, factor)
         unstretched = _unstretched(trajectory, motion.time, factor)
@@ -74,12 +74,12 @@ class TaskSamples(NamedTuple):
         return Instants(self.motion.time, self.factor)
 
     def slowed(self, factor: float) -> TaskSamples:
-        """Return the same passed more slowly, at rest if the factor is infinite."""
+        """Return the samples slowed down by a factor; with an infinite factor they are at rest."""
         slower = self.motion.mapped(self.motion.time, lambda array, order: array / factor**order)
         return TaskSamples(slower, self.factor * factor)
 
     def stiffened(self, change: FloatArray) -> TaskSamples:
-        """Return the part with an addition to the stiffness of each joint, (joints,) N m/rad (N/m)."""
+        """Return the samples with a constant added to each joint's stiffness, (joints,) N m/rad (N/m)."""
         motion, arrays = self.motion, self.motion.of_joints
         arrays[STIFFNESS.key] = arrays[STIFFNESS.key] + change
         return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
@@ -92,13 +92,13 @@ class TaskSamples(NamedTuple):
         return [Load(motion.time, command, self.instants) for command in commands]
 
     def select(self, steps: IndexArray) -> TaskSamples:
-        """Return some of the steps, by index."""
+        """Return the samples with the given indices."""
         motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
         return TaskSamples(motion, self.factor[steps])
 
 
 def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Motion:
-    """Return the motion at instants, as of `TaskSamples.between`, with the times of the trajectory."""
+    """Return the motion at the instants of `TaskSamples.between`, with the times of the given trajectory."""
     return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
 
 
@@ -114,7 +114,7 @@ def evenly_chosen(trajectory: Trajectory, steps: int) -> TaskSamples:
 
 
 def joined(parts: Iterable[TaskSamples]) -> TaskSamples:
-    """Return the steps of several parts, one after the other."""
+    """Return the samples of several parts, concatenated."""
     motions, factors = zip(*parts, strict=True)
     variables = [motion.variables() for motion in motions]
     arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
@@ -125,13 +125,13 @@ def joined(parts: Iterable[TaskSamples]) -> TaskSamples:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """The command of one joint and its elastic torque.
+    """The command of one joint, with its elastic torque, over time.
 
     Attributes:
-        time: ascending, (samples,) in s, of the task or of one that was stretched.
-        command: rows (samples,).
-        instants: where they stand in the task.
-        steps: which of the times are steps, by index, where others are among them.
+        time: ascending times, (samples,) in s, of the task or of the stretched task.
+        command: command at these times, rows of (samples,).
+        instants: the same times in the unchanged task.
+        steps: indices of the times that are samples of the trajectory; the others lie between samples.
     """
 
     time: FloatArray
@@ -141,13 +141,13 @@ class Load:
 
     @classmethod
     def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
-        """Return the load at times of a task stretched by a factor, the samples among them."""
+        """Return a load at times of a stretched task, which include the samples."""
         unstretched = _unstretched(trajectory, time, factor)
         steps = np.searchsorted(time, trajectory.times.block(0, trajectory.samples))
         return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
 
     def at(self, steps: IndexArray | slice) -> Load:
-        """Return the load at some of the times."""
+        """Return the load at the times with the given indices."""
         rows = {name: row[steps] for name, row in self.command.arrays().items()}
         return Load(self.time[steps], Command.of(rows), self.instants.at(steps))
 
@@ -166,16 +166,16 @@ def joint_loads(
     factor: float = 1.0,
     between: FloatArray | None = None,
 ) -> list[Load]:
-    """Return the loads of some joints, given by index: at every step, and half-way from one to the next.
+    """Return the loads of some joints at every sample and midway between samples.
 
-    Every second instant, from the first on, is a step, unless there are further instants.
+    Every second instant, from the first on, is a sample, unless there are further instants.
 
     Args:
-        robot: the robot.
-        trajectory: a task, or one that was stretched.
-        joints: by index.
-        factor: of the stretching.
-        between: further instants, as times since the start of the task as it is, s.
+        robot: robot that executes the motion.
+        trajectory: trajectory of the task, stretched if `factor` is not 1.
+        joints: indices of the joints.
+        factor: factor by which the trajectory is stretched.
+        between: further instants, as times since the start of the unchanged task, s.
     """
     instants = 2 * trajectory.samples - 1
     names = Command.names(trajectory.commanded)
@@ -204,29 +204,29 @@ def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...
 
 
 def _unstretched(trajectory: Trajectory, time: FloatArray, factor: float) -> FloatArray:
-    """Times of a stretched trajectory as they were before."""
+    """Return times of a stretched trajectory as times of the unchanged one."""
     return stretch(time, trajectory.start, 1 / factor)
 
 
 SAME = 1e-6
-"""Largest difference of repeated values, relative to the largest value of each variable."""
+"""Largest difference between periods, relative to the peak of each variable."""
 
 AT_REST = 1e-9
-"""Largest share of its largest velocity with which a motion rests: rounding."""
+"""Share of its peak velocity below which a joint is at rest but for rounding."""
 
 LOADING = ("q", "dq", "ddq", "tau_e", "dtau_e", "ddtau_e")
 """Variables that load the motors, apart from the stiffness."""
 
 FEWEST_STEPS = 20
-"""Samples of a period; faster repetition is not distinguished from noise."""
+"""Smallest number of samples in a period; faster repetition is not distinguished from noise."""
 
 
 class Ends(NamedTuple):
-    """The start and end of a motion.
+    """The conditions at the start and end of a motion.
 
     Attributes:
-        periods: how many equal periods it has; 0 if it does not repeat itself.
-        moving: whether it begins, and ends, on its way without repeating itself.
+        periods: number of equal periods; 0 if the motion is not periodic.
+        moving: whether a motion that is not periodic begins, and ends, with nonzero velocity.
     """
 
     periods: int = 0
@@ -234,7 +234,7 @@ class Ends(NamedTuple):
 
     @classmethod
     def of(cls, trajectory: Trajectory, loads: Sequence[Load]) -> Ends:
-        """Return the ends of a trajectory with the loads of all joints."""
+        """Return the ends of a trajectory; `loads` are those of all joints."""
         moving = _moving_ends(trajectory)
         if not any(moving):
             return cls()
@@ -255,9 +255,9 @@ def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
 
 
 def periods(load: Load) -> int:
-    """Return the number of equal periods, in whole samples, of a load; 0 if it ends in another state.
+    """Return the number of equal periods of a load, each of whole samples; 0 if it is not periodic.
 
-    Every second instant of a load is a step.
+    Every second instant of the load must be a sample.
     """
     arrays = load.command.arrays()
     rows = np.stack([arrays[name] for name in LOADING])

@@ -1,8 +1,7 @@
 """The stiffness profile nearest to the commanded one: a cubic spline between bounds, by a quadratic program.
 
-`vsacli optimize` has a solver of its own, which goes from a profile that keeps all bounds to a local minimum
-of any cost. Here such a profile is searched, the minimum is the only one, and bounds may touch,
-which leaves nothing between them to start from.
+`vsacli optimize` has another solver, `interior_point`, which needs a profile inside all bounds to start from.
+Here no such profile is known, and none exists where bounds touch; in return, the minimum is unique.
 """
 
 from __future__ import annotations
@@ -32,36 +31,36 @@ if TYPE_CHECKING:
 
 DEGREE = 3
 PIECES_PER_SMOOTHING = 3
-"""Pieces of the spline in one smoothing time: the objective leaves nothing finer."""
+"""Pieces of the spline per smoothing time; the objective suppresses finer detail."""
 
 END_HALVINGS = 4
-"""Halvings of the pieces at both ends, where the function begins flat although its bounds may move."""
+"""Halvings of the first and last pieces: the function is flat at the ends although its bounds may move."""
 
 DECAY_SMOOTHING_TIMES = 8
-"""Smoothing times over which a change dies out; e^-8 is left of it."""
+"""Smoothing times over which a change decays, to e^-8."""
 
 MOST_COEFFICIENTS = 100
-"""Coefficients that the dense solver handles in a tenth of a second; more make coarser pieces."""
+"""Number of coefficients that the dense solver handles in 0.1 s; if there are more, pieces become coarser."""
 
 MOST_ROUNDS = 100
-"""Rounds of adding the instants at which bounds are missed; about five are needed."""
+"""Limit on rounds that add instants of violated bounds; about five are needed."""
 
 BOUND_ACCURACY = 1e-7
-"""Share of its largest value by which a spline may miss its bounds; a tenth of the reserve."""
+"""Share of its peak by which a spline may violate its bounds; a tenth of `CLEARANCE`."""
 
 
 class NoSplineError(Exception):
-    """No spline with pieces of this length lies between the bounds."""
+    """Error: no spline with pieces of this length lies between the bounds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The bounds of a function over time.
+    """Bounds of a function over time.
 
     Attributes:
-        time: ascending, (instants,) in s.
-        low: smallest value, (instants,).
-        high: largest value, above `low`; infinite where nothing bounds it.
+        time: ascending times, (instants,) in s.
+        low: lower bound, (instants,).
+        high: upper bound, not below `low`; infinite where there is none.
     """
 
     time: FloatArray
@@ -70,26 +69,26 @@ class Bounds:
 
     @property
     def excluding_zero(self) -> BoolArray:
-        """Instants at which the function cannot vanish."""
+        """Mask of the instants at which the function cannot be zero."""
         return (self.low > 0) | (self.high < 0)
 
     def missed_by(self, values: FloatArray) -> FloatArray:
-        """Return the distance of values outside; zero or negative inside."""
+        """Return the violation of the bounds by values; zero or negative between the bounds."""
         return np.maximum(self.low - values, values - self.high)
 
 
 def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = None) -> BSpline[np.float64]:
-    """Return the C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
+    """Return the C2 function x between bounds that minimizes the integral of x^2 + smoothing^4 x''^2.
 
-    Its first and second derivative vanish at both ends, so that the sum starts and stops as the profile
-    did. A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least
-    distance by non-negative least squares (Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter
-    23). Far from where the bounds exclude zero, x is zero.
+    Its first and second derivatives are zero at both ends, so that the changed profile starts and stops like
+    the commanded one. It is the solution of a convex quadratic program in the coefficients of a cubic spline,
+    solved as a least-distance problem by non-negative least squares (Lawson & Hanson, "Solving Least Squares
+    Problems", 1974, chapter 23). Far from the instants at which the bounds exclude zero, x is zero.
 
     Args:
-        bounds: excluding zero at some instants.
-        smoothing: time in s within which it is expensive to change.
-        knots: times that its pieces may begin and end at, both ends among them; any if None.
+        bounds: bounds that exclude zero at some instants.
+        smoothing: time scale below which variation is penalized, s.
+        knots: times at which pieces may begin and end, both ends included; any time if None.
 
     Raises:
         NoSplineError: the bounds are too narrow or change too fast.
@@ -107,7 +106,7 @@ def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = 
 def _knots(
     bounds: Bounds, smoothing: float, allowed: FloatArray | None
 ) -> tuple[FloatArray, BoolArray, float]:
-    """Pieces, which coefficients are free, and the smoothing that such pieces can follow."""
+    """Return the knots, a mask of the free coefficients, and the smoothing time that the pieces resolve."""
     first, last = bounds.time[[0, -1]]
     while True:
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
@@ -124,16 +123,16 @@ def _knots(
 
 
 def _graded(ends: FloatArray) -> FloatArray:
-    """Ends of equal pieces, of which the outer ones are halved again and again towards their ends."""
+    """Return the ends of equal pieces, with the first and last pieces halved repeatedly towards the ends."""
     halves = (ends[1] - ends[0]) * 0.5 ** np.arange(END_HALVINGS, 0, -1)
     return np.concatenate([ends[:1], ends[0] + halves, ends[1:-1], ends[-1] - halves[::-1], ends[-1:]])
 
 
 def _shapes(free: BoolArray) -> FloatArray:
-    """Coefficients of the shapes that make up the spline, (coefficients, shapes).
+    """Return the B-spline coefficients of each shape, (coefficients, shapes).
 
-    One for each free coefficient; but the first three are one, and so are the last three, since the first two
-    derivatives vanish at an end where these are equal.
+    There is one shape per free coefficient; only the first three coefficients share one, and so do the last
+    three, since the first two derivatives are zero at an end where these are equal.
     """
     rows = np.arange(len(free))
     shape_of = np.clip(rows - DEGREE + 1, 0, len(free) - 2 * DEGREE + 1)
@@ -143,14 +142,14 @@ def _shapes(free: BoolArray) -> FloatArray:
 
 
 def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
-    """Return the pieces with one of these ascending times in reach."""
+    """Return a mask of the pieces within `reach` of any of the ascending times."""
     next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
     near: BoolArray = next_time <= ends[1:] + reach
     return near
 
 
 def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
-    """Return the amount of each shape, with as many of the bounds as matter."""
+    """Return the coefficient of each shape; bounds are added at instants where they are violated."""
     from scipy.interpolate import BSpline
 
     root = _objective(knots, shapes, smoothing)
@@ -169,7 +168,7 @@ def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smooth
 
 
 def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
-    """Upper triangular R such that |R x|^2 is the integral, in smoothing times; exact by Gauss' rule."""
+    """Return upper triangular R such that |R x|^2 is the integral in smoothing times, by Gauss quadrature."""
     from scipy.interpolate import BSpline
 
     ends = knots[DEGREE:-DEGREE]
@@ -183,7 +182,7 @@ def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> Float
 
 
 def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> FloatArray:
-    """Return the x of least |root x| with rows x >= low."""
+    """Return the x that minimizes |root x| subject to rows x >= low."""
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
@@ -201,29 +200,29 @@ def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> Floa
 
 
 def peaks(missed: FloatArray) -> IndexArray:
-    """Return the worst instant of each stretch at which bounds are missed."""
+    """Return the index of the worst instant of each stretch with violated bounds."""
     padded = np.concatenate([[0.0], np.maximum(missed, 0), [0.0]])
     rising, falling = padded[1:-1] > padded[:-2], padded[1:-1] >= padded[2:]
     return np.flatnonzero(rising & falling & (missed > 0))
 
 
 MARGIN_FACTORS = (1, 2, 4, 8)
-"""Multiples of the margin tried where motor limits refuse the nearest profile: torques grow with 1/margin."""
+"""Multiples of the margin to try if motor limits refuse the nearest profile: torques grow with 1/margin."""
 
 SMOOTHING_FACTORS = (1, 2, 4, 8)
-"""Multiples of the smoothing time tried in the same way: torques grow with the second derivative."""
+"""Multiples of the smoothing time to try then: torques grow with the second derivative."""
 
 CLEARANCE = 1e-6
-"""Share of the largest change by which a profile keeps clear of its bounds, so that rounding crosses none."""
+"""Distance of a profile from its bounds, relative to the largest change, so that rounding crosses none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """The addition to the stiffness of a joint.
+    """An addition to the stiffness of a joint.
 
     Attributes:
-        time: (instants,) in s.
-        rows: the change, its rate and its second derivative, (3, instants), N m/rad (N/m) per s^k.
+        time: times, (instants,) in s.
+        rows: addition with its first two derivatives, (3, instants), N m/rad (N/m) per s^k.
     """
 
     time: FloatArray
@@ -231,14 +230,14 @@ class Change:
 
     @classmethod
     def constant(cls, time: FloatArray, value: float) -> Change:
-        """Return a change that is the same at every instant."""
+        """Return a constant change."""
         rows = np.zeros((3, len(time)))
         rows[0] = value
         return cls(time, rows)
 
     @property
     def rms(self) -> float:
-        """Root of the mean square over time, N m/rad (N/m)."""
+        """Root mean square over time, N m/rad (N/m)."""
         from scipy.integrate import trapezoid
 
         duration = self.time[-1] - self.time[0]
@@ -248,17 +247,17 @@ class Change:
 def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: float | None) -> Change:
     """Return the smoothed C2 change of least mean square that fixes a joint; the constant one if nearer.
 
-    Where the limits of the motors refuse it, the nearest of some that are smoother and keep further away from
-    the ends of the corridor.
+    If the limits of the motors refuse it, the nearest of several others is returned that are smoother or keep
+    further away from the ends of the attainable range.
 
     Args:
-        acceptance: the rule.
-        joint: the joint, at least one of whose steps is refused.
-        load: its steps and instants between them, all of which are to be accepted.
-        constant: the constant that fixes the joint, if there is one.
+        acceptance: acceptance rule.
+        joint: joint with at least one refused sample.
+        load: load of the joint at samples and between, all of which must be accepted.
+        constant: constant that fixes the joint, if there is one.
 
     Raises:
-        ImpossibleError: with the reason.
+        ImpossibleError: no change that was tried is accepted; the error has the reason.
     """
     _check_possible(acceptance, joint, load)
     nearest, *others = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
@@ -273,7 +272,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
 
 
 def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
-    """Refuse a task that no stiffness can fix."""
+    """Raise ImpossibleError if no stiffness is admissible at some instant."""
     low, high = checked_range(acceptance, joint, load)
     worst = int((low - high).argmax())
     if low[worst] > high[worst]:
@@ -286,7 +285,7 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
 def _change(
     acceptance: Acceptance, joint: Joint, load: Load, margins: float, smoothings: float
 ) -> Change | None:
-    """Return the nearest change for multiples of margin and smoothing time, or None if no spline does."""
+    """Return the nearest change for multiples of margin and smoothing time; None if no spline is found."""
     near_singular = margins * acceptance.near_singular
     if near_singular >= 1:
         return None
@@ -298,7 +297,7 @@ def _change(
     if not bounds.excluding_zero.any():
         return Change.constant(load.time, 0.0)
     try:
-        # a piece between two steps is what a file with all derivatives at the steps says of the time between
+        # pieces end at samples: a file with derivatives at the samples then describes exactly this spline
         spline = nearest_spline(bounds, smoothings * _smoothing_time(joint, load), load.time[load.steps])
     except NoSplineError:
         return None
@@ -306,7 +305,7 @@ def _change(
 
 
 def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
-    """Bounds a little narrower, unless that would leave nothing between them."""
+    """Return the bounds, narrowed by `CLEARANCE` where they are wide enough and else to their middle."""
     clearance = CLEARANCE * max(low.max(), -high.min(), 0.0)
     middle = (low + high) / 2
     wide = high - low > 2 * clearance
@@ -314,7 +313,8 @@ def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
 
 
 def _smoothing_time(joint: Joint, load: Load) -> float:
-    """sqrt(B/sigma): the motors follow slower changes with little torque of inertia; at least three steps."""
+    """Return sqrt(B/sigma), at least three sampling intervals, s."""
+    # changes slower than this resonance require little inertial torque of the motors
     inertia = max(motor.inertia for motor in variable_stiffness_actuator(joint).motors)
     resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
     step = float(np.median(np.diff(load.time[load.steps])))

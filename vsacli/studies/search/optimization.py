@@ -1,4 +1,8 @@
-"""The trajectory with which a cost is least, among those that the robot can execute."""
+"""Optimization of the stiffness, the timing or both for least cost or least time, within all limits.
+
+`optimize` chooses the search: stiffness along a fixed motion, cheapest timing, or fastest timing. A run
+confirms each result; instants at which it fails count in the next search.
+"""
 
 from __future__ import annotations
 
@@ -63,26 +67,26 @@ def optimize(
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Optimum:
-    """Return the stiffness or timing of least cost, or of least time, within all limits.
+    """Return the stiffness or timing of least cost or least time, within all limits.
 
-    A stiffness profile is four times continuously differentiable. Its first two derivatives vanish at both
-    ends, unless the motion repeats itself: then so does the profile. A timing passes the same path at another
-    pace, in the same time unless that is minimized. The result is a local optimum.
+    A stiffness profile is four times continuously differentiable. Its first two derivatives are zero at both
+    ends; for a periodic motion, the profile is periodic instead. A timing changes the pace along the same
+    path, with the same duration unless the time is minimized. The result is a local optimum.
 
     Args:
-        robot: the robot.
-        trajectory: for this robot.
-        minimize: "torque" (rms of the motor torques), "energy" (that the motors spend), "copper" (heat in
-            their windings) or "peak" (of the motor torques), of each joint on its own, or of all
-            together where the timing varies; or "time".
-        vary: "stiffness", "timing" or "both"; for "time" one of the latter.
-        margin: min(sigma - lower, upper - sigma)/sigma that every step shall have.
-        seed: of the starts that are drawn.
-        progress: is told how many further searches are done, of those that `searches` tells.
+        robot: robot that executes the motion.
+        trajectory: motion to improve.
+        minimize: "torque" (rms of the motor torques), "energy" (positive motor work), "copper" (heat in the
+            windings) or "peak" (of the motor torques), for each joint separately, or for all joints together
+            if the timing varies; or "time".
+        vary: "stiffness", "timing" or "both"; for "time" one of the latter two.
+        margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
+        seed: seed of the random starts.
+        progress: function to call with the number of further searches done; `searches` gives the total.
 
     Raises:
-        InputError: the trajectory is not for the robot, something that is needed is not given, or the two
-            words do not go together.
+        InputError: the trajectory is not for the robot, a required parameter is missing, or `minimize` and
+            `vary` cannot be combined.
     """
     trajectory = fitted(robot, trajectory)
     check_near_singular(margin)
@@ -101,16 +105,16 @@ def optimize(
 
 
 def searches(robot: Robot, minimize: str, vary: str) -> int:
-    """Return the largest number of searches of an optimization."""
+    """Return the number of searches that an optimization is expected to report as progress."""
     of_pace = SEARCHES * (vary in (TIMING, BOTH))
     return of_pace + (0 if minimize == TIME or vary == TIMING else SEARCHES * len(chosen_joints(robot)))
 
 
 MOST_DIVIDED = 4 * LOOKED_AT
-"""Steps up to which those of a result are divided."""
+"""Number of samples up to which the sampling of a result is refined."""
 
 ROOM = 0.02
-"""Share of the stiffness by which a search that has to slow down begins further inside the corridor."""
+"""Additional margin with which the slow-down is found from which a search starts."""
 
 _Search = TypeVar("_Search", bound=PacedSearch)
 
@@ -118,10 +122,10 @@ _Search = TypeVar("_Search", bound=PacedSearch)
 def fastest(
     what: Optimum, trajectory: Trajectory, varied: Sequence[int], seed: int, progress: Callable[[int], object]
 ) -> Optimum:
-    """Return the fastest pace, and the stiffness of joints that varies, by index, confirmed by runs.
+    """Return the fastest timing, with the stiffness of the joints `varied` (indices), confirmed by runs.
 
-    If no slow-down makes the stiffness as commanded feasible, the search begins from the smallest slow-down
-    with other constants.
+    If no slow-down makes the commanded stiffness feasible, the search starts from the smallest slow-down
+    with constant changes of the stiffness.
     """
     bar, ends = Countdown(progress), _ends(what, trajectory)
     try:
@@ -156,7 +160,7 @@ def _fastest(
     seed: int,
     progress: Callable[[], None],
 ) -> tuple[float, Pacing, Trajectory]:
-    """Return the duration of the fastest uniform motion, the fastest pace, and the motion at it."""
+    """Return the duration of the fastest uniform timing, the fastest timing, and the motion with it."""
     search, found, best = _confirmed(
         what, path, ends, lambda rule: TimingSearch(rule, path, ends, varied, seed, progress)
     )
@@ -171,12 +175,12 @@ def cheapest_pace(
     seed: int,
     progress: Callable[[int], object],
 ) -> Optimum:
-    """Return the pace with which a motion costs least in its duration, confirmed by runs.
+    """Return the timing of least cost at the commanded duration, confirmed by runs.
 
-    Where the stiffness of joints, by index, varies as well, the search begins with that which is best at the
-    pace as commanded. If there is none, the search for the fastest motion begins with the smallest slow-down
-    for which there is one. If that motion takes no longer than commanded, it is where the search for the
-    cheapest one begins; else the motion is slowed down so much.
+    If the stiffness of joints varies as well, the search starts from the best stiffness at the commanded
+    timing. If no stiffness is feasible there, the fastest motion is searched, from the smallest feasible
+    slow-down. If it lasts no longer than commanded, the search for least cost starts from it; otherwise the
+    motion is slowed down by that factor.
     """
     ends = _ends(what, trajectory)
     criterion = type(criterion)(repeating=ends.periods > 0)
@@ -222,7 +226,7 @@ def cheapest_pace(
 
 
 def _of_faster(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
-    """Return a pace along a path that was slowed down by a factor, as one along the path as it was."""
+    """Return a pace along a slowed-down path as a pace along the unchanged path."""
     return pace if factor == 1 else type(pace)(pace.t / factor, factor * pace.c, pace.k)
 
 
@@ -231,10 +235,10 @@ def _ends(what: Optimum, trajectory: Trajectory) -> Ends:
 
 
 def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
-    """Return the smallest slow-down with which other constants than commanded keep every limit, and these.
+    """Return the smallest slow-down at which constant stiffness changes keep every limit, and the changes.
 
     Raises:
-        ImpossibleError: there is none.
+        ImpossibleError: no slow-down was found.
     """
     margin = what.margin + ROOM * (1 - what.margin)
     found = CombinedSearch(Task(Acceptance(what.robot, margin), trajectory)).fastest()
@@ -249,16 +253,16 @@ def _confirmed(
     """Search until a run of the result keeps every limit between its samples as well.
 
     Args:
-        what: robot and margin.
-        path: of the motion.
-        ends: of the motion.
-        search_by: a search by a rule, whose instants between steps are places on the path.
+        what: optimum with robot and margin.
+        path: motion along the path, as commanded.
+        ends: ends of the motion.
+        search_by: function that makes a search from a rule, whose `between` are values of s on the path.
 
     Returns:
-        The last search, its result, and the motion at that pace.
+        Last search, its result, and the motion with that timing.
 
     Raises:
-        ImpossibleError: nothing was found, or a run falls short between its steps whatever is tried.
+        ImpossibleError: nothing was found, or runs of all results fail between samples.
     """
     count = max(ends.periods, 1)
 
@@ -279,9 +283,9 @@ def _confirmed(
 def _retimed(
     what: Optimum, path: Trajectory, found: Pacing, count: int
 ) -> tuple[Trajectory, FloatArray | None]:
-    """Return the motion at a pace, and when a run of it falls short, if it does.
+    """Return the motion at a pace, and the instants at which a run of it fails, or None.
 
-    At its own rate if it is known between its samples; else at a multiple of it.
+    Samples have the rate of the path, or a multiple if a file would not describe the motion between them.
     """
     name = as_name(f"{what.asked}-{what.minimised}")
     parts = 1
@@ -298,7 +302,7 @@ def _retimed(
 def _costed(
     rule: Acceptance, motion: PacedMotion, criterion: Criterion, sizes: Sequence[float], varied: Sequence[int]
 ) -> list[PacedJoint]:
-    """Return the joints with their shares in the cost, about one for the motion that gave the sizes."""
+    """Return the joints with their shares of the cost, which is about 1 for the motion of `sizes`."""
     if criterion.relative:
         share = 1 / len(sizes)
     else:
@@ -320,7 +324,7 @@ def _costed(
 
 
 def _sizes(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
-    """Scales of the cost of each joint, from the first motion along which it is finite."""
+    """Return the scale of each joint's cost, from the first motion along which it is finite."""
     sizes = np.full(len(what.robot.joints), np.nan)
     for motion in motions:
         loads = joint_loads(what.robot, motion, list(range(len(sizes))))

@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 
 
 VARIED = {"stiffness": "stiffness", "timing": "timing", "both": "timing and stiffness"}
-"""Words for the varied quantities."""
+"""Varied quantities in words."""
 
 FULL = 0.995
-"""Share of the time that is all of it, as it is printed."""
+"""Share of the time or path from which on the text says "all"."""
 
 
 @dataclass(frozen=True)
 class JointOptimum(Published):
-    """The best stiffness of a joint that was found.
+    """The best stiffness found for a joint.
 
     Attributes:
-        before: cost with the stiffness that is commanded; NaN where that is out of reach.
-        constant: with the best constant; NaN if there is none.
-        after: with the best profile.
-        unit: of the costs.
+        before: cost with the commanded stiffness; NaN if that is infeasible.
+        constant: cost with the best constant; NaN if there is none.
+        after: cost with the best profile.
+        unit: unit of the costs.
         found: whether the conditions for a local optimum hold.
-        starts: with how many profiles the search began.
-        agreeing: from how many of them it came to this optimum.
-        bounding: share of the time during which the profile runs along a bound, by the name of the bound.
+        starts: number of starts of the search.
+        agreeing: number of starts that reached this optimum.
+        bounding: share of the time, or of the path, during which each bound is active, by name of the bound.
     """
 
     before: float
@@ -52,12 +52,12 @@ class JointOptimum(Published):
 
 @dataclass(frozen=True)
 class TotalCost(Published):
-    """The cost of all joints together, which is minimized where they share a timing.
+    """The cost of all joints together, which is minimized if they share a timing.
 
     Attributes:
-        before: as commanded; NaN where that is out of reach.
-        after: with the best timing.
-        unit: of the costs; empty where each joint counts relative to its cost as commanded.
+        before: cost as commanded; NaN if that is infeasible.
+        after: cost with the best timing.
+        unit: unit of the costs; empty if each joint counts relative to its commanded cost.
     """
 
     before: float
@@ -67,16 +67,17 @@ class TotalCost(Published):
 
 @dataclass(frozen=True)
 class TimingOptimum(Published):
-    """The fastest pace that was found along the path of a motion.
+    """The fastest timing found along the path of a motion.
 
     Attributes:
-        before: duration as commanded, s.
-        uniform: of the fastest motion that is slowed down or sped up as a whole, s; NaN if there is none.
-        after: of the best, s.
-        found: whether the conditions for a local optimum hold, to about a thousandth of the duration.
-        starts: with how many paces the search began.
-        agreeing: from how many of them it came to this optimum.
-        bounding: share of the path along each bound, by joint and name of the bound.
+        before: commanded duration, s.
+        uniform: duration of the fastest motion that is uniformly slowed down or sped up, s; NaN if there is
+            none.
+        after: duration with the best timing, s.
+        found: whether the conditions for a local optimum hold, to about 0.1 % of the duration.
+        starts: number of starts of the search.
+        agreeing: number of starts that reached this optimum.
+        bounding: share of the path on which each bound is active, by joint and name of the bound.
     """
 
     before: float
@@ -88,7 +89,7 @@ class TimingOptimum(Published):
     bounding: dict[str, dict[str, float]]
 
     def lines(self) -> Iterator[str]:
-        """Yield the durations, and the bounds that hold each joint back."""
+        """Yield the durations, and the active bounds of each joint."""
         yield f"as commanded {self.before:.4g} s"
         if not math.isnan(self.uniform):
             yield f"fastest when slowed down or sped up as a whole {self.uniform:.4g} s"
@@ -99,23 +100,23 @@ class TimingOptimum(Published):
 
 @dataclass(frozen=True)
 class Optimum(Published):
-    """The trajectory with which a cost is least, as far as was searched.
+    """The result of an optimization: the best trajectory that was found.
 
     Attributes:
-        robot: the robot.
-        asked: name of the trajectory that was to be improved.
-        minimised: torque, energy, copper, peak or time.
-        words: the same in words.
-        varied: stiffness, timing or both.
-        margin: that every step has.
-        joints: by name; empty if nothing was found, and where time is minimised.
-        together: their total cost, if they share a timing; else None.
-        slow_down: factor by which the motion is slower than commanded, where a cost is minimised and no pace
-            in its duration was found that is feasible; else 1.
-        timing: None if time is not minimised, or nothing was found.
-        reasons: why nothing was found, in clauses.
-        trajectory: the best; None if nothing was found.
-        pace: along the path, dt/ds, a spline whose argument is s; None if it is as commanded.
+        robot: robot that executes the trajectory.
+        asked: name of the trajectory to be improved.
+        minimised: objective: torque, energy, copper, peak or time.
+        words: objective in words.
+        varied: varied quantity: stiffness, timing or both.
+        margin: margin that every sample has.
+        joints: results by joint name; empty if nothing was found, or if time is minimized.
+        together: total cost of the joints if they share a timing, otherwise None.
+        slow_down: factor by which the motion is slower than commanded, if a cost is minimized and no feasible
+            timing of the commanded duration was found; otherwise 1.
+        timing: result if time is minimized; None if it is not, or if nothing was found.
+        reasons: reasons why nothing was found, as clauses.
+        trajectory: best trajectory; None if nothing was found.
+        pace: pace dt/ds along the path, a spline whose argument is s; None if the timing is unchanged.
     """
 
     robot: Robot = field(repr=False)
@@ -152,7 +153,7 @@ class Optimum(Published):
 
     @property
     def slowed_down(self) -> float | None:
-        """The factor of the slow-down, if there is any."""
+        """Factor of the slow-down; None without one."""
         return None if self.slow_down == 1 else self.slow_down
 
     @property
@@ -207,7 +208,7 @@ def _change(before: float, after: float) -> str:
 
 
 def _along(bounding: Mapping[str, float], whole: str) -> str:
-    """Along which bounds a joint runs, and for which share."""
+    """Return a clause with the active bounds and their shares."""
     along = [
         f"the {name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the {whole}"
         for name, share in bounding.items()

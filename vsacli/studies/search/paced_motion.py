@@ -1,7 +1,7 @@
-"""A motion along its path at another pace: commands, costs and bounds of joints as functions of the pace.
+"""A motion along its path with another timing: commands, costs and bounds of joints as functions of the pace.
 
-The path parameter s is the time of the motion as commanded; the pace is p = dt/ds, so that time is its
-integral. A function of s has the rates df/dt = f_s/p and so on, by the chain rule.
+The path coordinate s is the time of the motion as commanded; the pace is p = dt/ds, whose integral is time.
+Derivatives by time follow from those by s by the chain rule, df/dt = f_s/p and so on.
 """
 
 from __future__ import annotations
@@ -41,28 +41,28 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 LOOKED_AT = 4000
-"""Instants at which bounds are looked at to see where they are missed, at most."""
+"""Largest number of evenly spaced instants at which bounds are checked."""
 
 FEWEST_LOOKED_AT = 1000
-"""The same at least, however few steps a motion has."""
+"""Smallest number of such instants, even if a motion has fewer samples."""
 
 NOTHING = np.empty(0)
 
 TOWARDS_END = (1e-5, 0.05, 150)
-"""Shares of the path between which further instants towards each end are, and how many: where an arm with
-a hardening spring started, torques between even instants were 8e-4 larger than at them."""
+"""Range of further instants near each end, as shares of the path, and their number: when an arm with a
+hardening spring started, torques between evenly spaced instants were 8e-4 larger than at them."""
 
 PACE_ORDERS = 4
-"""The pace and its derivatives by s that the fourth derivative of a motion takes."""
+"""Rows of the pace: the fourth derivative of a motion depends on the third derivative of the pace."""
 
 
 class PacedMotion:
     """A robot's motion at instants of its path.
 
     Args:
-        robot: the robot.
-        trajectory: whose smooth functions are the path.
-        s: instants, (instants,), seconds from the start of the trajectory.
+        robot: robot that executes the motion.
+        trajectory: trajectory whose functions of time define the path.
+        s: path coordinates of the instants, (instants,), seconds from the start of the trajectory.
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory, s: FloatArray) -> None:
@@ -72,9 +72,9 @@ class PacedMotion:
         self._known: tuple[bytes, list[Command]] | None = None
 
     def commands(self, pace: Sequence[Row], instants: IndexArray) -> list[Command]:
-        """Return the commands of each joint, with link torques, at a pace with its derivatives.
+        """Return the command of each joint, with link torques, for a pace with its derivatives.
 
-        The last request is kept: joints are evaluated one after the other.
+        The last result is cached, since joints are evaluated one after the other.
         """
         values = np.stack([*(value_of(row) for row in pace), instants])
         key = values.tobytes() + type(pace[0]).__name__.encode()
@@ -84,7 +84,7 @@ class PacedMotion:
 
     @property
     def resting(self) -> BoolArray:
-        """Instants at which all joints rest, and go on resting, (instants,)."""
+        """Mask of the inner instants at which all joints rest, also at both neighbors, (instants,)."""
         still: BoolArray = np.all(
             [
                 np.abs(row) <= AT_REST * np.abs(row).max()
@@ -98,24 +98,24 @@ class PacedMotion:
         return resting
 
     def stiffness(self, joint: int) -> FloatArray:
-        """Return the commanded stiffness, (instants,)."""
+        """Return the commanded stiffness of a joint, (instants,)."""
         stiffness: FloatArray = self._path.by_s[STIFFNESS.key][joint]
         return stiffness
 
     def stiffness_rates(self, pace: Sequence[Row], by_s: Sequence[Row]) -> list[Row]:
-        """Return a stiffness along the path, and its two derivatives by time."""
+        """Return a stiffness and its first two derivatives by time, from those by s."""
         return Speeds.of(pace).rates(by_s)
 
 
 def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = NOTHING) -> FloatArray:
-    """Return the instants at which bounds are checked, s: even, and ever denser towards both ends.
+    """Return the path coordinates s at which bounds are checked: even, and ever denser towards both ends.
 
-    A motion that begins at rest has hardly begun where its pace, which may be high there, is past its worst.
+    Near a start from rest, a high pace can violate a bound before the motion has moved noticeably.
 
     Args:
-        trajectory: the path.
-        duration: of its part that is looked at, s.
-        further: instants of that part that shall be among them, s.
+        trajectory: trajectory that defines the path.
+        duration: length of the checked part of the path, s.
+        further: coordinates to include, s.
     """
     even = np.linspace(0.0, 1.0, min(max(2 * trajectory.samples - 1, FEWEST_LOOKED_AT), LOOKED_AT))
     towards = np.geomspace(*TOWARDS_END)
@@ -123,22 +123,22 @@ def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = N
 
 
 CLEARANCE = 1e-4
-"""Share of each bound by which a motion keeps clear of it at the instants that are looked at, for what lies
-between them: with 4000 of them a hardening spring's motor exceeded its limit by 2e-5 there."""
+"""Relative distance from each bound at the checked instants, as an allowance for the time between them: with
+4000 instants, the motor of a hardening spring exceeded its limit by 2e-5 between them."""
 
 FASTEST = 0.02
-"""Least pace: fifty times as fast as commanded, more than which the units are more likely to be wrong."""
+"""Smallest pace, fifty times as fast as commanded; beyond that, wrong units are more likely."""
 
 NOT_OF_THE_PACE = ("q", "damping")
-"""Variables with limits that no pace changes; nor that of a stiffness that does not vary."""
+"""Limited variables that do not depend on the pace."""
 
 
 class Pace:
-    """The `Functions` of the pace itself: time, and bounds on it.
+    """The `Functions` of the pace alone: the time, and a lower bound on the pace.
 
     Args:
-        held: where the motion rests on its way, (instants,): it shall not rest for a shorter time.
-        duration: by which time is scaled, s.
+        held: mask of the instants at which the motion pauses, (instants,); pauses must not be shortened.
+        duration: scale of the time, s.
     """
 
     def __init__(self, held: BoolArray, duration: float) -> None:
@@ -147,30 +147,31 @@ class Pace:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """Time, and the distance of the pace from its bound."""
+        """Return the integrand of the time, and the bound on the pace; see `Functions`."""
         return [rows[0] / self._duration], [least_pace(self._held)[instants] - rows[0]]
 
 
 def least_pace(held: BoolArray) -> FloatArray:
-    """Return the smallest tried pace, (instants,), or the commanded one where the motion pauses."""
+    """Return the lower bound of the pace, (instants,): the commanded pace where the motion pauses."""
     return np.where(held, 1.0, FASTEST)
 
 
 class PacedJoint:
-    """The `Functions` of the pace, of a stiffness if it varies, both with their derivatives, and of a level.
+    """The `Functions` of pace and, if it varies, stiffness, with their derivatives, and of a level.
 
     Args:
-        motion: of all joints.
-        index: of the joint.
-        near_singular: the margin.
-        criterion: its cost.
-        share: that its cost has in that of all joints.
-        reserve: share of each limit that is kept clear of besides `CLEARANCE`.
+        motion: motion of all joints.
+        index: index of the joint.
+        near_singular: required margin.
+        criterion: cost of the joint.
+        scale: scale of that cost.
+        share: weight of the cost in that of all joints.
+        reserve: required clearance to limits in addition to `CLEARANCE`, as a share of each.
         varied: whether the stiffness varies.
 
     Attributes:
-        criterion: its cost.
-        scale: of that cost.
+        criterion: cost of the joint.
+        scale: scale of that cost.
     """
 
     def __init__(
@@ -205,7 +206,7 @@ class PacedJoint:
 
     @property
     def bound_names(self) -> list[str]:
-        """Words for the first bounds; those after are of levels."""
+        """Names of the first bounds; the bounds after these belong to levels."""
         return [*(ENDS_OF_CORRIDOR if self._chosen else ()), *limit_names(self._checks)]
 
     @property
@@ -220,10 +221,10 @@ class PacedJoint:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """Integrands of the cost over the path, and the bounds; see `Functions`."""
+        """Return the integrands of the cost over the path, and the bounds; see `Functions`."""
         behind = len(rows) - self.criterion.levels
         pace, stiffness, level = list(rows[:PACE_ORDERS]), list(rows[PACE_ORDERS:behind]), rows[behind:]
-        with np.errstate(all="ignore"):  # a step of the search may leave the corridor
+        with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             command = self._motion.commands(pace, instants)[self._index]
             if len(stiffness):
                 rates = self._motion.stiffness_rates(pace, stiffness)
@@ -249,10 +250,10 @@ class PacedJoint:
 
 
 NEWTON_STEPS = 6
-"""Steps that find s at a time, from where a line between two of many instants leads, to rounding."""
+"""Newton steps that find s at a time down to rounding, from a linear interpolation."""
 
 FIRST_LOOK = 4000
-"""Instants between which these lines are drawn."""
+"""Points of that interpolation."""
 
 
 def retimed(
@@ -262,14 +263,14 @@ def retimed(
     name: str,
     refined: int = 1,
 ) -> Trajectory:
-    """Return the motion of a trajectory along its path at a pace dt/ds, at about its own rate.
+    """Return the motion along the path of a trajectory at a pace dt/ds, at about the same sample rate.
 
     Args:
-        trajectory: the path, whose parameter s is the time since its start.
-        pace: over the path.
-        stiffness: over the path, of joints by index that get another one.
-        name: of the result.
-        refined: times the rate.
+        trajectory: trajectory that defines the path; the coordinate s is the time since its start.
+        pace: pace as a function of s.
+        stiffness: new stiffness as a function of s, by joint index.
+        name: name of the result.
+        refined: factor by which the sample rate is increased.
     """
     elapsed = pace.antiderivative()
     duration = float(elapsed(trajectory.duration) - elapsed(0.0))
@@ -295,7 +296,7 @@ def retimed(
 
 
 def path_at(time: FloatArray, pace: BSpline[np.float64], end: float) -> FloatArray:
-    """S at times since the start, (samples,), by Newton's method."""
+    """Return s at times since the start, (samples,), by Newton's method."""
     elapsed = pace.antiderivative()
     known = np.linspace(0.0, end, FIRST_LOOK)
     s = np.interp(time, elapsed(known) - elapsed(0.0), known)

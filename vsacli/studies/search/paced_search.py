@@ -1,4 +1,8 @@
-"""Search along a path over the pace, and the stiffness if that varies, for the least time or cost."""
+"""Search over the pace along a path, and the stiffness if it varies, for the least time or cost.
+
+`PacedSearch` tries several starts and refines the best; `TimingSearch` minimizes the time,
+`CheapestPaceSearch` a cost at the commanded duration.
+"""
 
 from __future__ import annotations
 
@@ -30,41 +34,41 @@ from vsacli.studies.search.splines import PacedSpaces, Pacing, of_rows
 from vsacli.trajectory.trajectory import Trajectory
 
 INSTANTS_PER_PIECE = 12
-"""Instants of a piece at which bounds are kept, at least."""
+"""Smallest number of instants per piece at which bounds are kept."""
 
 MOST_ROUNDS = 12
-"""Rounds of adding instants at which bounds are missed: a motion with two dwells, bounded by the ends of its
-corridors alone, took seven."""
+"""Limit on rounds that add instants of violated bounds: a motion with two dwells, bounded only by the ends of
+its attainable ranges, required seven."""
 
 ACTIVE = 1e-2
-"""Relative distance from a bound at which a motion runs along it: barriers keep a thousandth away."""
+"""Relative distance from a bound below which it is active; barriers keep a motion a thousandth away."""
 
 STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
-"""Multiples of the commanded stiffness to begin with, if it may vary."""
+"""Multiples of the commanded stiffness for the starts, if it may vary."""
 
 DRAWN, LEVELS = 2, 6
-"""Paces that are drawn to begin with, and levels between which each of them is interpolated."""
+"""Number of random paces among the starts, and of the random levels that each of them interpolates."""
 
 Start = tuple[FloatArray, FloatArray | None]
-"""Unknowns to begin near, and some that keep all bounds, if these are known."""
+"""Unknowns near which to start, and unknowns that keep all bounds, if any are known."""
 
 
 class PacedSearch:
-    """The common part of searches along a path; those for least time and least cost derive from it.
+    """The common part of the searches along a path for least time and for least cost.
 
     Attributes:
-        pieces: of the splines, first with several starts, then finer.
-        same_cost: relative difference of costs up to which two starts came to the same optimum.
+        pieces: numbers of pieces of the splines, first for several starts, then for refinements.
+        same_cost: relative difference of costs up to which two starts reached the same optimum.
         timed: whether time is the cost.
-        worth: share of the cost that finer pieces must gain for still finer ones.
-        nothing_kept: why nothing was found where no start led to anything, in a clause.
+        worth: relative decrease of the cost by a refinement that justifies the next one.
+        nothing_kept: clause that explains that no start led to a result.
 
     Args:
-        motion: along the path.
-        joints: cost and bounds of each.
-        varied: the joints whose stiffness varies as well, by index.
-        seed: of the starts that are drawn.
-        progress: called after each search.
+        motion: motion along the path.
+        joints: cost and bounds of each joint.
+        varied: indices of the joints whose stiffness varies as well.
+        seed: seed of the random starts.
+        progress: function to call after each search.
     """
 
     pieces: ClassVar[tuple[int, ...]]
@@ -88,31 +92,31 @@ class PacedSearch:
         self._scale = self._span[1]
 
     def _spaces(self, pieces: int) -> PacedSpaces:
-        """Return the splines of this many pieces among which is searched."""
+        """Return the spaces of splines with this many pieces."""
         raise NotImplementedError
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
         """Return the starts.
 
         Raises:
-            ImpossibleError: there is no start.
+            ImpossibleError: no start was found.
         """
         raise NotImplementedError
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        """Return a start among finer splines: near the timing (None) and stiffnesses of joints, by index."""
+        """Return a start among finer splines, near the pace (key None) and the stiffness of joints."""
         raise NotImplementedError
 
     def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        """Return the minimum of the cost; bounds raise it at first by a gap."""
+        """Return a minimum of the cost; the first barrier raises it by `gap`."""
         raise NotImplementedError
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """Return a found minimum if it keeps all bounds at every instant."""
+        """Return the minimum, possibly slowed down, if it keeps all bounds at every instant; else None."""
         raise NotImplementedError
 
     def best(self) -> Pacing:
-        """Return the best that is found from several starts.
+        """Return the best pace, and stiffness if it varies, found from several starts.
 
         Raises:
             ImpossibleError: nothing was found.
@@ -137,14 +141,14 @@ class PacedSearch:
         return self._pacing(spaces, best, len(starts), agreeing)
 
     def _rows(self, spaces: PacedSpaces, found: Minimum) -> dict[int | None, FloatArray]:
-        """Pace, None, and stiffness of joints, by index, at every instant."""
+        """Return the pace (key None) and the stiffness of joints (key: index) at every instant."""
         return {
             key: space.offset + space.basis(self._s, 1)[0] @ found.unknowns[own]
             for key, (space, own) in spaces.parts().items()
         }
 
     def _drawn(self, least: float, most: float) -> list[FloatArray]:
-        """Return some paces between two, (instants,)."""
+        """Return random paces between two values, each (instants,)."""
         generator = np.random.default_rng(self._seed)
         places = np.linspace(*self._span, LEVELS)
         return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
@@ -152,7 +156,7 @@ class PacedSearch:
     def _attempt(
         self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
     ) -> Minimum | None:
-        """Search from the wanted profile with as many instants as needed; None if none keeps all bounds."""
+        """Search from a start, adding instants until all bounds are kept; return None if that fails."""
         instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
         every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
         for _ in range(MOST_ROUNDS):
@@ -170,7 +174,7 @@ class PacedSearch:
         return None
 
     def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
-        """Return the pace on its own, and each joint, at some instants."""
+        """Return the groups of the problem at some instants: the pace alone, and each joint."""
         s = self._s[instants]
         pace = spaces.rows(None, s, PACE_ORDERS)
         of_pace = Pace(self._motion.resting, self._scale)
@@ -196,7 +200,7 @@ class PacedSearch:
         )
 
     def _bounding(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
-        """Share of the path along each bound, by joint and name of the bound."""
+        """Return the share of the path on which each bound is active, by joint and name of the bound."""
         _, *groups = self._groups(spaces, np.arange(len(self._s)))
         shares_of_path = trapezoidal(self._s) / self._span[1]
         found: dict[str, dict[str, float]] = {}
@@ -212,48 +216,49 @@ class PacedSearch:
 
 
 FEW = 100
-"""Instants at which bounds are looked at in a first look."""
+"""Number of instants at which bounds are checked first."""
 
 SLOWEST, STRIDE = 1000.0, 1.1
-"""Factors of uniform slow-downs that are looked at: each so much larger than the one before."""
+"""Largest factor of a uniform slow-down that is tried, and the ratio of successive factors."""
 
 HALVINGS = 16
-"""Halvings of the last stride: to 1e-6 of the factor."""
+"""Bisections of the last stride, to 1e-6 of the factor."""
 
 UNBOUNDED = 1.1
-"""Multiple of the time that the least pace takes, below which nothing else holds the motion back."""
+"""Multiple of the duration at the smallest pace below which no other bound limits the motion."""
 
 SLACK = 1.02
-"""Ratio to the fastest uniform motion at which a search begins."""
+"""Ratio of a start's duration to that of the fastest uniform timing."""
 
 SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
-"""Relative slow-downs tried so that a motion keeps all bounds between instants as well."""
+"""Relative slow-downs to try so that a motion keeps all bounds between instants as well."""
 
 LAST_TIMING_GAP = 1e-4
-"""Increase of the time by bounds at the end, relative to a uniform motion: near them steps are short."""
+"""Increase of the time by bounds at the last barrier, relative to a uniform timing: close to bounds, Newton
+steps are short."""
 
 STALLED_TIMING = 3e-4
-"""Share of the time that some steps together must gain."""
+"""Relative change of the time within `PATIENCE` Newton steps below which the search ends."""
 
 
 class NoStartError(ImpossibleError):
-    """No stiffness that was tried makes any slow-down feasible."""
+    """Error: no stiffness that was tried makes any slow-down feasible."""
 
 
 class TimingSearch(PacedSearch):
-    """A search for the fastest pace along the path of a trajectory, over a period if it repeats itself.
+    """A search for the fastest timing along the path of a trajectory, over one period if it is periodic.
 
     Args:
-        acceptance: the rule, with instants of the path that count as well.
-        trajectory: the path.
-        ends: of the motion.
-        varied: the joints whose stiffness varies as well, by index.
-        seed: of the starts that are drawn.
-        progress: called after each search.
+        acceptance: acceptance rule; its `between` are values of s on the path.
+        trajectory: trajectory that defines the path.
+        ends: ends of the motion.
+        varied: indices of the joints whose stiffness varies as well.
+        seed: seed of the random starts.
+        progress: function to call after each search.
 
     Attributes:
-        uniform: duration of the fastest motion that is slowed down or sped up as a whole, s; NaN if there is
-            none, or its ends move at a given pace.
+        uniform: duration of the fastest motion that is uniformly slowed down or sped up, s; NaN if there is
+            none, or if the pace at an end is prescribed.
     """
 
     pieces = (12, 24)
@@ -288,10 +293,10 @@ class TimingSearch(PacedSearch):
         self.uniform = math.nan
 
     def best(self) -> Pacing:
-        """Return the fastest pace that is found.
+        """Return the fastest timing found.
 
         Raises:
-            ImpossibleError: none was found.
+            ImpossibleError: none was found, or no limit bounds the speed.
         """
         found = super().best()
         shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
@@ -328,13 +333,13 @@ class TimingSearch(PacedSearch):
         return begun
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        """Return a little slower, since the way out of a corner is long."""
+        # a little slower, since the way out of a corner is long
         stiffness = {key: row for key, row in rows.items() if key is not None}
         slower = spaces.fitted(self._s, SLACK * rows[None], stiffness)
         return slower, slower
 
     def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
-        """Return the least pace that is the same everywhere and keeps all bounds; None if none does."""
+        """Return the smallest constant pace that keeps all bounds, or None."""
         few = self._groups(spaces, evenly(len(self._s), FEW))
         every = self._groups(spaces, np.arange(len(self._s)))
 
@@ -358,7 +363,7 @@ class TimingSearch(PacedSearch):
         return minimise(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """Return a slightly slower timing that keeps all bounds at every instant; None if it takes more."""
+        """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""
         for share in SLOWER:
             unknowns = spaces.slowed(found.unknowns, share)
             cost, bounds = SeparableProblem(every).values(unknowns)
@@ -368,30 +373,31 @@ class TimingSearch(PacedSearch):
 
 
 STIFFER = 1.0, 1.5, 2.0
-"""Multiples of that stiffness to begin with."""
+"""Multiples of the first stiffness for further starts."""
 
 DRAWN_PACES = 0.6, 1.6
-"""Paces between which those that are drawn lie, before they are scaled to the duration."""
+"""Range of the random paces before they are scaled to the duration."""
 
 LIFTED = 1.1
-"""Multiple of a stiffness with which a search begins: from an end of the corridor, where the best often is, a
-pendulum took more than two hundred steps, and from here fifty."""
+"""Factor on a stiffness from which a search starts: from an end of the attainable range, where the optimum
+often is, a pendulum required more than 200 Newton steps, and from here 50."""
 
 FIRST_LEVEL = 1.05
-"""First level, as a multiple of the bounded values."""
+"""Initial level, as a multiple of the largest value that it bounds."""
 
 
 class CheapestPaceSearch(PacedSearch):
-    """A search for the pace with which a motion costs least while it takes as long as commanded.
+    """A search for the timing of least cost at the commanded duration.
 
     Args:
-        motion: along the path.
-        joints: cost and bounds of each.
-        varied: the joints whose stiffness varies as well, by index.
-        ends: of the motion.
-        seed: of the starts that are drawn.
-        progress: called after each search.
-        near: pace and stiffness to begin near, scaled to the duration, where the path itself is infeasible.
+        motion: motion along the path.
+        joints: cost and bounds of each joint.
+        varied: indices of the joints whose stiffness varies as well.
+        ends: ends of the motion.
+        seed: seed of the random starts.
+        progress: function to call after each search.
+        near: pace and stiffness near which to start, scaled to the duration, if the path is infeasible as
+            commanded.
     """
 
     pieces = (12, 24, 48)
@@ -417,7 +423,7 @@ class CheapestPaceSearch(PacedSearch):
         return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        """Return the pace as commanded with some stiffnesses, and drawn paces with the first of these."""
+        """Return the commanded pace with several stiffnesses, and random paces with the first of these."""
         asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
         even = np.ones_like(self._s)
         if self._near is not None:
@@ -435,7 +441,7 @@ class CheapestPaceSearch(PacedSearch):
         return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
 
     def _lasting(self, pace: FloatArray) -> FloatArray:
-        """Return a pace scaled to the duration as commanded, (instants,)."""
+        """Return a pace scaled to the commanded duration, (instants,)."""
         scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
         return scaled
 
@@ -448,7 +454,7 @@ class CheapestPaceSearch(PacedSearch):
         return bool(np.all(every.values(unknowns)[1] < 0))
 
     def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
-        """Unknowns with an effective level, if there are any."""
+        """Return unknowns with a level appended that bounds its values, if the cost is a level."""
         if not self._joints[0].criterion.levels:
             return unknowns
         without = np.append(unknowns, 0.0)

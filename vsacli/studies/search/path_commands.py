@@ -1,10 +1,10 @@
-"""Commands of joints along a path at any speed, from functions of the path that powers of the speed multiply.
+"""Commands of joints along a path at any speed, as polynomials in the speed with coefficients along the path.
 
 Along q(s), gravity, environment and inertia require tau = g(s) + b(s) v^2 + a(s) v' of each joint, where
 v = ds/dt, a = M q_s and b = M q_ss + c(q, q_s) (Bobrow, Dubowsky & Gibson, International Journal of Robotics
 Research 4(3), 1985, equation 7). The derivatives of tau by time follow by the chain rule from those of g, b
-and a by s, which the recursion yields at five speeds; a search needs no more evaluations of it. Friction and
-dampers, which are no such polynomials, are added joint by joint.
+and a by s. Five evaluations of the recursion yield all of these; a search needs no others. Friction and
+dampers are not polynomials in the speed and are added joint by joint.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 Row: TypeAlias = Any
-"""(..., instants), which may carry derivatives."""
+"""Array (..., instants), which may carry derivatives."""
 
 
 class Speeds(NamedTuple):
@@ -39,7 +39,7 @@ class Speeds(NamedTuple):
 
     @classmethod
     def even(cls, factor: float, instants: int) -> Speeds:
-        """Return the speeds along a path that is passed more slowly by a factor throughout."""
+        """Return the speeds along a path that is uniformly slowed down by a factor."""
         zero = np.zeros(instants)
         return cls(zero + 1 / factor, zero, zero, zero)
 
@@ -63,7 +63,7 @@ class Speeds(NamedTuple):
         )
 
     def rates(self, by_s: Sequence[Row]) -> list[Row]:
-        """Return a function of the path coordinate s with derivatives by s, and its derivatives by time."""
+        """Return a function and its derivatives by time, from the function and its derivatives by s."""
         f, *slopes = by_s
         s1, s2, s3, s4 = self
         rates = [f, slopes[0] * s1, slopes[1] * (s1 * s1) + slopes[0] * s2]
@@ -81,11 +81,11 @@ class PathCommands:
     """The commands of a robot's joints at instants of a path, with link torques.
 
     Args:
-        robot: the robot.
-        motion: along the path, whose time is its coordinate s.
+        robot: robot that executes the motion.
+        motion: motion along the path; its time is the path coordinate s.
 
     Attributes:
-        by_s: signals with their derivatives by s, each (components, instants), by name.
+        by_s: signals and their derivatives by s, each (components, instants), by name.
     """
 
     def __init__(self, robot: Robot, motion: Motion) -> None:
@@ -94,7 +94,7 @@ class PathCommands:
         self.by_s = {name: by_joint(each) for name, each in motion.variables().items() if name != "time"}
 
     def at(self, speeds: Speeds, instants: IndexArray | slice = slice(None)) -> list[Command]:
-        """Return the command of each joint at some of the instants, at speeds that may be dual."""
+        """Return the command of each joint at some instants; speeds may carry derivatives."""
         along = {name: by_s[:, instants] for name, by_s in self.by_s.items()}
         rows = _rates(along, speeds) | self._torques(speeds, instants)
         commands = []
@@ -124,7 +124,7 @@ class PathCommands:
 
     @cached_property
     def _factors(self) -> tuple[FloatArray, ...]:
-        """Factors of the powers of the speed in tau_e, tau_e' and tau_e'', each (powers, joints, instants).
+        """Coefficients of the powers of the speed in tau_e, tau_e', tau_e'', each (powers, joints, instants).
 
         With k = a_s + 2 b: tau' = g_s v + b_s v^3 + k v v' + a v'', and tau'' = g_ss v^2 + g_s v' + b_ss v^4
         + (k_s + 3 b_s) v^2 v' + k v'^2 + (k + a_s) v v'' + a v'''.
@@ -153,7 +153,7 @@ class PathCommands:
 
 
 def _rates(by_s: Mapping[str, FloatArray], speeds: Speeds) -> dict[str, Row]:
-    """Return signals by the names of their derivatives by time, from those by s, (components, instants)."""
+    """Return signals and their derivatives by time from those by s, each (components, instants), by name."""
     signals = [each for each in (POSITION, *COMMANDED.values(), WRENCH) if each.names[0] in by_s]
     return {
         name: rate

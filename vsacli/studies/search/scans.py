@@ -1,7 +1,8 @@
-"""The smallest slow-down, stiffness offset or transition that is accepted, by scan and bisection.
+"""The smallest accepted slow-down, stiffness offset or transition, by scan and bisection.
 
-Each candidate is a whole number, so that the printed value is the one that was confirmed. A scan looks at
-some watched samples; a candidate that they accept is confirmed on all, and samples that refuse it join them.
+Each candidate is an integer that stands for a value on a grid, so that the printed value is the confirmed
+one. A scan checks some watched samples; a candidate that they accept is confirmed on all samples, and some of
+the samples that refuse it are watched from then on.
 """
 
 from __future__ import annotations
@@ -25,20 +26,20 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Candidates(Protocol):
-    """Whole numbers that stand for changes of growing size, judged on a few watched steps or on all."""
+    """Integers that stand for changes of growing size, checked at watched samples or at all."""
 
     def stride(self, number: int) -> int:
-        """Return how far a scan goes from a refused number, at least 1."""
+        """Return the step of the scan from a refused number, at least 1."""
 
     def accepts(self, number: int) -> bool:
-        """Return whether the change is accepted at the watched steps."""
+        """Return whether the change is accepted at the watched samples."""
 
     def confirms(self, number: int) -> bool:
-        """Return whether it is accepted at all samples; watch some of those that refuse it from now on."""
+        """Return whether the change is accepted at all samples; watch some that refuse it from now on."""
 
 
 def smallest_confirmed(candidates: Candidates, start: int, stop: int) -> int | None:
-    """Return the smallest number from `start` to `stop` found by scan, bisection, confirmation; or None."""
+    """Return the smallest accepted number from `start` to `stop` that all samples confirm, or None."""
     number: int | None = start if start <= stop else None
     while number is not None:
         number = _smallest_accepted(candidates, number, stop)
@@ -48,9 +49,9 @@ def smallest_confirmed(candidates: Candidates, start: int, stop: int) -> int | N
 
 
 def _smallest_accepted(candidates: Candidates, start: int, stop: int) -> int | None:
-    """Go up in strides to the first accepted number, then bisect down to the last refused one.
+    """Scan up in strides to the first accepted number, then bisect down to the last refused one.
 
-    Numbers between strides that are accepted while their neighbours are not may be missed.
+    An accepted number between two refused strides can be missed.
     """
     refused, number = start - 1, start
     while not candidates.accepts(number):
@@ -67,32 +68,32 @@ def _smallest_accepted(candidates: Candidates, start: int, stop: int) -> int | N
 
 
 FACTOR_DENOMINATOR = 10_000
-"""Factors are whole multiples of 1/FACTOR_DENOMINATOR where recorded stamps are not even: steps get further
-apart."""
+"""Grid of the factors, in units of 1/FACTOR_DENOMINATOR, if recorded time stamps are uneven."""
 
 WHOLE = 1e-9
-"""Relative difference from a whole number of steps that is rounding."""
+"""Relative difference up to which a number of sampling intervals is an integer but for rounding."""
 
 LARGEST_FACTOR = 1000
-"""Up to which slow-downs are tried; beyond, the units of the trajectory are more likely to be wrong."""
+"""Largest factor that is tried; beyond it, wrong units in the trajectory are more likely."""
 
 WATCHED_STEPS = 1000
-"""Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
+"""Samples that a scan watches at first, and the most that a refused confirmation adds."""
 
 FIRST_STEPS = 20
-"""Samples tried at many factors before the scan, and refused ones tried even at rest."""
+"""Samples that are checked at many candidates before the scan, and as many that are refused even at rest."""
 
 FACTORS_AT_ONCE = 64
-"""Factors that are tried at once."""
+"""Factors evaluated in one call."""
 
 
 class Factors(NamedTuple):
-    """The factors of slow-downs that are tried: those with a whole number of steps at the rate of the task.
+    """The factors of slow-downs: those with an integer number of sampling intervals at the rate of the task.
 
-    A controller has one rate; a motion of 577.74 of its periods ends between two of them.
+    A controller has one rate; a motion of 577.74 of its periods would end between two of them.
 
     Attributes:
-        denominator: numbers stand for themselves over this: steps of the task, which need not be whole.
+        denominator: sampling intervals of the task, not necessarily an integer; number n stands for the
+            factor n/denominator.
     """
 
     denominator: float
@@ -105,12 +106,12 @@ class Factors(NamedTuple):
 
     @property
     def first(self) -> int:
-        """The number that stands for no slow-down."""
+        """Number that stands for no slow-down."""
         return round(self.denominator) if self._whole else math.floor(self.denominator)
 
     @property
     def last(self) -> int:
-        """The number of the largest factor."""
+        """Number of the largest factor."""
         return math.floor(LARGEST_FACTOR * self.denominator)
 
     @property
@@ -118,7 +119,7 @@ class Factors(NamedTuple):
         return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
 
     def factor(self, number: int) -> float:
-        """Return the factor of a number."""
+        """Return the factor that a number stands for."""
         denominator = round(self.denominator) if self._whole else self.denominator
         return 1.0 if number == self.first else number / denominator
 
@@ -126,15 +127,15 @@ class Factors(NamedTuple):
 def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     """Return the smallest factor by which position, stiffness and wrench must be stretched together in time.
 
-    It is found by a scan upward in steps of 1 %, then bisection to one step, and confirmed on all steps of
-    the stretched trajectory.
+    A scan upward in strides of 1 % is followed by bisection to adjacent numbers and by a check of all samples
+    of the stretched trajectory.
 
     Args:
-        acceptance: the rule, and the robot.
-        trajectory: one that is refused as it is.
+        acceptance: acceptance rule, which includes the robot.
+        trajectory: trajectory with refused samples.
 
     Raises:
-        ImpossibleError: with the reason.
+        ImpossibleError: no factor is accepted; the error has the reason.
     """
     steps = acceptance.watched(trajectory, WATCHED_STEPS)
     at_rest = steps.slowed(math.inf)
@@ -154,9 +155,9 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
 
 
 def _scan_start(acceptance: Acceptance, few: TaskSamples, factors: Factors) -> int | None:
-    """Return a number up to which the scan would find one of a few steps refused; None if it always would.
+    """Return a number below which a scan finds one of a few samples refused; None if every number is refused.
 
-    It tries many factors at once, which costs hardly more than one of them.
+    Many factors are evaluated in one call, which costs hardly more than a single one.
     """
     numbers = [factors.first]
     while numbers[-1] < factors.last:
@@ -171,25 +172,22 @@ def _scan_start(acceptance: Acceptance, few: TaskSamples, factors: Factors) -> i
 
 
 class SlowDownCandidates:
-    """Stretching by the factors of a task, judged at watched steps; see `Candidates`."""
+    """Stretching by the factors of a task; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: TaskSamples) -> None:
         self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
         self._factors = Factors.of(trajectory)
 
     def stride(self, number: int) -> int:
-        """One percent."""
+        """Return 1 % of the number."""
         return _stride(number)
 
     def accepts(self, number: int) -> bool:
-        """Return whether every watched step is accepted."""
+        """See `Candidates.accepts`."""
         return not self._acceptance.refused(self._watched.slowed(self._factors.factor(number))).any()
 
     def confirms(self, number: int) -> bool:
-        """Return whether every step is accepted.
-
-        Those of the first block with others are watched from now on.
-        """
+        """See `Candidates.confirms`; the samples to watch come from the first block with refused ones."""
         factor = self._factors.factor(number)
         for part in self._acceptance.parts(self._trajectory.stretched(factor), factor):
             steps = np.flatnonzero(np.any(self._acceptance.refused(part), axis=1))
@@ -205,34 +203,34 @@ def _stride(number: int) -> int:
 
 
 LARGEST_RATIO = 100
-"""Largest ratio by which an offset changes the stiffness of a joint without other bounds."""
+"""Largest ratio by which an offset may change the stiffness of a joint if nothing else bounds it."""
 
 OFFSETS_AT_ONCE = 64
-"""Offsets that are tried at once: hardly dearer than one of them."""
+"""Offsets evaluated in one call, which costs hardly more than a single one."""
 
 OFFSET_DIGITS = 4
-"""Decimal places of an offset behind the leading digit of the stiffness: the printed value was confirmed."""
+"""Decimal places of an offset after the leading digit of the stiffness: the grid of printed values."""
 
 ROUNDING = 1e-9
-"""Relative rise of a stiffness after which rounding leaves it no margin short."""
+"""Relative increase of a stiffness that keeps its margin in spite of rounding."""
 
 GRID_ROUNDING = 1e-6
-"""Share of the spacing by which a number may miss the grid; far less than any limit allows."""
+"""Share of the grid spacing by which a bound may miss a number; far below the tolerance of any limit."""
 
 
 def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     """Return the constant closest to zero that fixes a joint, N m/rad (N/m).
 
-    Where only the corridor and the limits of stiffness and deflection are at stake, its bounds are closed;
-    for the limits of the motors it is a scan outward in steps of 1 % of the stiffness, then bisection.
+    The attainable range and the limits of stiffness and deflection bound it directly; for the limits of the
+    motors a scan outward in strides of 1 % of the stiffness is followed by bisection.
 
     Args:
-        acceptance: the rule.
-        joint: the joint, at least one of whose steps is refused.
-        load: its steps.
+        acceptance: acceptance rule.
+        joint: joint with at least one refused sample.
+        load: load of the joint at all samples.
 
     Raises:
-        ImpossibleError: with the reason.
+        ImpossibleError: no constant is accepted; the error has the reason.
     """
     low, high = _bounds(acceptance, joint, load)
     raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
@@ -247,7 +245,7 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
 
 
 def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
-    """Return the constant that makes a joint as soft as load and stiffness limit admit, N m/rad (N/m).
+    """Return the constant that makes a joint as soft as load and stiffness limits admit, N m/rad (N/m).
 
     Raises:
         ImpossibleError: no stiffness fixes the joint.
@@ -259,7 +257,7 @@ def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
 
 
 def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
-    """Smallest and largest offset that the corridor and the limits of stiffness and deflection admit."""
+    """Return the offsets that attainable range, stiffness limits and deflection limits admit."""
     admissible = checked_range(acceptance, joint, load)
     asked = load.command.commanded["stiffness"]
     rise, fall = admissible.low - asked, admissible.high - asked
@@ -275,7 +273,7 @@ def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, fl
 
 
 class OffsetCandidates:
-    """Constants of one sign on a decimal grid, judged at watched steps; see `Candidates`."""
+    """Constants of one sign on a decimal grid; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, joint: Joint, load: Load, sign: int) -> None:
         self._acceptance, self._joint, self._load, self._sign = acceptance, joint, load, sign
@@ -284,11 +282,11 @@ class OffsetCandidates:
         self._watched = evenly(len(load.time), WATCHED_STEPS)
 
     def value(self, number: int) -> float:
-        """Return the constant that a number stands for: the double nearest to the decimal."""
+        """Return the constant that a number stands for: the double nearest to the decimal fraction."""
         return float(f"{self._sign * number}e{self._exponent}")
 
     def smallest(self, low: float, high: float) -> float | None:
-        """Return the constant closest to zero between two bounds on its size, or None."""
+        """Return the accepted constant closest to zero between two bounds on its size, or None."""
         unit = 10.0**self._exponent
         ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
         start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
@@ -298,9 +296,9 @@ class OffsetCandidates:
         return None if number is None else self.value(number)
 
     def _scan_start(self, start: int, stop: int) -> int | None:
-        """Return a number up to which the scan would find some watched step refused; None if it always would.
+        """Return a number below which a scan finds a watched sample refused; None if every number is refused.
 
-        Found by looking at a few steps, to which others are added as long as the watched ones refuse.
+        A few samples are checked first; watched ones that refuse a number which the few accept are added.
         """
         few = np.union1d(self._watched[evenly(len(self._watched), FIRST_STEPS)], self._hardest(start))
         numbers = list(self._strides(start, stop))
@@ -313,12 +311,12 @@ class OffsetCandidates:
         return None
 
     def _hardest(self, number: int) -> IndexArray:
-        """Return some of the watched steps that refuse a number."""
+        """Return at most `FIRST_STEPS` of the watched samples that refuse a number, by index."""
         refused = self._watched[self._refused(self._load.at(self._watched), number)]
         return refused[evenly(len(refused), FIRST_STEPS)]
 
     def _strides(self, start: int, stop: int) -> Iterator[int]:
-        """Yield the numbers at which the scan looks."""
+        """Yield the numbers that the scan checks."""
         number = start
         while number < stop:
             yield number
@@ -327,7 +325,7 @@ class OffsetCandidates:
             yield stop
 
     def _first_accepted(self, numbers: Sequence[int], first: int, steps: IndexArray) -> int:
-        """Index, from `first` on, of a number that these steps accept; that behind the last if none is."""
+        """Return the index, from `first` on, of a number that these samples accept, or len(numbers)."""
         for begin in range(first, len(numbers), OFFSETS_AT_ONCE):
             tried = numbers[begin : begin + OFFSETS_AT_ONCE]
             load = self._load.at(np.tile(steps, len(tried)))
@@ -339,15 +337,15 @@ class OffsetCandidates:
         return len(numbers)
 
     def stride(self, number: int) -> int:
-        """One percent of the stiffness."""
+        """Return 1 % of the changed stiffness."""
         return math.ceil((self._softest / 10.0**self._exponent + max(self._sign * number, 0)) / 100)
 
     def accepts(self, number: int) -> bool:
-        """Return whether every watched step is accepted."""
+        """See `Candidates.accepts`."""
         return not self._refused(self._load.at(self._watched), number).size
 
     def confirms(self, number: int) -> bool:
-        """Return whether every step is accepted; steps that are not are watched from now on."""
+        """See `Candidates.confirms`."""
         refused = self._refused(self._load, number)
         self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
         return not refused.size
@@ -358,31 +356,31 @@ class OffsetCandidates:
 
 
 DIGITS = 3
-"""Decimal places of a transition behind its leading digit, so that the printed one is the confirmed one."""
+"""Decimal places of a transition after its leading digit: the grid of printed values."""
 
 
 def has_transitions(trajectory: Trajectory) -> bool:
-    """Return whether the stiffness is given by levels with transitions between them."""
+    """Return whether the stiffness is given as levels with transitions between them."""
     return bool(_changes(trajectory))
 
 
 def _changes(trajectory: Trajectory) -> list[RestToRest]:
-    """Return the changes from level to level, none if the stiffness is something else."""
+    """Return the transitions between levels; none if the stiffness is another curve."""
     stiffness = trajectory.commanded[STIFFNESS.key]
     return (changes_of_steps(stiffness) or []) if isinstance(stiffness, Chain) else []
 
 
 def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
-    """Return the commanded transition, the shortest accepted longer one, and the trajectory with it.
+    """Return the commanded transition time, the shortest accepted longer one, s, and the trajectory with it.
 
-    Each change of level begins when it did. It is found by a scan in steps of 1 %, then bisection.
+    Each transition begins as commanded. A scan in strides of 1 % is followed by bisection.
 
     Args:
-        acceptance: the rule, and the robot.
-        trajectory: one that `has_transitions`.
+        acceptance: acceptance rule, which includes the robot.
+        trajectory: trajectory that `has_transitions`.
 
     Raises:
-        ImpossibleError: no transition that ends in time is accepted.
+        ImpossibleError: no transition that ends before the next one begins is accepted.
     """
     candidates = _Transitions(acceptance, trajectory)
     number = smallest_confirmed(candidates, candidates.first, candidates.last)
@@ -392,7 +390,7 @@ def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple
 
 
 class _Transitions:
-    """Transitions on a decimal grid, judged at watched instants; see `Candidates`."""
+    """Transition times on a decimal grid, checked at watched instants; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory) -> None:
         self._acceptance, self._trajectory, self._changes = acceptance, trajectory, _changes(trajectory)
@@ -408,20 +406,20 @@ class _Transitions:
 
     @property
     def first(self) -> int:
-        """The first number that stands for a longer transition."""
+        """Smallest number that stands for a longer transition."""
         return math.floor(self.shortest / 10.0**self._exponent * (1 + 1e-9)) + 1
 
     @property
     def last(self) -> int:
-        """The number of the longest transition that ends before the next change, or the motion."""
+        """Number of the longest transition that ends before the next one begins, or the motion ends."""
         return math.floor(self.longest / 10.0**self._exponent * (1 + 1e-9))
 
     def length(self, number: int) -> float:
-        """Return the transition that a number stands for, s."""
+        """Return the transition time that a number stands for, s."""
         return min(float(f"{number}e{self._exponent}"), self.longest)
 
     def trajectory(self, number: int) -> Trajectory:
-        """Return the trajectory with transitions of that length."""
+        """Return the trajectory with the transition time that a number stands for."""
         first, length = self._changes[0], self.length(number)
         levels = [first.start, *(change.end for change in self._changes)]
         spans = [
@@ -432,15 +430,15 @@ class _Transitions:
         return with_stiffness(self._trajectory, profile)
 
     def stride(self, number: int) -> int:
-        """One percent."""
+        """Return 1 % of the number."""
         return math.ceil(number / 100)
 
     def accepts(self, number: int) -> bool:
-        """Return whether every watched instant is accepted."""
+        """See `Candidates.accepts`."""
         return not self._refused(number, self._watched).size
 
     def confirms(self, number: int) -> bool:
-        """Return whether every step is accepted; steps that are not are watched from now on."""
+        """See `Candidates.confirms`."""
         refused = self._refused(number, self._steps)
         self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
         return not refused.size

@@ -1,7 +1,7 @@
-"""Problems whose cost and bounds are functions of a few rows at each instant, linear in the unknowns.
+"""Problems whose cost and bounds depend on a few rows at each instant, which are linear in the unknowns.
 
-The rows are, say, the stiffness of a joint and its two derivatives, the unknowns coefficients of a spline. So
-all derivatives by the unknowns follow from small ones, instant by instant.
+For example, the rows are the stiffness of a joint and its two derivatives, and the unknowns are coefficients
+of a spline. So gradients and Hessians by the unknowns follow from small ones by the rows, instant by instant.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from vsacli.studies.search.interior_point import minimise
 from vsacli.studies.search.nearest_profile import peaks
 
 DIFFERENCE = 1e-6
-"""Steps in the scale of a row by which exact gradients are differenced: half of the digits are left."""
+"""Step for differencing exact gradients, relative to the scale of a row: half of the digits remain."""
 
 LEAST_CLEARANCE = 1e-5
-"""Clearance of all bounds at a start: the path out of a corner is long."""
+"""Clearance of all bounds that a start should have, since the path out of a corner is long."""
 
 LEAST_RELIEF = 1e-3
-"""Relative clearance of bounds at a start, if possible."""
+"""Clearance at which relieving the bounds ends; the relief begins as much above the largest bound."""
 
 PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
-"""Shares of the way to a place inside, one of which leads inside."""
+"""Shares of the way to an interior point that are tried, until one leads inside."""
 
 TETHER = 1e-3
-"""Cost of moving as far as rows are large while bounds are relieved: otherwise free unknowns would drift."""
+"""Cost of moving rows by their scale while bounds are relieved; without it, free unknowns would drift."""
 
 
 class Functions(Protocol):
-    """Terms of a cost and its bounds: functions of rows at instants, which may carry derivatives."""
+    """Integrands of a cost and its bounds: functions of rows at instants, which may carry derivatives."""
 
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[Sequence[Dual | FloatArray], Sequence[Dual | FloatArray]]:
-        """Integrands of the cost, and bounds, which shall not be positive; each (instants,).
+        """Return integrands of the cost, and bounds, which must not be positive; each (instants,).
 
         Args:
-            rows: one array (instants,) each.
-            instants: which they are.
+            rows: rows, each (instants,).
+            instants: indices of the instants.
         """
 
 
@@ -55,7 +55,7 @@ class Sampled(NamedTuple):
     gradients: FloatArray
 
     def split(self, parts: int) -> tuple[Sampled, list[FloatArray]]:
-        """Return the first of equal parts of the instants, and the gradients of each of the others."""
+        """Split the instants into equal parts; return the first, and the gradients of each other part."""
         instants = self.values.shape[1] // parts
         first = Sampled(self.values[:, :instants], self.gradients[..., :instants])
         return first, np.split(self.gradients[..., instants:], parts - 1, axis=-1)
@@ -63,17 +63,17 @@ class Sampled(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Functions of the same rows.
+    """A part of a problem: a cost and bounds that are functions of the same rows.
 
     Attributes:
-        functions: the cost and bounds.
-        instants: at which, (instants,), as the functions number them.
-        basis: of the rows, (rows, instants, own unknowns).
-        unknowns: places of its unknowns among all, (own unknowns,).
-        weights: of each integrand at each instant, (integrands, instants).
-        there: which bounds there are, (bounds, instants); others do not count.
+        functions: integrands of the cost, and bounds.
+        instants: indices of the instants for the functions, (instants,).
+        basis: rows per unit of each unknown, (rows, instants, own unknowns).
+        unknowns: indices of the group's unknowns among all, (own unknowns,).
+        weights: weight of each integrand at each instant, (integrands, instants).
+        there: mask of the bounds that exist, (bounds, instants).
         scales: sizes of the rows, (rows,).
-        offsets: values of the rows at zero unknowns, (rows,); zero unless given.
+        offsets: values of the rows if all unknowns are zero, (rows,); zero if None.
     """
 
     functions: Functions
@@ -86,17 +86,17 @@ class Group:
     offsets: FloatArray | None = None
 
     def rows(self, unknowns: FloatArray) -> FloatArray:
-        """Return the rows of all unknowns of a problem, (rows, instants)."""
+        """Return the rows, (rows, instants), from all unknowns of a problem."""
         rows: FloatArray = self.basis @ unknowns[self.unknowns]
         return rows if self.offsets is None else rows + self.offsets[:, None]
 
     @cached_property
     def by_instant(self) -> FloatArray:
-        """The basis in another order, (instants, rows, own unknowns)."""
+        """Basis with the axes (instants, rows, own unknowns)."""
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
 
     def values(self, rows: FloatArray) -> tuple[float, FloatArray]:
-        """Return the cost and the bounds there are."""
+        """Return the cost and the existing bounds."""
         integrands, bounds = self.functions(rows, self.instants)
         cost = float(np.sum(self.weights * _stacked(integrands, rows)))
         return cost, _stacked(bounds, rows)[self.there]
@@ -106,7 +106,7 @@ class Group:
         return _stacked(self.functions(rows, self.instants)[1], rows)
 
     def sampled(self, rows: FloatArray, instants: IndexArray) -> tuple[Sampled, Sampled]:
-        """Integrands and bounds with their gradients."""
+        """Return integrands and bounds with their gradients."""
         integrands, bounds = self.functions(seeds(list(rows)), instants)
         return _sampled(integrands, rows), _sampled(bounds, rows)
 
@@ -124,9 +124,9 @@ def _sampled(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sample
 
 
 class _Expanded:
-    """A group at unknowns: functions and gradients there, and where each row is displaced a little.
+    """A group at given unknowns: functions and gradients there, and with each row displaced a little.
 
-    All are computed at once, since calls cost more than instants.
+    One call computes all of them, since a call costs more than many instants.
     """
 
     def __init__(self, group: Group, unknowns: FloatArray) -> None:
@@ -147,18 +147,18 @@ class _Expanded:
         return self._by_unknowns(_weighted(self.group.weights, self.integrands.gradients))
 
     def pull(self, weights: FloatArray) -> FloatArray:
-        """Return the sum of the bounds' gradients by the own unknowns, (own unknowns,)."""
+        """Return the weighted sum of the bounds' gradients, (own unknowns,)."""
         return self._by_unknowns(_weighted(self._of_all(weights), self.bounds.gradients))
 
     def changes(self, step: FloatArray) -> FloatArray:
-        """Return the changes of the bounds."""
+        """Return the first-order changes of the existing bounds with a step."""
         moved = self.group.basis @ step[self.group.unknowns]
         changes: FloatArray = np.sum(self.bounds.gradients * moved, axis=1)[self.group.there]
         return changes
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
-        if self._curved is None:  # asked for again where this is not positive definite
+        if self._curved is None:  # a second call follows, with `convex`, if the matrix is indefinite
             self._curved = self._curvature(self._of_all(multipliers))
         curved = self._curved
         if convex:
@@ -172,7 +172,7 @@ class _Expanded:
         return matrix
 
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
-        """Second derivatives of cost and multiplied bounds by rows, (instants, rows, rows), differenced."""
+        """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
         moved = [
             _weighted(self.group.weights, here) + _weighted(multipliers, of_bounds)
             for here, of_bounds in zip(self._moved_integrands, self._moved_bounds, strict=True)
@@ -184,7 +184,7 @@ class _Expanded:
         return symmetric
 
     def _of_all(self, of_bounds: FloatArray) -> FloatArray:
-        """Numbers of the bounds there are, and zeros for the others, (bounds, instants)."""
+        """Return values of the existing bounds with zeros for the others, (bounds, instants)."""
         spread = np.zeros(self.group.there.shape)
         spread[self.group.there] = of_bounds
         return spread
@@ -195,7 +195,7 @@ class _Expanded:
 
 
 def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
-    """Return the sum of gradients times weights, (rows, instants); gradients without weight may be NaN."""
+    """Return the weighted sum of gradients, (rows, instants); gradients with zero weight may be NaN."""
     kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
     summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)
     return summed
@@ -241,26 +241,27 @@ class SeparablePoint:
 
 @dataclass(frozen=True, eq=False)
 class SeparableProblem:
-    """The sum of the costs of groups under the bounds of all; a `Problem`."""
+    """The sum of the costs of several groups, subject to the bounds of all; a `Problem`."""
 
     groups: Sequence[Group]
 
     def values(self, unknowns: FloatArray) -> tuple[float, FloatArray]:
-        """Cost and bounds; not finite where they are not defined."""
+        """See `Problem.values`."""
         found = [group.values(group.rows(unknowns)) for group in self.groups]
         return sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found])
 
     def at(self, unknowns: FloatArray) -> SeparablePoint:
-        """Return the same with derivatives."""
+        """See `Problem.at`."""
         return SeparablePoint(self.groups, unknowns)
 
 
 def interior(
     problem: SeparableProblem, wanted: FloatArray, inside: FloatArray | None = None
 ) -> FloatArray | None:
-    """Unknowns near to the wanted ones that keep all bounds; None if the search for them finds none.
+    """Return unknowns near the wanted ones that keep all bounds, or None.
 
-    On the way to a place inside, if one is known; else the largest bound is lowered until it is negative.
+    They lie on the way to an interior point, if one is known; otherwise the largest bound is minimized until
+    it is negative.
     """
     kept = None
     for share in PULLS:
@@ -281,7 +282,7 @@ def interior(
 
 
 def _relieved(group: Group, start: FloatArray) -> Group:
-    """Return the same bounds less a further unknown, which is the cost, with a little more for going far."""
+    """Return the bounds of a group minus a further unknown, the relief, whose mean is the cost."""
     rows, instants, own = group.basis.shape
     basis = np.zeros((rows + 1, instants, own + 1))
     basis[:-1, :, :-1], basis[-1, :, -1] = group.basis, 1.0
@@ -298,7 +299,7 @@ def _relieved(group: Group, start: FloatArray) -> Group:
 
 
 class _Relieved:
-    """`Functions` whose cost is a further row, less which others are bounds."""
+    """The `Functions` whose cost is a relief and a small cost of moving; the relief lowers all bounds."""
 
     def __init__(self, group: Group, start: FloatArray) -> None:
         self._group, self._start = group, start
@@ -306,7 +307,7 @@ class _Relieved:
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """Return the relief, and the bounds less that."""
+        """Return the cost, and the bounds minus the relief; see `Functions`."""
         *own, relief = rows
         _, bounds = self._group.functions(own, self._group.instants[instants])
         sizes = zip(own, self._start[:, instants], self._group.scales, strict=True)
@@ -315,10 +316,10 @@ class _Relieved:
 
 
 def missed_instants(missed: FloatArray) -> IndexArray:
-    """Return where any bound, a row of values that are positive where it is missed, shall be kept as well.
+    """Return the instants to add where bounds, (bounds, instants), are positive and so violated.
 
-    At the worst instant of each stretch and beside it: with the former alone, the next minimum would miss the
-    bound there, and a search would follow it from instant to instant.
+    They are the worst instant of each violated stretch and its neighbors: with the worst alone, the next
+    minimum would violate the bound at a neighbor, and the search would follow it from instant to instant.
     """
     worst = np.concatenate([peaks(row) for row in missed])
     around = worst[:, None] + np.array([-1, 0, 1])

@@ -1,4 +1,8 @@
-"""Splines of degree 5 as combinations of shapes, and the splines of pace and stiffness along a path."""
+"""Spaces of quintic splines, and the splines of pace and stiffness along a path.
+
+A shape is a combination of B-splines that satisfies the end conditions of its space; unknowns of a search are
+coefficients of shapes.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +23,17 @@ if TYPE_CHECKING:
 DEGREE = 5
 
 FLAT_ENDS = 2
-"""Derivatives that vanish at both ends of a spline from rest to rest."""
+"""Number of derivatives that are zero at both ends of a spline from rest to rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class SplineSpace:
-    """Splines over a span, all of them or those that begin and end at rest, or repeat, or are constant.
+    """A space of splines over a span: all, or those that are at rest at both ends, periodic or constant.
 
     Attributes:
-        knots: (coefficients + 6,), s.
+        knots: knots, (coefficients + 6,) in s.
         shapes: B-spline coefficients of each shape, (coefficients, shapes).
-        offset: of each spline, without its shapes.
+        offset: constant that is added to every spline.
     """
 
     knots: FloatArray
@@ -40,15 +44,14 @@ class SplineSpace:
     def at_rest(
         cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
     ) -> SplineSpace:
-        """Splines of this many equal pieces whose first two derivatives vanish at both ends.
-
-        They vanish where the first three coefficients are equal.
+        """Return the splines of equal pieces whose first two derivatives are zero at both ends.
 
         Args:
-            span: where they are defined, s.
-            pieces: their number; fewer if fewer are allowed.
-            allowed: times at which pieces may begin and end, both ends of the span among them; any if None.
+            span: first and last time, s.
+            pieces: number of pieces; fewer if `allowed` has fewer.
+            allowed: times at which pieces may begin and end, both ends of the span included; any if None.
         """
+        # derivatives are zero at an end where three coefficients are equal
         ends = _ends(span, pieces, allowed)
         knots = np.concatenate([[ends[0]] * DEGREE, ends, [ends[-1]] * DEGREE])
         coefficients = len(ends) - 1 + DEGREE
@@ -57,7 +60,7 @@ class SplineSpace:
 
     @classmethod
     def free(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
-        """Splines of this many equal pieces, whatever they do at the ends."""
+        """Return the splines of this many equal pieces, without conditions at the ends."""
         knots = cls.at_rest(span, pieces).knots
         return cls(knots, np.eye(pieces + DEGREE))
 
@@ -65,7 +68,7 @@ class SplineSpace:
     def periodic(
         cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
     ) -> SplineSpace:
-        """Splines of this many equal pieces that go on at the end as they begin; see `at_rest`."""
+        """Return the periodic splines of this many equal pieces; see `at_rest`."""
         ends = _ends(span, pieces, allowed)
         pieces, period = len(ends) - 1, span[1] - span[0]
         turns, places = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
@@ -73,22 +76,20 @@ class SplineSpace:
 
     @classmethod
     def constant(cls, span: tuple[float, float]) -> SplineSpace:
-        """Constants."""
+        """Return the constants over a span."""
         whole = cls.at_rest(span, 1)
         return cls(whole.knots, np.ones((len(whole.shapes), 1)))
 
     def one_at(self, first: bool, last: bool) -> SplineSpace:
-        """Return the `free` splines that are one at one or both ends, where three derivatives vanish.
-
-        They do where the first four coefficients are equal.
-        """
+        """Return the `free` splines that are 1, with three zero derivatives, at one or both ends."""
         if not (first or last):
             return self
+        # the value is 1 and derivatives are zero where four coefficients are 1, the offset
         fixed = FLAT_ENDS + 2
         return replace(self, shapes=self.shapes[:, fixed * first : self.size - fixed * last], offset=1.0)
 
     def of_mean(self, mean: float) -> SplineSpace:
-        """Return those splines with a mean over the span, the constant among them."""
+        """Return the splines with a given mean over the span, among them the constant."""
         from scipy.interpolate import BSpline
         from scipy.linalg import null_space
 
@@ -97,7 +98,7 @@ class SplineSpace:
         return replace(self, shapes=self.shapes @ null_space(integrals[None]), offset=mean)
 
     def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
-        """Return a spline that goes on at the end as it begins, passed this many times."""
+        """Return a periodic spline over `count` periods."""
         first, last = self.knots[DEGREE], self.knots[-DEGREE - 1]
         pieces = len(self.shapes) - DEGREE
         whole = self.periodic((first, first + count * (last - first)), count * pieces)
@@ -115,30 +116,30 @@ class SplineSpace:
         return float(ends[-1] - ends[0]) / (len(ends) - 1)
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
-        """Return the shapes and their derivatives, (orders, instants, shapes)."""
+        """Return the shapes with their derivatives, (orders, instants, shapes)."""
         from scipy.interpolate import BSpline
 
         every = BSpline(self.knots, self.shapes, DEGREE)
         return np.stack([every(time, nu=order) for order in range(orders)])
 
     def offsets(self, orders: int) -> FloatArray:
-        """Return values and derivatives of the splines without any shape, (orders,)."""
+        """Return the offset with its derivatives, which are zero, (orders,)."""
         return np.append(self.offset, np.zeros(orders - 1))
 
     def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
-        """Return the spline of so much of each shape, (shapes, ...)."""
+        """Return the spline with given coefficients of the shapes, (shapes, ...)."""
         from scipy.interpolate import BSpline
 
         return BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
-        """Return the amounts of the shapes with which they come nearest to values, (shapes,)."""
+        """Return the coefficients of the spline nearest to values, (shapes,), by least squares."""
         amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0]
         return amounts
 
 
 def _ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:
-    """Return the ends of pieces of about equal length, each the nearest that is allowed."""
+    """Return the ends of pieces of about equal length, each at the nearest allowed time."""
     ends = np.linspace(*span, pieces + 1)
     if allowed is None:
         return ends
@@ -149,14 +150,14 @@ def _ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) ->
 
 @dataclass(frozen=True, eq=False)
 class Pacing:
-    """A pace along the path of a trajectory, and the stiffness of joints where it varies.
+    """An optimized pace along the path of a trajectory, with the stiffness of joints where it varies.
 
     Attributes:
-        splines: of the pace, None, and of joints by index: a space, and the amounts of its shapes.
+        splines: space and coefficients of the pace (key None) and of each stiffness (key: joint index).
         found: whether the conditions for a local optimum hold.
-        starts: from how many the search began.
-        agreeing: from how many it came to this optimum.
-        bounding: share of the path along each bound, by joint and name of the bound.
+        starts: number of starts of the search.
+        agreeing: number of starts that reached this optimum.
+        bounding: share of the path on which each bound is active, by joint and name of the bound.
     """
 
     splines: dict[int | None, tuple[SplineSpace, FloatArray]] = field(repr=False)
@@ -166,15 +167,15 @@ class Pacing:
     bounding: dict[str, dict[str, float]]
 
     def pace(self, count: int = 1) -> BSpline[np.float64]:
-        """Over the path, a spline whose argument is s; passed this many times if it repeats itself."""
+        """Return the pace as a spline over s; for a periodic motion, over `count` periods."""
         return self._spline(None, count)
 
     def stiffness(self, count: int = 1) -> dict[int, BSpline[np.float64]]:
-        """Return the same of the joints where it varies, by index."""
+        """Return each varied stiffness as a spline over s, by joint index; see `pace`."""
         return {key: self._spline(key, count) for key in self.splines if key is not None}
 
     def stiffness_at(self, s: FloatArray) -> dict[int, FloatArray]:
-        """Return the stiffness of these joints at instants of the path or its first period, (instants,)."""
+        """Return each varied stiffness at coordinates of the path or its first period, (instants,)."""
         return {joint: spline(s) for joint, spline in self.stiffness().items()}
 
     def _spline(self, key: int | None, count: int) -> BSpline[np.float64]:
@@ -183,7 +184,7 @@ class Pacing:
 
 
 class Rows(NamedTuple):
-    """Rows of functions from unknowns: the fields of a `Group` that say so."""
+    """Rows as linear functions of unknowns: the fields of a `Group` for these."""
 
     basis: FloatArray
     places: IndexArray
@@ -191,11 +192,11 @@ class Rows(NamedTuple):
     offsets: FloatArray
 
     def first(self) -> Rows:
-        """Return the first of them alone."""
+        """Return the first row only."""
         return Rows(self.basis[:1], self.places, self.scales[:1], self.offsets[:1])
 
     def beside(self, other: Rows) -> Rows:
-        """These and others, with unknowns of their own."""
+        """Return these rows followed by others, which have their own unknowns."""
         rows, own = len(self.basis), self.basis.shape[2]
         joined = np.zeros((rows + len(other.basis), self.basis.shape[1], own + other.basis.shape[2]))
         joined[:rows, :, :own], joined[rows:, :, own:] = self.basis, other.basis
@@ -206,13 +207,13 @@ class Rows(NamedTuple):
 def of_rows(
     functions: Functions, instants: IndexArray, rows: Rows, weights: FloatArray, bounds: int
 ) -> Group:
-    """Functions of rows at instants, with this many bounds at each of them."""
+    """Return the group for functions of rows at instants, with `bounds` bounds at each instant."""
     there = np.ones((bounds, len(instants)), dtype=np.bool_)
     return Group(functions, instants, rows.basis, rows.places, weights, there, rows.scales, rows.offsets)
 
 
 class PacedSpaces(NamedTuple):
-    """Splines of the pace, and of the stiffness of joints by index; their unknowns stand in this order."""
+    """Spaces of the pace and of the stiffness of joints, by index; unknowns are ordered like this."""
 
     pace: SplineSpace
     stiffness: dict[int, SplineSpace]
@@ -221,9 +222,8 @@ class PacedSpaces(NamedTuple):
     def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int], ends: Ends) -> PacedSpaces:
         """Return the spaces with this many pieces each, for a motion with these ends.
 
-        A repeated motion goes on at the end as it begins, at any pace. A motion that begins or ends on its
-        way without repeating itself does so at the pace as commanded, with the accelerations as commanded,
-        too.
+        Splines of a periodic motion are periodic. At an end at which another motion moves, velocity and
+        higher derivatives remain as commanded.
         """
         if ends.periods:
             periodic = SplineSpace.periodic(span, pieces)
@@ -232,11 +232,11 @@ class PacedSpaces(NamedTuple):
         return cls(pace, dict.fromkeys(varied, SplineSpace.at_rest(span, pieces)))
 
     def lasting_as_commanded(self) -> PacedSpaces:
-        """Return the spaces in which the path takes the commanded time."""
+        """Return the spaces in which the motion has the commanded duration."""
         return self._replace(pace=self.pace.of_mean(1.0))
 
     def parts(self) -> dict[int | None, tuple[SplineSpace, IndexArray]]:
-        """Space and places of unknowns, of the pace, None, and of joints."""
+        """Return space and indices of unknowns of the pace (key None) and of each varied stiffness."""
         spaces: dict[int | None, SplineSpace] = {None: self.pace}
         spaces.update(self.stiffness.items())
         ends = np.cumsum([space.size for space in spaces.values()])
@@ -244,31 +244,31 @@ class PacedSpaces(NamedTuple):
         return {key: (space, own) for (key, space), own in zip(spaces.items(), places, strict=True)}
 
     def fitted(self, s: FloatArray, pace: FloatArray, stiffness: Mapping[int, FloatArray]) -> FloatArray:
-        """Return unknowns nearest to a pace and to stiffness, each (instants,)."""
+        """Return the unknowns nearest to a pace and to the stiffness of joints, each (instants,)."""
         wanted: dict[int | None, FloatArray] = {None: pace}
         wanted.update(stiffness.items())
         return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
 
     def even(self, s: FloatArray, pace: float, stiffness: Mapping[int, FloatArray]) -> FloatArray:
-        """Unknowns of the same pace everywhere, but for ends where it is given."""
+        """Return the unknowns of a constant pace, except at ends where it is prescribed."""
         unknowns = self.fitted(s, np.full_like(s, pace), stiffness)
         _, own = self.parts()[None]
         unknowns[own] = pace - self.pace.offset  # shapes of a free pace are B-splines, whose sum is one
         return unknowns
 
     def slowed(self, unknowns: FloatArray, share: float) -> FloatArray:
-        """Unknowns of a pace that is larger by a share, but for ends where it is given."""
+        """Return unknowns with the pace increased by a share, except at ends where it is prescribed."""
         slower, (_, own) = unknowns.copy(), self.parts()[None]
         slower[own] += share * (slower[own] + self.pace.offset)
         return slower
 
     def rows(self, key: int | None, s: FloatArray, orders: int, size: float = 1.0) -> Rows:
-        """Return None (the timing) or the stiffness of a joint, scaled, with its derivatives at instants."""
+        """Return the rows of the pace (key None) or of a joint's stiffness of size `size`, at instants."""
         space, own = self.parts()[key]
         scales = size * space.piece ** -np.arange(orders, dtype=np.float64)
         return Rows(space.basis(s, orders), own, scales, space.offsets(orders))
 
     def level(self, s: FloatArray) -> Rows:
-        """Return a further unknown, behind all others, that is the same everywhere."""
+        """Return the row of a level: one further unknown after all others, constant over the path."""
         last = sum(space.size for space, _ in self.parts().values())
         return Rows(np.ones((1, len(s), 1)), np.array([last]), np.ones(1), np.zeros(1))

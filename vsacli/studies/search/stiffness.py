@@ -1,7 +1,8 @@
-"""The stiffness profile of one joint with which a cost is least, along a fixed motion.
+"""The stiffness profile of one joint that minimizes a cost along a fixed motion.
 
-Cost and bounds are functions of the stiffness and its derivatives at each instant. The search begins from
-several smooth profiles inside the attainable range, and goes on with finer splines as long as these pay.
+Cost and bounds are functions of the stiffness and its derivatives at each instant. An interior-point method
+starts from several smooth profiles inside the attainable range and refines the best with finer splines, as
+long as these lower the cost.
 """
 
 from __future__ import annotations
@@ -37,22 +38,22 @@ from vsacli.studies.search.separable import Group, SeparableProblem, interior, m
 from vsacli.studies.search.splines import SplineSpace
 
 CLEARANCE = 1e-6
-"""Share of each bound by which a profile keeps clear of it, so that rounding crosses none."""
+"""Relative distance that a profile keeps from each bound, so that rounding does not cross it."""
 
 OF_MOTORS = ("phi", "dtheta", "tau_motor", "current", "voltage")
-"""Variables with limits that depend on the stiffness."""
+"""Limited variables that depend on the stiffness."""
 
 
 class FixedMotion:
-    """The `Functions` of stiffness, its rate and its second derivative; and of a level, if the cost is one.
+    """The `Functions` of a stiffness and its first two derivatives, and of a level if the cost is one.
 
     Args:
-        joint: the joint.
-        load: of the joint, at all instants.
-        admissible: its stiffness at them.
-        criterion: the minimized quantity.
-        scale: of the cost.
-        reserve: share of each limit of the motors that is kept clear of.
+        joint: joint whose stiffness varies.
+        load: load of the joint at all instants.
+        admissible: admissible stiffness at these instants.
+        criterion: objective.
+        scale: scale of the cost.
+        reserve: required clearance to the limits of the motors, as a share of each.
     """
 
     def __init__(
@@ -72,18 +73,18 @@ class FixedMotion:
 
     @property
     def bound_names(self) -> list[str]:
-        """Words for the first bounds; those after are of levels."""
+        """Names of the first bounds; the bounds after these belong to levels."""
         return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
 
     @property
     def further_bounds(self) -> int:
-        """Number of bounds behind those of the stiffness itself."""
+        """Number of bounds after the two of the stiffness itself."""
         return len(self.bound_names) - 2 + self.criterion.bound_count(self.joint)
 
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """Integrands of the cost, and bounds; see `Functions`."""
+        """Return integrands of the cost, and bounds; see `Functions`."""
         driven = self.driven(rows[: STIFFNESS.orders], instants)
         level = rows[STIFFNESS.orders] if self.criterion.levels else None
         asked = (self.joint, driven, level, self.scale)
@@ -98,19 +99,19 @@ class FixedMotion:
         load = self.load.at(instants).command
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
-        with np.errstate(all="ignore"):  # a step of the search may leave the corridor
+        with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             return driven_by(joint, load._replace(commanded=commanded), NEAR_SINGULAR_MARGIN)
 
 
 INSIDE = 1e-3
-"""Share of its stiffness by which a start keeps clear of the ends of the admissible range, if possible."""
+"""Relative distance that a start keeps from the ends of the admissible range, if possible."""
 
 DRAWN, LEVELS = 2, 6
-"""Targets that are drawn, and the levels between which each of them is interpolated."""
+"""Number of random targets, and of the random levels that each of them interpolates."""
 
 
 class _Distance:
-    """The `Functions` of a stiffness that shall be near a target, within bounds."""
+    """The `Functions` of the squared distance from a target stiffness, within bounds."""
 
     def __init__(self, target: FloatArray, within: Range, size: float) -> None:
         self._target, self._within, self._size = target, within, size
@@ -125,7 +126,7 @@ class _Distance:
 
 
 def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
-    """Yield profiles to begin near: the commanded one, the lower end, constants, random ones."""
+    """Yield targets for starts: the command, the lower end of the range, constants, random profiles."""
     highest = float(admissible.low.max())
     generator = np.random.default_rng(seed)
     yield asked
@@ -140,7 +141,7 @@ def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -
 def nearest_profile(
     space: SplineSpace, time: FloatArray, target: FloatArray, admissible: Range
 ) -> FloatArray | None:
-    """Return the admissible amounts of a space's shapes nearest to a target, if there are any."""
+    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None."""
     size = float(np.median(admissible.low))
     clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
     within = Range(admissible.low + clearance, admissible.high - clearance)
@@ -159,45 +160,45 @@ def nearest_profile(
 
 
 INSTANTS_PER_PIECE = 8
-"""Instants of a piece of the spline at which the cost is summed up and bounds are kept."""
+"""Instants per piece of the spline at which the cost is integrated and bounds are kept."""
 
 FIRST_PIECES = 12
-"""Pieces of the splines with which several starts are tried."""
+"""Pieces of the splines for the several starts."""
 
 MOST_PIECES = 96
-"""Pieces up to which they are halved, as long as that pays."""
+"""Largest number of pieces after repeated halving."""
 
 WORTH_HALVING = 1e-3
-"""Share of the cost by which halving the pieces must lower it to be done again."""
+"""Relative decrease of the cost by halving the pieces above which they are halved again."""
 
 SAME_COST = 1e-4
-"""Relative difference of costs up to which two starts came to the same optimum."""
+"""Relative difference of costs up to which two starts reached the same optimum."""
 
 MOST_ROUNDS = 12
-"""Rounds of adding instants at which bounds are missed; one or two are usual, seven were needed."""
+"""Limit on rounds that add instants of violated bounds; one or two are usual, seven were needed once."""
 
 SAME_LEVEL = 1e-5
 """Share of a level by which values may exceed it at some instants: a tenth of `SAME_COST`."""
 
 FIRST_LEVEL = 1.05
-"""First level, as a multiple of the bounded values."""
+"""Initial level, as a multiple of the largest value that it bounds."""
 
 ACTIVE = 1e-3
-"""Relative distance from a bound at which a profile runs along it."""
+"""Relative distance from a bound below which it is active."""
 
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A stiffness over the instants of a load.
+    """An optimized stiffness over the instants of a load.
 
     Attributes:
-        rows: stiffness, rate and second derivative at the instants of the load, (3, instants), N m/rad (N/m)
-            per s^k.
-        steps: which of these instants are steps.
+        rows: stiffness with its first two derivatives at the instants of the load, (3, instants),
+            N m/rad (N/m) per s^k.
+        steps: indices of the instants that are samples of the trajectory.
         found: whether the conditions for a local optimum hold.
-        starts: of how many different profiles the search began.
-        agreeing: from how many of them it came to this optimum.
-        bounding: share of the time at which each bound holds it back, by its name.
+        starts: number of starts of the search.
+        agreeing: number of starts that reached this optimum.
+        bounding: share of the time during which each bound is active, by name of the bound.
     """
 
     rows: FloatArray = field(repr=False)
@@ -209,12 +210,12 @@ class Profile:
 
     @property
     def at_steps(self) -> FloatArray:
-        """The rows at the steps alone, (3, steps)."""
+        """Rows at the samples of the trajectory only, (3, samples)."""
         return self.rows[:, self.steps]
 
 
 Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
-"""The splines over a span of this many pieces, which begin and end at some of these times."""
+"""Function (span, number of pieces, times at which pieces may begin and end) that returns the splines."""
 
 
 class _Attempt(NamedTuple):
@@ -225,7 +226,7 @@ class _Attempt(NamedTuple):
     instants: IndexArray
 
     def in_space(self, space: SplineSpace, time: FloatArray) -> FloatArray:
-        """Return the same profile in another space, (shapes,)."""
+        """Return the coefficients of the profile in another space, (shapes,)."""
         return space.fitted(time, self.space.basis(time, 1)[0] @ self.minimum.unknowns[: self.space.size])
 
 
@@ -233,14 +234,14 @@ class StiffnessSearch:
     """A search for the best stiffness profile of one joint.
 
     Args:
-        acceptance: the rule for every step.
-        joint: whose stiffness can be chosen.
-        load: of the joint. Pieces of splines begin and end at its steps, so that the quintic between two
-            steps with given derivatives, which a file describes, is the spline itself.
-        criterion: the minimized quantity.
-        spaces: among which splines is searched.
-        seed: of the starts that are drawn.
-        progress: called after each of its searches, about ten in all.
+        acceptance: acceptance rule for every sample.
+        joint: joint whose stiffness can be chosen.
+        load: load of the joint. Pieces of splines begin and end at its samples, so that the spline is equal
+            to the quintic by which a file with derivatives describes the time between two samples.
+        criterion: objective.
+        spaces: splines among which to search.
+        seed: seed of the random starts.
+        progress: function to call after each inner search, about ten in all.
 
     Raises:
         ImpossibleError: no stiffness keeps the margin and the limits of stiffness and deflection.
@@ -267,17 +268,17 @@ class StiffnessSearch:
         self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
     def best(self) -> Profile:
-        """Return the best profile that is found from several starts.
+        """Return the best profile found from several starts.
 
         Raises:
-            ImpossibleError: none was found.
+            ImpossibleError: no profile was found.
         """
         pieces, starts = self._starts()
         space = self._space(pieces)
         self._scale_by(space, starts[0])
         kept: list[tuple[_Attempt, FloatArray]] = []
         for start in starts:
-            # most starts come to the same optimum, where bounds are missed at the same instants
+            # most starts reach the same optimum, where the same instants are needed to keep the bounds
             attempt = self._attempt(space, pieces, start, known=kept[-1][0].instants if kept else None)
             if attempt is not None:
                 kept.append((attempt, start))
@@ -291,7 +292,7 @@ class StiffnessSearch:
         return self._profile(self._refined(best, pieces, start), len(starts), agreeing)
 
     def best_constant(self) -> Profile | None:
-        """Return the best constant; None if no constant keeps all bounds."""
+        """Return the best constant as a profile; None if no constant keeps all bounds."""
         space = SplineSpace.constant(self._span)
         start = nearest_profile(space, self._load.time, self._asked, self._admissible)
         if start is None:
@@ -308,7 +309,7 @@ class StiffnessSearch:
         return self._spaces(self._span, pieces, self._steps)
 
     def _starts(self) -> tuple[int, list[FloatArray]]:
-        """Return the smallest pieces with admissible splines, and these."""
+        """Return the smallest number of pieces with admissible splines, and such splines as starts."""
         time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
@@ -323,13 +324,13 @@ class StiffnessSearch:
         )
 
     def _finer_than(self, pieces: int) -> Iterator[int]:
-        """Numbers of pieces, each twice as large as the one before, up to the most that there may be."""
+        """Yield numbers of pieces, each twice the previous one, up to the largest allowed."""
         while pieces < self._most:
             pieces = min(max(2 * pieces, 1), self._most)
             yield pieces
 
     def _scale_by(self, space: SplineSpace, amounts: FloatArray) -> None:
-        """Scale the cost by that of a profile."""
+        """Scale the cost by the cost of a profile."""
         every = np.arange(len(self._load.time))
         driven = self._whole.driven(space.basis(self._load.time, STIFFNESS.orders) @ amounts, every)
         size = self._criterion.size(self._joint, driven, self._load.time)
@@ -343,14 +344,14 @@ class StiffnessSearch:
         nearby: _Attempt | None = None,
         known: IndexArray | None = None,
     ) -> _Attempt | None:
-        """Search from a start, with as many instants as it takes; None if nothing keeps all bounds.
+        """Search from a start, adding instants until all bounds are kept; return None if that fails.
 
         Args:
-            space: of the splines.
-            pieces: of each.
-            start: amounts of the shapes, admissible.
-            nearby: a minimum among coarser splines, from which the search goes on.
-            known: instants that another search took.
+            space: space of the splines.
+            pieces: number of pieces of a spline.
+            start: coefficients of an admissible spline.
+            nearby: minimum among coarser splines from which to continue.
+            known: instants that another search needed.
         """
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1)
         if known is not None:
@@ -376,7 +377,7 @@ class StiffnessSearch:
         return None
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:
-        """Cost and bounds at some instants."""
+        """Return cost and bounds at some instants as a group of the separable problem."""
         time = self._load.time[instants]
         basis, levels = space.basis(time, STIFFNESS.orders), self._criterion.levels
         if levels:
@@ -398,7 +399,7 @@ class StiffnessSearch:
         )
 
     def _with_level(self, every: Group, start: FloatArray) -> FloatArray:
-        """Return a start with an effective level, if there are any."""
+        """Return a start with a level appended that bounds its values, if the cost is a level."""
         if not self._criterion.levels:
             return start
         driven = self._whole.driven((every.basis[:-1, :, :-1] @ start), every.instants)
@@ -406,13 +407,13 @@ class StiffnessSearch:
         return np.append(start, FIRST_LEVEL * level)
 
     def _missed(self, every: Group, unknowns: FloatArray) -> IndexArray:
-        """Instants at which bounds that are missed shall be kept as well."""
+        """Return the instants to add because bounds are violated there."""
         missed = every.bounds(every.rows(unknowns)) - CLEARANCE
         missed[len(self._whole.bound_names) :] -= SAME_LEVEL
         return missed_instants(missed)
 
     def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
-        """Return the same with finer pieces, as long as these lower the cost."""
+        """Return the attempt refined with finer pieces, as long as these lower the cost."""
         coarse = best.space
         for finer_pieces in self._finer_than(pieces):
             space = self._space(finer_pieces)
@@ -438,7 +439,7 @@ class StiffnessSearch:
         )
 
     def _bounding(self, rows: FloatArray) -> dict[str, float]:
-        """Share of the time during which the profile runs along a bound, by the name of the bound."""
+        """Return the share of the time during which each bound is active, by name of the bound."""
         every = np.arange(len(self._load.time))
         _, bounds = self._whole((*rows, *[0.0 * rows[0]] * self._criterion.levels), every)
         shares = [float(np.mean(bound > -ACTIVE)) for bound in bounds]

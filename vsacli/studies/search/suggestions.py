@@ -13,7 +13,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class NotPossible(Published):
-    """There is no suggestion of a kind, and why."""
+    """Reasons why a kind of change fixes nothing."""
 
     reasons: tuple[str, ...]
 
@@ -23,11 +23,11 @@ class NotPossible(Published):
 
 @dataclass(frozen=True)
 class SlowDown(Published):
-    """Stretch position and stiffness together in time.
+    """A change that stretches position and stiffness together in time.
 
     Attributes:
-        factor: at least 1.
-        duration: from the first to the last step as commanded, s.
+        factor: ratio of the new duration to the commanded one, at least 1.
+        duration: commanded time from the first to the last sample, s.
     """
 
     factor: float
@@ -38,18 +38,18 @@ class SlowDown(Published):
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         return f"slow down by a factor {self.factor:.4g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
 
     @property
     def slower(self) -> float:
-        """The new duration, s."""
+        """New duration, s."""
         return self.factor * self.duration
 
 
 @dataclass(frozen=True)
 class Offset:
-    """Add a constant to the stiffness of a joint, N m/rad (N/m)."""
+    """A constant addition to the stiffness of a joint, N m/rad (N/m)."""
 
     joint: str
     value: float
@@ -61,7 +61,7 @@ class Offset:
 
 @dataclass(frozen=True)
 class StiffnessOffset(Published):
-    """Add a constant to the stiffness of each joint; joints that are fine get zero."""
+    """A constant addition to the stiffness of each joint; zero for joints that need none."""
 
     offsets: tuple[Offset, ...]
 
@@ -70,12 +70,12 @@ class StiffnessOffset(Published):
 
     @property
     def by_joint(self) -> dict[str, float]:
-        """The constant of each joint."""
+        """Constant of each joint, by name."""
         return {offset.joint: offset.value for offset in self.offsets}
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         raised = ", ".join(str(offset) for offset in self.offsets if offset.value > 0)
         lowered = ", ".join(str(offset) for offset in self.offsets if offset.value < 0)
         clauses = {"raise": raised, "lower": lowered}
@@ -100,7 +100,7 @@ class JointChange(Published):
 
 @dataclass(frozen=True)
 class StiffnessProfile(Published):
-    """Give the stiffness of the joints that are not fine another profile."""
+    """Another stiffness profile for each joint that needs one."""
 
     changes: tuple[JointChange, ...]
 
@@ -109,18 +109,18 @@ class StiffnessProfile(Published):
 
     @property
     def by_joint(self) -> dict[str, JointChange]:
-        """The change of each joint."""
+        """Change of each joint, by name."""
         return {change.joint: change for change in self.changes}
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         return f"reshape the stiffness of {', '.join(map(str, self.changes))}"
 
 
 @dataclass(frozen=True)
 class LongerTransition(Published):
-    """Give the stiffness more time to go from level to level, s; each change begins when it did."""
+    """A longer transition between stiffness levels, s; each transition begins when it did before."""
 
     before: float
     after: float
@@ -130,13 +130,13 @@ class LongerTransition(Published):
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         return f"lengthen the transitions of the stiffness from {self.before:.10g} s to {self.after:.10g} s"
 
 
 @dataclass(frozen=True)
 class OtherPreload(Published):
-    """Take the other preload: the new one, by joint."""
+    """A change to the other preload; the new preloads are given by joint name."""
 
     preloads: Mapping[str, str]
 
@@ -144,21 +144,21 @@ class OtherPreload(Published):
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         return "change the preload of " + ", ".join(f"{joint} to {to}" for joint, to in self.preloads.items())
 
 
 @dataclass(frozen=True)
 class Remedy(Published):
-    """Changes that together make a task possible, as a whole run has confirmed.
+    """A fix: changes that together make a task feasible, confirmed by a run over all samples.
 
     Attributes:
         size: root of the sum of the squares of all relative changes: the factor of the slow-down less 1, and
-            of each joint the root mean square of its change of stiffness over that of its stiffness.
-        robot: with another preload, if that is among the changes.
-        declared: the trajectory with the changes, but for the factor by which it is passed more slowly.
-        factor: this factor; formulas are stretched already, see `Task`.
-        asked: the trajectory without the changes.
+            for each joint the rms change of its stiffness over its rms stiffness.
+        robot: robot with the new preloads.
+        declared: trajectory with the changes, except for a slow-down that follows a fit.
+        factor: factor of that slow-down; 1 if `declared` is stretched already, see `Task`.
+        asked: trajectory without the changes.
     """
 
     size: float
@@ -177,35 +177,35 @@ class Remedy(Published):
 
     @property
     def trajectory(self) -> Trajectory:
-        """Trajectory of the task."""
+        """Trajectory with all changes."""
         return self.declared if self.factor == 1 else self.declared.stretched(self.factor)
 
     @property
     def longer(self) -> float:
-        """Growth of the duration, relative to it."""
+        """Growth of the duration, relative to the commanded duration."""
         return 0.0 if self.slow_down is None else self.slow_down.factor - 1
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Kinds of change it takes; a profile is a more general constant."""
+        """Kinds of change in the fix; a profile includes a constant, which it generalizes."""
         kinds = {part for part in self.PARTS if getattr(self, part) is not None}
         return frozenset(kinds | ({"stiffness_offset"} if self.stiffness_profile else set()))
 
     @property
     def sentence(self) -> str:
-        """Return the advice, without a full stop."""
+        """Advice as a sentence, without a full stop."""
         parts = [getattr(self, part) for part in self.PARTS]
         return ", and ".join(part.sentence for part in parts if part is not None)
 
 
 @dataclass(frozen=True)
 class Cause(Published):
-    """Why a joint keeps a task from being possible.
+    """The reason why a joint makes a task infeasible.
 
     Attributes:
-        joint: its name.
-        text: the trouble, and whether a change helps at rest, in a clause.
-        fixable: whether anything that was tried helps.
+        joint: name of the joint.
+        text: exceeded bound, and whether a change helps at rest, as a clause.
+        fixable: whether any change that was tried helps.
     """
 
     joint: str
@@ -218,15 +218,15 @@ class Cause(Published):
 
 @dataclass(frozen=True)
 class Suggestions(Published):
-    """The fixes of a task: each kind of change on its own, and combinations.
+    """The fixes of a task: the smallest change of each kind alone, and combinations.
 
-    Each kind is the smallest change that does, or why there is none; None where nothing needs to change, and
-    where the stiffness has no transitions.
+    Each kind is the change, the reasons why none suffices, or None if nothing needs to change or the
+    stiffness has no transitions.
 
     Attributes:
-        near_singular: the margin that every step shall have.
-        causes: why each joint that falls short does.
-        remedies: the choices, the smallest first, those with another preload last.
+        near_singular: margin required of every sample.
+        causes: reason why each refused joint is refused.
+        remedies: fixes to choose from, the smallest first; those with another preload come last.
     """
 
     near_singular: float
@@ -241,7 +241,7 @@ class Suggestions(Published):
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        """Yield a numbered sentence for each fix under a heading, and why single kinds are not enough."""
+        """Yield the causes, a heading, and a numbered sentence for each fix."""
         margin = f"a margin of at least {100 * self.near_singular:.6g} %"
         if self.slow_down is None:
             yield f"nothing to change: every step has {margin} and keeps every limit"
@@ -257,5 +257,5 @@ class Suggestions(Published):
 
 
 def and_joined(names: Sequence[str]) -> str:
-    """Names in a sentence."""
+    """Return names joined for a sentence: "a, b and c"."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

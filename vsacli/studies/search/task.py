@@ -1,4 +1,7 @@
-"""A task that is to be fixed, the fixes that follow from combinations of changes, and their full runs."""
+"""A task to be fixed: its acceptance rule, the cost of changes, the fixes, and the run that confirms each.
+
+A search yields a `Combination` of changes; `Task` turns it into a `Remedy` with a trajectory and a robot.
+"""
 
 from __future__ import annotations
 
@@ -48,28 +51,28 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Cost(Protocol):
-    """The size of changes; the cost of all together is the root of the sum of squares."""
+    """Measure of the size of changes; several costs combine as the root of the sum of their squares."""
 
     def of_factor(self, factor: float) -> float:
-        """Return the cost of a slow-down: 0 for a factor of 1, and growing with it."""
+        """Return the cost of a slow-down, which is 0 for a factor of 1 and increases with the factor."""
 
     def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
-        """Return the cost of an addition to the stiffness of a joint, (samples,): 0 without one."""
+        """Return the cost of adding `change` to the commanded stiffness of a joint, both (samples,)."""
 
 
 class _RelativeChange:
-    """The change relative to the command.
+    """Size of changes relative to the command.
 
-    One part is the factor less 1, the others the root mean square of each joint's change over that of its
-    stiffness: a motion that takes 10 % longer counts as much as a joint that is 10 % stiffer throughout.
+    A slow-down costs its factor less 1; a joint costs the rms of its change over the rms of its stiffness.
+    So a motion that lasts 10 % longer costs as much as a joint that is 10 % stiffer throughout.
     """
 
     def of_factor(self, factor: float) -> float:
-        """Return how much longer the motion takes, relative to its duration."""
+        """Return the growth of the duration, relative to the duration."""
         return factor - 1
 
     def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
-        """Return the change of the stiffness of a joint, relative to it."""
+        """Return the rms change of the stiffness of a joint, relative to the rms stiffness."""
         return math.sqrt(float(np.mean(change**2) / np.mean(asked**2)))
 
 
@@ -77,17 +80,17 @@ RELATIVE_CHANGE: Cost = _RelativeChange()
 
 
 Form = Callable[[Acceptance, Joint, Load], FloatArray]
-"""Function to the addition to the stiffness of a joint that makes its load accepted, (samples,); or an
-ImpossibleError."""
+"""Search for the addition to a joint's stiffness, (samples,), with which its load is accepted; raises
+ImpossibleError if there is none."""
 
 
 def constant_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
-    """Return the smallest that is the same at every sample."""
+    """Return the smallest constant addition to the stiffness, (samples,)."""
     return np.full(len(load.time), smallest_offset(acceptance, joint, load))
 
 
 def least_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
-    """Return the smallest stiffness of each sample on its own; no smooth profile can have a smaller one."""
+    """Return the smallest addition at each sample separately, a lower bound for every smooth profile."""
     low, high = checked_range(acceptance, joint, load)
     if np.any(low > high):
         raise ImpossibleError(f"corridor and limits leave {joint.name} no stiffness")
@@ -101,11 +104,10 @@ class Combination:
     """Changes that together fix a motion.
 
     Attributes:
-        factor: of the slow-down, at least 1.
-        changes: additions to the stiffness, (samples,), by index of the joint; joints that are fine are
-            left out.
-        preloads: the new preload, by index of the joint, where it changes.
-        size: by the cost that was asked for.
+        factor: factor of the slow-down, at least 1.
+        changes: additions to the stiffness, (samples,), by joint index; joints without one are left out.
+        preloads: new preloads, by joint index; joints that keep theirs are left out.
+        size: total cost of the changes.
     """
 
     factor: float
@@ -115,11 +117,11 @@ class Combination:
 
     @property
     def constants(self) -> dict[int, float]:
-        """The changes of stiffness by index of the joint, if they are constant."""
+        """Constant additions to the stiffness, by joint index; valid only if the changes are constant."""
         return {index: float(change[0]) for index, change in self.changes.items()}
 
     def robot(self, robot: Robot) -> Robot:
-        """Return the robot with the preloads of the combination."""
+        """Return a robot with the preloads of the combination."""
         return robot.replace(
             {preload_path(robot, index): preload for index, preload in self.preloads.items()}
         )
@@ -129,33 +131,34 @@ AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
 
 def preload_path(robot: Robot, index: int) -> str:
-    """Return the path to the preload of a joint in the file of its robot."""
+    """Return the path of a joint's preload in the robot file."""
     return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"
 
 
 _Found = TypeVar("_Found")
 
 REFUSED = ("infeasible", "singular", "over_limit")
-"""Verdicts that no fix may have; no fix changes the uncertainty of a recording."""
+"""Verdicts that a fix must remove. Unreliable is not among them: no fix makes a recording less uncertain."""
 
 FINER = 10
-"""Parts into which each step of a remedy is divided to see whether it falls short between them."""
+"""Subdivisions of each sampling interval when a fix is checked between its samples."""
 
 MOST_INSTANTS = 300_000
-"""Instants of a remedy that are looked at: the steps of longer ones are divided into fewer parts."""
+"""Largest number of instants in this check: the intervals of longer motions get fewer subdivisions."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """The task of a robot, and the rule for every sample.
+    """The motion to be fixed, with the acceptance rule for its samples and the cost of changes.
 
     Attributes:
-        acceptance: the rule, and the robot.
-        trajectory: the commanded motion.
-        cost: how large a remedy is.
-        keeps_rate: whether a recording that becomes slower has steps at its rate, else at its samples.
-        impossible: numbers of factors at which nothing helps, by form and whether preloads change; they are
-            kept for the same task under a stricter rule.
+        acceptance: acceptance rule, which includes the robot.
+        trajectory: commanded motion.
+        cost: measure of the size of a fix.
+        keeps_rate: whether a recording that is slowed down is sampled at its original rate; otherwise its own
+            samples are kept, further apart.
+        impossible: numbers of the factors (see `Factors`) at which no change is accepted, by form and whether
+            preloads may change; also valid for the same task under a stricter rule, which shares them.
     """
 
     acceptance: Acceptance
@@ -165,11 +168,11 @@ class Task:
     impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
 
     def acceptance_with(self, found: Combination) -> Acceptance:
-        """Return the rule for the robot with the preloads of a combination."""
+        """Return the acceptance rule for the robot with the preloads of a combination."""
         return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
 
     def with_constants(self, found: Combination) -> Remedy:
-        """Return the remedy of a combination whose changes of stiffness are constants."""
+        """Return the fix by a combination whose changes of stiffness are constant."""
         offsets = tuple(
             Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
             for index, joint in enumerate(self.acceptance.robot.joints)
@@ -191,10 +194,10 @@ class Task:
         )
 
     def with_profiles(self, found: Combination) -> Remedy:
-        """Return the fix with slow-down and preloads of a combination, and the nearest profiles.
+        """Return the fix with the slow-down and preloads of a combination and the nearest stiffness profiles.
 
         Raises:
-            ImpossibleError: there is none for some joint.
+            ImpossibleError: no profile was found for some joint.
         """
         slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
         robot = acceptance.robot
@@ -217,10 +220,10 @@ class Task:
         )
 
     def with_transition(self) -> Remedy:
-        """Return the remedy with the shortest transitions between levels of stiffness that do.
+        """Return the fix with the shortest accepted transitions between stiffness levels.
 
         Raises:
-            ImpossibleError: there are none.
+            ImpossibleError: no transition is accepted.
         """
         before, after, longer = smallest_transition(self.acceptance, self.trajectory)
         asked, changed = (
@@ -244,32 +247,30 @@ class Task:
         return isinstance(self.trajectory.commanded[STIFFNESS.key], ClosedForm)
 
     def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
-        """Return the slower trajectory, and the factor by which it is still to be stretched.
-
-        A record is stretched after its fit only: that of slower samples could be another one, hum of mains at
-        other frequencies for example. Resampled steps with another stiffness are known as such, at the rate
-        that the stretched ones have.
+        """Return the slower trajectory, and the factor by which it remains to be stretched.
 
         Args:
-            factor: how much longer it lasts.
-            changed: whether the stiffness will be recorded at the steps.
+            factor: factor of the slow-down.
+            changed: whether the stiffness will be given as values at the samples.
         """
+        # a recording is stretched after its fit: slower samples could be fitted differently, for example
+        # because mains hum would have another frequency; resampled ones with another stiffness have no fit
         resampled = isinstance(self.trajectory.times, ResampledTimes)
         if self.trajectory.estimates and not (changed and resampled):
             return self.trajectory, factor
         return self.trajectory.stretched(factor), 1.0
 
     def _kept_rate(self, declared: Trajectory, factor: float, found: Combination) -> tuple[Trajectory, float]:
-        """Return the declared trajectory, still slower by a factor, at the rate of the task if possible."""
+        """Return the declared trajectory at the rate of the task if possible, and its remaining factor."""
         if found.factor == 1 or not self.keeps_rate:
             return declared, factor
         return with_kept_rate(declared, factor, rate_of(self.trajectory))
 
     def constants(self) -> Combination:
-        """Return the smallest constant changes of stiffness that fix the task by themselves.
+        """Return the smallest constant changes of stiffness that fix the task without other changes.
 
         Raises:
-            ImpossibleError: there is none for some joint.
+            ImpossibleError: no constant fixes some joint.
         """
         changes = for_refused_joints(
             self.acceptance,
@@ -296,10 +297,11 @@ class Task:
         return OtherPreload(preloads) if preloads else None
 
     def falls_short(self, remedy: Remedy) -> FloatArray | None:
-        """Instants at which a run over the whole fix misses margin or limits; None without any.
+        """Run a fix; return instants at which it misses the margin or a limit, or None if it is confirmed.
 
-        They are times since the start of the task as it is, s: the worst ones of the run, which looks between
-        its steps, and those of a grid `FINER` times as fine.
+        Instants are times since the start of the unchanged task, s: the worst ones in the report of the run,
+        also between samples, and those of a grid `FINER` times as fine. None are returned if only the
+        self-check fails.
         """
         run = Run(remedy.robot, remedy.trajectory, near_singular=self.acceptance.near_singular)
         for _ in run:
@@ -315,13 +317,13 @@ class Task:
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 
     def _is_short(self, joint: JointReport) -> bool:
-        """Return whether the report of a joint shows trouble that no fix may have."""
+        """Return whether a joint has less than the required margin or a verdict of `REFUSED`."""
         return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
 
     def _refused_between(self, remedy: Remedy) -> FloatArray:
-        """Return some of the instants between the steps of a remedy that are not accepted."""
+        """Return up to `WATCHED_STEPS` refused instants between the samples of a fix, s."""
         trajectory, factor = remedy.trajectory, 1 + remedy.longer
-        # what is allowed for the noise of a recording is known at its steps; between them the run looks
+        # the allowance for the noise of a recording is known at samples only; the run checks between them
         if not trajectory.known_between or trajectory.estimates:
             return np.empty(0)
         acceptance = replace(self.acceptance, robot=remedy.robot, between=np.empty(0))
@@ -337,7 +339,7 @@ class Task:
 
 
 def _times(joint: JointReport) -> Iterator[float]:
-    """Yield the times of the worst trouble of each kind at a joint."""
+    """Yield the time of the worst violation of each kind at a joint."""
     yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
 
 
@@ -347,16 +349,16 @@ def for_refused_joints(
     find: Callable[[Joint, Load], _Found],
     factor: float = 1.0,
 ) -> dict[int, tuple[Load, _Found]]:
-    """Return load and result of each joint with any sample that is not accepted, by index.
+    """Search for each joint that has a refused sample; return its load and the result, by joint index.
 
     Args:
-        acceptance: the rule, and the robot.
-        trajectory: a task, or one that was stretched.
-        find: the search of a joint.
-        factor: of the stretching.
+        acceptance: acceptance rule, which includes the robot.
+        trajectory: motion of the task, or that motion stretched.
+        find: search for one joint.
+        factor: factor by which the trajectory is stretched.
 
     Raises:
-        ImpossibleError: with the reason of each joint for which nothing was found.
+        ImpossibleError: a search failed; the error has the reason of each such joint.
     """
     refused = np.flatnonzero(acceptance.refused_joints(trajectory, factor)).tolist()
     found: dict[int, tuple[Load, _Found]] = {}
@@ -373,12 +375,12 @@ def for_refused_joints(
 
 
 def _counting(load: Load, trajectory: Trajectory) -> Load:
-    """Return the load where it is known: at the steps alone, if the trajectory is known there alone."""
+    """Return the load at its samples only, if the trajectory is known only there; otherwise all of it."""
     return load if trajectory.known_between else load.at(load.steps)
 
 
 def _nearest_change(acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load) -> Change:
-    """Return the nearest profile, or the constant if that is nearer."""
+    """Return the nearest profile, or the smallest constant if that is nearer."""
     try:
         constant = smallest_offset(acceptance, joint, _counting(load, trajectory))
     except ImpossibleError:

@@ -1,4 +1,4 @@
-"""Sensitivity of all results to each parameter of the robot file."""
+"""Sensitivity of motor torques, margins and energy to each parameter of the robot file."""
 
 from vsacli.studies.sensitivities.analysis import analysed, sensitivity
 from vsacli.studies.sensitivities.sensitivity_report import Sensitivity

@@ -1,4 +1,7 @@
-"""Sensitivity of a whole run: effects of small changes, their ranking, and the effect of tolerances."""
+"""Sensitivity of a whole run: effects of small parameter changes, their ranking, the effect of tolerances.
+
+`Effects` accumulates the derivatives of `slopes` block by block; `band` and `tolerances` add the uncertainty.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +25,12 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Smallest(NamedTuple):
-    """The smallest margin of each joint, and its derivatives there.
+    """The smallest margin of each joint, and its derivatives.
 
     Attributes:
-        value: (joints,); infinite as long as there is none.
-        time: when, (joints,), s.
-        slopes: (parameters, joints).
+        value: smallest margin so far, (joints,); infinite if there is none.
+        time: time of the smallest margin, (joints,) in s.
+        slopes: derivatives of the smallest margin, (parameters, joints).
     """
 
     value: FloatArray
@@ -36,26 +39,26 @@ class Smallest(NamedTuple):
 
 
 class Effects:
-    """Sums up derivatives over a run; `add` its blocks in order.
+    """Effects of parameter changes, accumulated over a run; `add` its blocks in order.
 
-    Steps at which a value or its derivative does not exist, infeasible and singular ones, do not count.
+    Infeasible and singular samples, at which a value or its derivative does not exist, do not count.
 
     Attributes:
         peak: largest |tau_motor| of each joint, (joints,).
-        largest: largest |change of tau_motor| of each joint by each parameter's step, (parameters, joints).
-        time, motor: when, s, and of which motor, 1 or 2; as above.
-        smallest: the smallest margins.
-        spent: change of the energy that the motors spend by each parameter's step, (parameters, joints), J.
-        failed: how many steps of joints are infeasible or singular.
+        largest: largest |change of tau_motor| of each joint by each parameter's change, (parameters, joints).
+        time, motor: time in s and motor, 1 or 2, of the largest change, (parameters, joints).
+        smallest: smallest margins.
+        spent: change of the positive motor work by each parameter's change, (parameters, joints), J.
+        failed: number of infeasible or singular samples, counted for each joint.
     """
 
     def __init__(self, steps: FloatArray, times: FloatArray, joints: int) -> None:
-        """Begin.
+        """Start with no samples.
 
         Args:
-            steps: by how much each parameter changes.
-            times: of all steps of the run, s.
-            joints: how many there are.
+            steps: change of each parameter.
+            times: times of all samples of the run, s.
+            joints: number of joints.
         """
         shape = (len(steps), joints)
         self._steps = steps
@@ -69,13 +72,13 @@ class Effects:
         self._flags = np.zeros(1, dtype=np.uint32)
 
     def add(self, part: Derivatives) -> None:
-        """Merge the next block."""
+        """Include the next block."""
         block = part.block
         self._flags |= np.bitwise_or.reduce(block.flags, axis=None)
         self.failed += int(np.count_nonzero(has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)))
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
         weights = self._weights[self._done : self._done + len(part.time), None, None]
-        spending = weights * (block.motor_power > 0)  # what motors take back does not count as spent
+        spending = weights * (block.motor_power > 0)  # negative work is not subtracted
         gap = np.where(np.isfinite(part.margin), part.margin, np.inf)
         worst, joints = gap.argmin(axis=0), np.arange(gap.shape[1])
         smaller = gap[worst, joints] < self.smallest.value
@@ -114,7 +117,7 @@ class Effects:
 
 
 def _trapezoidal(times: FloatArray) -> FloatArray:
-    """Weights of the trapezoidal rule over times, (samples,), s."""
+    """Return the weights of the trapezoidal rule over times, (samples,) in s."""
     halves = np.diff(times) / 2
     weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
     return weights
@@ -129,22 +132,23 @@ def sensitivity(
     runs: int = 0,
     seed: int = 0,
 ) -> Sensitivity:
-    """Return the dependence of motor torques, margins and energy on each parameter of a robot.
+    """Return the sensitivity of motor torques, margins and energy to each parameter of a robot.
 
-    Derivatives are exact to rounding: of the recursion by dual numbers, of the deflections by the implicit
-    function theorem. Results of a change are its size times the derivative.
+    Derivatives are exact to rounding: dual numbers differentiate the recursion, the implicit function theorem
+    the deflections. The effect of a change is its size times the derivative.
 
     Args:
-        robot: the robot.
-        trajectory: for this robot.
-        parameters: only numbers whose paths fit one of these, e.g. `joints.*.link.mass`; all if empty.
-        tolerances: how uncertain the numbers are: a share such as `5%`, or the path of a YAML file with a
+        robot: robot that executes the motion.
+        trajectory: trajectory for this robot.
+        parameters: patterns of parameter paths, e.g. `joints.*.link.mass`; all parameters if empty.
+        tolerances: uncertainty of the parameters: a share such as `5%`, or the path of a YAML file with a
             distribution for paths, such as `joints.*.link.mass: {normal: 2 %}`.
-        runs: how many robots are drawn from the tolerances and run as well.
-        seed: of these draws.
+        runs: number of robots to draw from the tolerances and run (Monte Carlo).
+        seed: seed of these draws.
 
     Raises:
-        InputError: the trajectory does not fit the robot, a pattern fits no number, a tolerance is invalid.
+        InputError: the trajectory does not fit the robot, a pattern matches no parameter, or a tolerance is
+            invalid.
     """
     return analysed(SensitivityRun(robot, trajectory, parameters), tolerances, runs=runs, seed=seed)
 
@@ -158,15 +162,15 @@ def analysed(
     progress: Callable[[int], None] = lambda _: None,
     keep: Callable[[Derivatives], None] = lambda _: None,
 ) -> Sensitivity:
-    """Return `sensitivity` of a run that exists already.
+    """Return the sensitivity for an existing run; see `sensitivity`.
 
     Args:
-        run: the run.
-        tolerances: as there.
-        runs: as there.
-        seed: as there.
-        progress: is told how many further steps, and robots, are done.
-        keep: gets the derivatives, block by block.
+        run: run with derivatives.
+        tolerances: see `sensitivity`.
+        runs: see `sensitivity`.
+        seed: see `sensitivity`.
+        progress: function to call with the number of further samples, or drawn robots, that are done.
+        keep: function to call with the derivatives of each block.
 
     Raises:
         InputError: a tolerance is invalid.

@@ -1,12 +1,11 @@
 """Uncertainty of motor torques and margins from tolerances of the parameters of a robot.
 
-To first order, but for dry friction, which jumps where motors reverse. They reverse earlier or later, or not
-at all, while their speed is uncertain.
-
-Friction whose width is 0 jumps where the speed changes its sign, so that it has no derivative there. While
-speed v and torque tau are normally distributed, none is needed: friction is F with the probability
-P(v > 0), and -B with P(v < 0). By Stein's lemma (C. M. Stein, Annals of Statistics 9 (1981)) its covariance
-with tau is cov(tau, v) times the mean of its derivative, F + B times the density of v at 0.
+Uncertainty is propagated to first order, except through sharp dry friction. Friction of width 0 jumps where
+the speed changes its sign and has no derivative there; with uncertain speeds, motors reverse earlier or
+later, or not at all. For normally distributed speed v and torque tau no derivative is needed: friction is F
+with probability P(v > 0), and -B with P(v < 0). By Stein's lemma (C. M. Stein, Annals of Statistics 9
+(1981)), its covariance with tau is cov(tau, v) times the mean of its derivative, F + B times the density of v
+at 0.
 """
 
 from __future__ import annotations
@@ -26,15 +25,16 @@ from vsacli.studies.sensitivities.joint_derivatives import MARGIN, SPEED
 from vsacli.studies.sensitivities.slopes import Derivatives
 
 NEAR = 5.0
-"""Standard deviations of a speed up to which its motor may run the other way. By a normal distribution one in
-three million does, but near the ends of corridors speeds grow without bound, and their tails are longer."""
+"""Speed in standard deviations below which the direction is uncertain. In a normal distribution, one motor in
+three million runs the other way, but near the ends of the attainable stiffness speeds grow without bound and
+their distributions have longer tails."""
 
 
 class Reversals:
-    """Dry friction of the motors of some joints, of which only the sharp ones count.
+    """The sharp dry friction of the motors of some joints.
 
     Args:
-        actuators: of the joints.
+        actuators: actuators of the joints.
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -49,16 +49,16 @@ class Reversals:
 
     @property
     def possible(self) -> bool:
-        """Whether any motor has such friction."""
+        """Whether any motor has sharp dry friction."""
         return bool(np.any(self._forward + self._backward))
 
     def variance(self, speed: FloatArray, deviation: FloatArray, covariance: FloatArray) -> FloatArray:
-        """Return the part of friction in the variance of motor torques; all (samples, joints, 2).
+        """Return the contribution of sharp friction to the variance of motor torques, (samples, joints, 2).
 
         Args:
-            speed: of the motors.
-            deviation: its standard deviation.
-            covariance: of speed and torque, without such friction.
+            speed: speeds of the motors, (samples, joints, 2).
+            deviation: standard deviations of the speeds, (samples, joints, 2).
+            covariance: covariances of speed and torque without sharp friction, (samples, joints, 2).
         """
         from scipy.special import ndtr
 
@@ -72,7 +72,7 @@ class Reversals:
         return np.where(uncertain, spread + 2 * covariance / scale * slope, 0.0)
 
     def uncertain(self, speed: FloatArray, deviation: FloatArray) -> BoolArray:
-        """Return where the direction of a motor is uncertain, (samples, joints); as of `variance`."""
+        """Return a mask of joints with a motor of uncertain direction, (samples, joints); see `variance`."""
         near = (deviation > 0) & (np.abs(speed) < NEAR * deviation)
         found: BoolArray = np.any(near & (self._forward + self._backward > 0), axis=-1)
         return found
@@ -84,15 +84,15 @@ class JointBand(Published):
 
     Attributes:
         torque: largest standard deviation of a motor torque, N m (N).
-        share: that over the largest motor torque.
-        time: when, s.
-        reverses: whether it is uncertain in which direction a motor with dry friction runs at some time.
-        reversals: share of its variance there that motors make which reverse earlier or later than computed;
-            below 0 if that makes the torque more certain.
-        margin: the margin that is the smallest number of its own standard deviations, NaN if there is none.
-        margin_deviation: that deviation.
-        margin_time: when, s.
-        lost: probability that the margin is lost there; that it is lost at all is at least as large.
+        share: ratio of that to the largest motor torque.
+        time: time of the largest standard deviation, s.
+        reverses: whether the direction of a motor with sharp dry friction is uncertain at any time.
+        reversals: share of the variance at `time` due to earlier or later reversals; negative if these make
+            the torque more certain.
+        margin: margin at the sample where it is smallest in units of its standard deviation; NaN without one.
+        margin_deviation: standard deviation of this margin.
+        margin_time: time of this margin, s.
+        lost: probability that this margin is negative; the probability over the whole run is at least this.
     """
 
     torque: float
@@ -122,8 +122,8 @@ class TorqueCurves(NamedTuple):
     """Motor torques over a run.
 
     Attributes:
-        time: (samples,), s.
-        tau_motor, deviation: (samples, joints, 2), N m (N).
+        time: times, (samples,) in s.
+        tau_motor, deviation: torques and their standard deviations, (samples, joints, 2), N m (N).
     """
 
     time: FloatArray
@@ -144,11 +144,11 @@ class _Part(NamedTuple):
 
 
 class Band:
-    """Variances over a run; independent parameters. `add` its blocks in order.
+    """Variances over a run for independent parameters; `add` its blocks in order.
 
     Args:
         deviations: standard deviations of the parameters.
-        actuators: of the joints.
+        actuators: actuators of the joints.
     """
 
     def __init__(self, deviations: FloatArray, actuators: Sequence[Actuator]) -> None:
@@ -157,7 +157,7 @@ class Band:
         self._parts: list[_Part] = []
 
     def add(self, part: Derivatives) -> None:
-        """Merge the next block."""
+        """Include the next block."""
         block = part.block
         of_torque, of_speed, of_both = np.zeros((3, *block.tau_motor.shape))
         of_margin = np.zeros_like(part.margin)
@@ -179,7 +179,7 @@ class Band:
         self._parts.append(_Part(*of_run, by_reversals, uncertain))
 
     def _of_joints(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:
-        """Slopes of each joint by uncertain parameters, with their variances."""
+        """Yield joint, slopes by uncertain parameters, and the variances of these parameters."""
         names = ("tau_motor", SPEED, MARGIN) if self._reversals.possible else ("tau_motor", MARGIN)
         for group in part.groups:
             variances = self._variances[group.places]
@@ -189,7 +189,7 @@ class Band:
                     yield joint, {name: slopes[name][known] for name in names}, variances[known]
 
     def curves(self) -> TorqueCurves:
-        """Torques and their deviations so far."""
+        """Return the torques and their standard deviations so far."""
         run = self._together()
         return TorqueCurves(run.time, run.tau_motor, run.of_torque)
 

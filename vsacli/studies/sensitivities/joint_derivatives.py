@@ -1,9 +1,9 @@
-"""Derivatives of motor motion and torques, by parameters of the actuator and by the torques of its link.
+"""Derivatives of motor motion and torques by parameters of the actuator and by the torques of its link.
 
-Deflections and corridors carry derivatives, by the implicit function theorem from (14). Solvers search by
-values. Their result is differentiated, not their search: from y(phi, p) = (tau_e, sigma) follows
-A dphi = (dtau_e, dsigma) - dy/dp. At an end of a corridor, where sigma is extreme along the curve of
-equal tau_e, or one phi is at the end of its range, sigma changes by the multiplier of tau_e.
+Solvers find deflections and the attainable stiffness from values only. Their result, not their iteration, is
+differentiated by the implicit function theorem: from y(phi, p) = (tau_e, sigma) of (14) follows
+A dphi = (dtau_e, dsigma) - dy/dp. At an end of the attainable range sigma is extreme along the curve of equal
+tau_e, or one phi is at the end of its range; there sigma changes by the Lagrange multiplier of tau_e.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, apart, seeded
 
 AT_END = 1e-9
-"""Relative distance from the end of its range at which phi is there."""
+"""Relative distance below which phi is at the end of its range."""
 
 
 class _Slopes(NamedTuple):
-    """Derivatives of tau_e and sigma: by phi, the rows of A, and by the directions at fixed phi.
+    """Derivatives of tau_e and sigma by phi, which are the rows of A, and by the directions at fixed phi.
 
     Attributes:
-        torque, stiffness: by phi_1 and phi_2, (2, samples).
-        of_torque, of_stiffness: by the directions, (directions, samples).
+        torque, stiffness: derivatives by phi_1 and phi_2, (2, samples).
+        of_torque, of_stiffness: derivatives by the directions, (directions, samples).
     """
 
     torque: FloatArray
@@ -44,19 +44,19 @@ class _Slopes(NamedTuple):
 
 
 class ImplicitSolution:
-    """Solves (14) for an actuator that carries derivatives.
+    """The solution of (14) for an actuator that carries derivatives.
 
     Args:
-        actuator: whose solution it is.
-        carrying: the same with numbers that carry derivatives.
-        directions: how many of them, of which the last ones are free: they serve phi.
+        actuator: actuator with plain parameters.
+        carrying: same actuator with parameters that carry derivatives.
+        directions: number of derivatives; the last ones are unused and serve phi.
     """
 
     def __init__(self, actuator: Actuator, carrying: Actuator, directions: int) -> None:
         self._actuator, self._carrying, self._directions = actuator, carrying, directions
 
     def solve(self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray) -> PairSolution:
-        """See `Actuator.solve`; with derivatives."""
+        """Return the solution with derivatives, also of the attainable range; see `Actuator.solve`."""
         found = self.solve_within(tau_e, stiffness, q)
         if self._actuator.motor_count == 1:
             return found
@@ -70,7 +70,7 @@ class ImplicitSolution:
     def solve_within(
         self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray
     ) -> PairSolution:
-        """Return the same with a corridor that carries none, as where nothing that moves it does."""
+        """Return the solution with derivatives of deflections only, for a constant attainable range."""
         found = self._actuator.solve(value_of(tau_e), value_of(stiffness), q)
         slopes = self._slopes(found.deflections[: self._actuator.motor_count], q)
         torque = self._all(tau_e, q) - slopes.of_torque
@@ -90,7 +90,7 @@ class ImplicitSolution:
         return found._replace(**derived)
 
     def _all(self, demanded: Dual | FloatArray, q: FloatArray) -> FloatArray:
-        """Return its derivatives in all directions, (directions, samples)."""
+        """Return the derivatives of a demand in all directions, (directions, samples)."""
         return tangent_of(demanded, self._directions, q.shape)
 
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
@@ -108,9 +108,9 @@ class ImplicitSolution:
     def _end(
         self, tau_e: Dual | FloatArray, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray
     ) -> Dual | FloatArray:
-        """Return an end of the corridor: critical, or where a side goes slack, or at the end of a range.
+        """Return an end of the attainable range with derivatives, which are zero where it is unbounded.
 
-        Where nothing bounds the corridor it does not change.
+        The end is a critical point, or a side goes slack there, or a phi is at the end of its range.
         """
         bounded = np.isfinite(end) & (end > 0)
         if not bounded.any():
@@ -147,10 +147,10 @@ class ImplicitSolution:
 
 
 OF_MOTORS = ("tau_motor", "theta", "motor_power")
-"""Variables of the motors that are differentiated."""
+"""Differentiated variables of the motors."""
 
 SPEED = "dtheta"
-"""Variable that says where dry friction reverses; differentiated as well."""
+"""Variable whose sign determines dry friction; differentiated as well."""
 
 MARGIN = "margin"
 """Name of the relative margin of the stiffness to the nearer end of its attainable range."""
@@ -160,8 +160,8 @@ class DriveDerivatives(NamedTuple):
     """Derivatives of the variables of a joint, by name: (..., 2, samples) of its motors, else (..., samples).
 
     Attributes:
-        by_numbers: by the numbers of the actuator, (numbers, ...), per SI unit of each.
-        by_torques: by tau_e, tau_e', tau_e'', (3, ...).
+        by_numbers: derivatives by the parameters of the actuator, (parameters, ...), per SI unit of each.
+        by_torques: derivatives by tau_e, tau_e', tau_e'', (3, ...).
     """
 
     by_numbers: dict[str, FloatArray]
@@ -173,13 +173,13 @@ def drive_derivatives(
 ) -> DriveDerivatives:
     """Differentiate (61)-(74) of a joint.
 
-    NaN where the variable does not exist, and where the decoupling matrix is singular.
+    Derivatives are NaN where the variable does not exist, and where the decoupling matrix is singular.
 
     Args:
-        robot: the robot.
-        index: of the joint.
-        command: of the joint.
-        chosen: numbers of its actuator.
+        robot: robot with the joint.
+        index: index of the joint.
+        command: command of the joint.
+        chosen: parameters of its actuator.
     """
     numbers, motors = len(chosen), 2
     directions = numbers + len(TORQUES) + motors
@@ -188,7 +188,7 @@ def drive_derivatives(
         zip(TORQUES, seeds([getattr(command, name) for name in TORQUES], numbers), strict=True)
     )
     implicit = ImplicitSolution(robot.joints[index].actuator, carrying.actuator, directions)
-    object.__setattr__(carrying.actuator, "solve", implicit.solve)  # in place of a search, which has no slope
+    object.__setattr__(carrying.actuator, "solve", implicit.solve)  # a search would lose the derivatives
     with np.errstate(invalid="ignore", divide="ignore"):
         driven = driven_by(carrying, command._replace(**torques), NEAR_SINGULAR_MARGIN)
         gap = margin(driven["stiffness"], driven["stiffness_lower"], driven["stiffness_upper"])

@@ -13,7 +13,7 @@ from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.tolerances import MonteCarlo
 
 SHOWN = 15
-"""Numbers in the table, the most important first."""
+"""Number of parameters in the table, the most important first."""
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class JointEffect(Published):
     """The effect of a change of a parameter on a joint.
 
     Attributes:
-        torque: largest change of a motor torque, N m (N), in size.
-        share: that over the joint's largest motor torque.
-        time: when, s.
-        motor: of which, 1 or 2.
-        margin: change of the smallest margin; NaN if there is none.
-        spent: change of the energy that its motors spend, J.
+        torque: largest |change of a motor torque|, N m (N).
+        share: ratio of that to the joint's largest motor torque.
+        time: time of the largest change, s.
+        motor: motor with the largest change, 1 or 2.
+        margin: change of the smallest margin; NaN without a margin.
+        spent: change of the positive motor work, J.
     """
 
     torque: float
@@ -44,12 +44,12 @@ class ParameterEffect(Published):
     """The effect of a change of a parameter.
 
     Attributes:
-        path: of the number, from the robot.
-        value, unit: of it, in SI units.
-        step: the change, in SI units.
-        words: the change as people say it.
-        joints: effect on each joint that it has an effect on, by name.
-        tolerance: standard deviation of the number, SI units; None if no tolerances were given.
+        path: path of the parameter in the robot.
+        value, unit: value and unit of the parameter, in SI units.
+        step: change of the parameter, in SI units.
+        words: change as text.
+        joints: effects on the affected joints, by name.
+        tolerance: standard deviation of the parameter, SI units; None without tolerances.
     """
 
     path: str
@@ -64,13 +64,13 @@ class ParameterEffect(Published):
 
     @property
     def most(self) -> tuple[str, JointEffect] | None:
-        """The joint whose motor torque changes most by its own measure, and how; None if none does."""
+        """Joint with the largest change relative to its peak torque, and the effect on it; None if none."""
         changed = [each for each in self.joints.items() if each[1].share > 0]
         return max(changed, key=lambda each: each[1].share, default=None)
 
     @property
     def share(self) -> float:
-        """Share of the largest motor torque of that joint."""
+        """Largest change of a motor torque relative to the joint's peak torque."""
         return 0.0 if self.most is None else self.most[1].share
 
 
@@ -79,14 +79,14 @@ class Sensitivity(Published):
     """The dependence of a run on each parameter of its robot.
 
     Attributes:
-        robot, trajectory: names of both.
-        verdict: on the run with the numbers as they are: ok, over_limit, singular or infeasible.
-        failed: how many of its steps are infeasible or singular, each joint on its own, and do not count.
-        parameters: the numbers, the most important first.
-        band: effect of tolerances on each joint, by name; empty if none were given.
-        curves: motor torques and their deviations; None without tolerances, and not in JSON.
-        monte_carlo: runs of robots drawn from the tolerances; None if none were.
-        units: of the torques of each joint, by name.
+        robot, trajectory: names of robot and trajectory.
+        verdict: verdict on the unchanged run: ok, over_limit, singular or infeasible.
+        failed: number of its infeasible or singular samples, counted for each joint, which are ignored.
+        parameters: effects of the parameters, the most important first.
+        band: effect of tolerances on each joint, by name; empty without tolerances.
+        curves: motor torques and their standard deviations; None without tolerances; not in JSON.
+        monte_carlo: results of robots drawn from the tolerances; None without draws.
+        units: unit of the torques of each joint, by name.
     """
 
     robot: str
@@ -115,7 +115,7 @@ class Sensitivity(Published):
 
     @property
     def top(self) -> tuple[ParameterEffect, ...]:
-        """The numbers that are shown."""
+        """Effects of the parameters in the table."""
         return tuple(each for each in self.parameters[:SHOWN] if each.most is not None)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
@@ -192,5 +192,5 @@ def _probability(share: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """Return a percentage with two digits, or as many as the whole number has."""
+    """Return a percentage with two digits, or as an integer from 100 % on."""
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"

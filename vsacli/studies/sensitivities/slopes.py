@@ -1,4 +1,8 @@
-"""Derivatives of a run by parameters of the robot: of its joints, and of the torques of its links."""
+"""Derivatives of a run by parameters of the robot: of its joints, and of the torques of its links.
+
+`torque_slopes` differentiates the recursion by link parameters, `drive_derivatives` each joint by actuator
+parameters and by the link torques; `Chained` combines both by the chain rule.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +31,12 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class TorqueSlopes(NamedTuple):
-    """Derivatives of tau_e, tau_e', tau_e'' by some numbers.
+    """Derivatives of tau_e, tau_e', tau_e'' by some parameters.
 
     Attributes:
-        places: of the numbers, among those that were chosen.
-        of_joints: of each joint, (numbers, 3, samples), in N m (N) per s^k and per SI unit of each number;
-            None for a joint without effect of them.
+        places: indices of the parameters among the chosen ones.
+        of_joints: derivatives for each joint, (parameters, 3, samples), in N m (N) per s^k and per SI unit of
+            each parameter; None for a joint that they do not affect.
     """
 
     places: Sequence[int]
@@ -40,16 +44,15 @@ class TorqueSlopes(NamedTuple):
 
 
 def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> Iterator[TorqueSlopes]:
-    """Differentiate (58)-(60) by numbers of a robot.
-
-    Joint by joint, since links before it move alike whatever its numbers are, and since the derivatives of
-    a whole chain by all of them would not stay in the caches: at once they took a tenth longer.
+    """Differentiate (58)-(60) by parameters of a robot; yield the derivatives joint by joint.
 
     Args:
-        robot: the robot.
-        motion: samples, and the wrench if there is one.
-        chosen: the numbers; no torque of the links depends on those of actuators.
+        robot: robot that executes the motion.
+        motion: samples of the motion, and the wrench if there is one.
+        chosen: parameters; link torques do not depend on those of actuators.
     """
+    # by joint, since the motion of previous links does not depend on its parameters, and derivatives of the
+    # whole chain by all parameters would not fit into the caches: at once they took a tenth longer
     frame, given = None if motion.wrench is None else motion.wrench.frame, motion.variables()
     arguments = LinkTorques(robot, frame).arguments
     rows = arguments.pack({name: by_joint(given[name]) for name in arguments.shapes})
@@ -65,7 +68,7 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
 
 
 def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
-    """Places of the numbers of each joint, and of the robot as a whole."""
+    """Return indices of the parameters of each joint, and (key None) of the robot as a whole."""
     places: dict[int | None, list[int]] = {}
     for place, parameter in enumerate(chosen):
         places.setdefault(parameter.joint, []).append(place)
@@ -93,7 +96,7 @@ def _derivatives(torques: Sequence[Scalar], places: Sequence[int], samples: int)
 
 
 class Slopes(ABC):
-    """Derivatives of the variables of a joint by some numbers."""
+    """Derivatives of the variables of a joint by some parameters."""
 
     @abstractmethod
     def __getitem__(self, name: str) -> FloatArray:
@@ -101,14 +104,14 @@ class Slopes(ABC):
 
     @abstractmethod
     def total(self, name: str, weights: FloatArray) -> FloatArray:
-        """Weighted sum of those of its motors that exist, (numbers,); weights are (2, samples)."""
+        """Return the weighted sum of finite slopes of motors, (parameters,); weights are (2, samples)."""
 
 
 class Known(Slopes):
-    """Derivatives that were computed.
+    """Derivatives given as arrays.
 
     Args:
-        of_variables: by name.
+        of_variables: derivatives by name of the variable.
     """
 
     def __init__(self, of_variables: Mapping[str, FloatArray]) -> None:
@@ -123,11 +126,11 @@ class Known(Slopes):
 
 
 class Chained(Slopes):
-    """Derivatives by numbers that tau_e depends on, by the chain rule when they are asked for.
+    """Derivatives by parameters that act through tau_e, evaluated by the chain rule on access.
 
     Args:
-        of_torques: of tau_e, tau_e', tau_e'' by the numbers, (numbers, 3, samples).
-        by_torques: of each variable by the three, (3, [2,] samples).
+        of_torques: derivatives of tau_e, tau_e', tau_e'' by the parameters, (parameters, 3, samples).
+        by_torques: derivatives of each variable by tau_e, tau_e', tau_e'', (3, [2,] samples).
     """
 
     def __init__(self, of_torques: FloatArray, by_torques: Mapping[str, FloatArray]) -> None:
@@ -149,11 +152,11 @@ class Chained(Slopes):
 
 
 class Group(NamedTuple):
-    """Derivatives by some numbers.
+    """Derivatives by some parameters.
 
     Attributes:
-        places: of the numbers, among all.
-        of_joints: of each joint; None if nothing of it depends on these numbers.
+        places: indices of the parameters among all.
+        of_joints: derivatives for each joint; None for a joint that they do not affect.
     """
 
     places: Sequence[int]
@@ -164,12 +167,12 @@ class Group(NamedTuple):
 class Derivatives:
     """The derivatives of a block of samples by the parameters of a robot, per SI unit of each.
 
-    NaN where the variable does not exist, and where the decoupling matrix is singular.
+    They are NaN where the variable does not exist, and where the decoupling matrix is singular.
 
     Attributes:
-        block: the steps, with the variables themselves.
-        numbers: how many there are.
-        groups: the derivatives; those that are zero for a whole joint are left out.
+        block: samples with the variables themselves.
+        numbers: number of parameters.
+        groups: derivatives by groups of parameters; those that are zero for a whole joint are left out.
     """
 
     block: Block
@@ -178,17 +181,17 @@ class Derivatives:
 
     @property
     def time(self) -> FloatArray:
-        """Times of the steps, (samples,), s."""
+        """Times of the samples, (samples,) in s."""
         time: FloatArray = self.block.time
         return time
 
     @property
     def margin(self) -> FloatArray:
-        """Derivative of the relative margin of the stiffness, (samples, joints)."""
+        """Relative margin of the stiffness, (samples, joints)."""
         return margin(self.block.stiffness, self.block.stiffness_lower, self.block.stiffness_upper)
 
     def over_time(self, name: str) -> FloatArray:
-        """Derivatives of a variable by all numbers, (samples, numbers, joints[, 2]); NaN wherever it is."""
+        """Return derivatives of a variable by all parameters, (samples, parameters, joints[, 2])."""
         variable = self.margin if name == MARGIN else self.block.arrays()[name]
         nothing = np.where(np.isnan(variable), np.nan, 0.0)
         slopes = np.repeat(nothing[:, None], self.numbers, axis=1)
@@ -204,29 +207,29 @@ def _existing(slopes: FloatArray) -> FloatArray:
 
 
 BLOCK_SAMPLES = 4096
-"""Steps at a time. 7R, 4000 steps: with 1024 it took half as long again; each block costs the interpreter."""
+"""Samples per block. With 1024, a 7R with 4000 samples took 1.5 times as long: each block has an overhead."""
 
 BLOCK_SLOPES = 10_000_000
-"""Bound on numbers times joints times steps at a time, each of 24 bytes at most: 20 joints take 0.6 GB."""
+"""Bound on parameters times joints times samples in a block, at most 24 bytes each: 0.6 GB for 20 joints."""
 
 ACTUATOR = "actuator"
-"""The part of a joint whose numbers leave the torque that its links demand as it is."""
+"""Part of a joint whose parameters do not change the link torques."""
 
 
 class SensitivityRun:
-    """Iterates over a trajectory.
+    """An iterable of the derivatives of a run, block by block.
 
     Args:
-        robot: the robot.
-        trajectory: for this robot.
-        patterns: only the numbers whose paths fit one of these; all that matter if empty.
+        robot: robot that executes the trajectory.
+        trajectory: trajectory for this robot.
+        patterns: patterns of parameter paths; all parameters if empty.
 
     Attributes:
-        parameters: the numbers, in the order of the derivatives.
-        slopes: names of the variables that are differentiated, each with whether it is one of motors.
+        parameters: parameters in the order of the derivatives.
+        slopes: names of the differentiated variables; the value says whether it is a variable of motors.
 
     Raises:
-        InputError: the trajectory does not fit, a pattern fits no number, or a transmission is damped.
+        InputError: the trajectory does not fit, a pattern matches no parameter, or a transmission is damped.
     """
 
     slopes: ClassVar[Mapping[str, bool]] = {**dict.fromkeys(OF_MOTORS, True), MARGIN: False}

@@ -1,4 +1,4 @@
-"""Tolerances of the parameters of a robot, and runs of robots drawn from them."""
+"""Tolerances of the parameters of a robot, and Monte Carlo runs of robots drawn from them."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from vsacli.robot.parameters import Parameter
 from vsacli.trajectory.trajectory import Trajectory
 
 RELATIVE = 0.01
-"""Change of most numbers."""
+"""Relative change of most parameters."""
 
 SMALL_CHANGES: Mapping[Quantity, tuple[float, str]] = {
     units.LENGTH: (1e-3, "1 mm"),
     units.ANGLE: (math.radians(1), "1 deg"),
 }
-"""Change of numbers that are zero as often as not, so that a share of them says nothing, and its words."""
+"""Absolute change, and its text, of quantities that are often zero: a relative change is meaningless."""
 
 
 def step_of(parameter: Parameter) -> float:
-    """Return the change, in SI units; zero for a number that is zero and is compared by a share of it."""
+    """Return the change of a parameter, in SI units; zero for a zero with a relative change."""
     change, _ = SMALL_CHANGES.get(parameter.quantity, (RELATIVE * abs(parameter.value), ""))
     return change
 
 
 def words_of(parameter: Parameter) -> str:
-    """Return the change as people say it."""
+    """Return the change of a parameter as text."""
     _, words = SMALL_CHANGES.get(parameter.quantity, (0.0, f"{100 * RELATIVE:g} %"))
     return words
 
@@ -60,8 +60,8 @@ class Tolerance(NamedTuple):
     """The distribution of a parameter about its value.
 
     Attributes:
-        shape: `normal`, or `uniform`.
-        size: standard deviation of the one, half width of the other; SI units.
+        shape: `normal` or `uniform`.
+        size: standard deviation of a normal, half width of a uniform distribution, SI units.
     """
 
     shape: str
@@ -73,13 +73,13 @@ class Tolerance(NamedTuple):
         return self.size if self.shape == "normal" else self.size / math.sqrt(3)
 
     def drawn(self, random: np.random.Generator) -> float:
-        """Return a deviation from the value."""
+        """Return a random deviation from the value."""
         if self.shape == "normal":
             return float(random.normal(0.0, self.size))
         return float(random.uniform(-self.size, self.size))
 
     def below(self, share: float) -> float:
-        """Return the deviation that so large a share of all is below: the quantile."""
+        """Return the quantile: the deviation below which a share of all deviations lies."""
         if self.shape == "normal":
             from scipy.special import ndtri
 
@@ -94,13 +94,13 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     """Return the tolerance of each parameter; None for exact ones.
 
     Args:
-        text: a share such as `5 %`, or the path of a YAML file of paths into the robot, each with a
-            distribution; `*` in a path stands for anything, and of several that fit the last one counts.
-        chosen: the parameters. A share is of numbers that can be compared by one: not of angles and of
-            lengths of links, which are zero as often as not.
+        text: share such as `5 %`, or path of a YAML file that maps parameter paths to distributions; `*` in a
+            path matches anything, and the last matching entry counts.
+        chosen: parameters. A share does not apply to angles and lengths of links, which are often zero; these
+            remain exact.
 
     Raises:
-        InputError: an entry is no distribution, or fits no parameter; with file and line.
+        InputError: an entry is not a distribution, or matches no parameter; with file and line.
     """
     share = PER_CENT.fullmatch(text.strip())
     if share is None:
@@ -118,7 +118,7 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
 
 
 def deviations(tolerances: Sequence[Tolerance | None]) -> FloatArray:
-    """Standard deviation of each parameter, zero for exact ones."""
+    """Return the standard deviation of each parameter, zero for exact ones."""
     return np.array([0.0 if each is None else each.deviation for each in tolerances])
 
 
@@ -146,15 +146,15 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
 
 
 def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
-    """Return the tolerance that a file says of a number.
+    """Return the tolerance that an entry of a file gives to a value.
 
     Args:
-        node: such as `{normal: 5 %}`.
-        value: the number.
-        unit: of it.
+        node: content of the entry, such as `{normal: 5 %}`.
+        value: value of the parameter.
+        unit: unit of the value.
 
     Raises:
-        InputError: it is invalid.
+        InputError: the entry is invalid.
     """
     if not isinstance(node, tree.Mapping) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")
@@ -181,14 +181,14 @@ def _number(text: str, whole: str, unit: str = "") -> float:
 
 @dataclass(frozen=True)
 class MonteCarlo(Published):
-    """The runs of the drawn robots.
+    """The results of Monte Carlo runs.
 
     Attributes:
-        drawn: how many.
-        refused: how many of those are no robots: a mass below zero, say.
-        lost: share of the others that have an infeasible or singular step, by joint.
-        torque: largest standard deviation of a motor torque among those that have none, by joint, N m (N);
-            NaN where fewer than two have none.
+        drawn: number of drawn robots.
+        refused: number of invalid ones, for example with a negative mass.
+        lost: share of the valid robots with an infeasible or singular sample, by joint.
+        torque: largest standard deviation of a motor torque over the robots without such a sample, by joint,
+            N m (N); NaN if fewer than two are left.
     """
 
     drawn: int
@@ -212,16 +212,16 @@ def monte_carlo(
     """Run perturbed robots over a trajectory.
 
     Args:
-        robot: the robot.
-        trajectory: for this robot.
-        chosen: its numbers.
-        tolerances: of those, None for exact ones.
-        runs: how many robots are drawn.
-        seed: of the draws.
-        progress: is told how many further robots are done.
+        robot: nominal robot.
+        trajectory: trajectory for this robot.
+        chosen: parameters of the robot.
+        tolerances: tolerance of each parameter, None for exact ones.
+        runs: number of robots to draw.
+        seed: seed of the draws.
+        progress: function to call with the number of further robots that are done.
 
     Raises:
-        InputError: the tolerances are so large that all that were drawn are no robots.
+        InputError: the tolerances are so large that every drawn robot is invalid.
     """
     trajectory, random = fitted(robot, trajectory), np.random.default_rng(seed)
     sums = _Sums(trajectory.samples, len(robot.joints))
@@ -250,7 +250,7 @@ def monte_carlo(
 
 
 def _run(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
-    """tau_motor, (samples, joints, 2), and which joints have a step that cannot be done, (joints,)."""
+    """Return tau_motor, (samples, joints, 2), and a mask of joints with a failed sample, (joints,)."""
     size = usual_block(len(robot.joints))
     blocks = [
         compute_block(robot, trajectory.block(start, start + size))
@@ -269,7 +269,7 @@ class _Sums:
         self._mean, self._squares = np.zeros((2, samples, joints, 2))
 
     def add(self, torque: FloatArray, lost: BoolArray) -> None:
-        """Merge a robot; joints that have lost a step do not count."""
+        """Include a robot; its joints with a failed sample do not count."""
         self._runs += 1
         self._lost += lost
         self._count += ~lost
@@ -280,12 +280,12 @@ class _Sums:
 
     @property
     def lost(self) -> FloatArray:
-        """Share of the robots, (joints,)."""
+        """Share of the robots with a failed sample, (joints,)."""
         return self._lost / max(self._runs, 1)
 
     @property
     def deviation(self) -> FloatArray:
-        """Largest over steps and motors, (joints,); NaN where fewer than two robots have torques."""
+        """Largest standard deviation over samples and motors, (joints,); NaN for fewer than two robots."""
         variance = self._squares / np.maximum(self._count - 1, 1)[:, None]
         largest = np.sqrt(variance.max(axis=(0, 2), initial=0.0))
         return np.asarray(np.where(self._count > 1, largest, np.nan))

@@ -1,4 +1,4 @@
-"""Sizing of drives and springs: the demands of motions, and the motors and gears that will do."""
+"""Sizing of drives and springs: the demands of motions, and the motors and gears that meet them."""
 
 from vsacli.studies.sizing.catalogue import CatalogueMotor
 from vsacli.studies.sizing.choices import CRITERIA

@@ -1,4 +1,4 @@
-"""A catalog of motors: a CSV file with data sheet values of each, on the motor's own shaft."""
+"""A catalog of motors: a CSV file with data sheet values, on the motor's own shaft."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vsacli.studies.sizing.shaft import Shaft
 _TORQUE, _VELOCITY, _DAMPING = (
     units.constant(quantity.revolute) for quantity in (units.TORQUE, units.VELOCITY, units.DAMPING)
 )
-"""A shaft turns, whatever the joint does."""
+"""Units of a rotating shaft, also at prismatic joints."""
 _SHARE = Check(lambda value: 0 < value <= 1, "above 0 and at most 1")
 _BEARING = ("continuous_torque", "max_torque", "continuous_current", "max_current")
 _NEEDED = {
@@ -33,12 +33,12 @@ _NEEDED = {
     "max_current": ("torque_constant",),
     "max_voltage": ("torque_constant", "resistance"),
 }
-"""Columns required by others."""
+"""Columns that a column requires."""
 
 
 @dataclass(frozen=True)
 class CatalogueMotor:
-    """A row of a catalogue: a motor, which may have a gear already."""
+    """A motor of a catalog, which may already have a gear."""
 
     name: str = value(Name(), "name of the motor, each once")
     inertia: float = number(units.INERTIA, "inertia of the rotor", check=POSITIVE)
@@ -100,14 +100,14 @@ class CatalogueMotor:
             yield FieldProblem((), f"nothing bounds its torque: give one of {', '.join(_BEARING)}")
 
     def _stuck(self) -> Iterator[FieldProblem]:
-        """Friction that the motor cannot overcome, by its torque or by its voltage."""
+        """Yield a problem if the motor cannot overcome its friction, by torque or voltage."""
         if self.coulomb and not list(self._missing()) and self.coulomb >= self.shaft.stall_torque:
             reason = f"must be below the {self.shaft.stall_torque:.4g} N m that the motor can give at all"
             yield FieldProblem(("coulomb",), reason)
 
     @property
     def shaft(self) -> Shaft:
-        """The motor as it is looked at here."""
+        """Constants of the motor."""
         constant = math.nan if self.torque_constant is None else self.torque_constant
         return Shaft(
             inertia=self.inertia,
@@ -126,10 +126,10 @@ class CatalogueMotor:
 
 
 def read_catalogue(path: str | os.PathLike[str]) -> RecordTable[CatalogueMotor]:
-    """Read the motors of a catalogue.
+    """Read the motors of a catalog.
 
     Raises:
-        InputError: with file and line of everything that is wrong.
+        InputError: the file is wrong; with file and line of every problem.
     """
     return read_records(path, CatalogueMotor, "name")
 
@@ -139,6 +139,6 @@ def _or_infinite(bound: float | None) -> float:
 
 
 def _smallest(torque: float | None, current: float | None, constant: float) -> float:
-    """Return the torque that is within both bounds."""
+    """Return the smaller of a torque limit and the torque at a current limit."""
     by_current = math.inf if current is None else current * constant
     return min(_or_infinite(torque), by_current)

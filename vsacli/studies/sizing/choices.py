@@ -1,7 +1,7 @@
-"""Motors of a catalogue with gears in the place of one of a robot, or of two whose rotors are coupled.
+"""Choice of motors and gears from a catalog for one motor of a robot, or for two with coupled rotors.
 
-A coupled inertia stays as it is on the joint's side, whatever the motors. Rotors that are too light for it
-would have an inertia matrix that is not positive definite, so motors of such a joint are chosen together.
+A coupled inertia on the joint side does not depend on the motors. With rotors too light for it, the inertia
+matrix would not be positive definite, so the two motors of such a joint are chosen together.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ CRITERIA = {
     "utilisation": "smallest share of any limit",
     "mass": "least mass",
 }
-"""Words for the quantity that the best choice minimizes."""
+"""Criteria, and the text for each in reports."""
 
 DIGITS = 4
-"""Digits of a free gear ratio."""
+"""Significant digits of a free gear ratio."""
 
 
 @dataclass(frozen=True)
 class Choice(Published):
-    """A motor of the catalogue in the place of one of the robot.
+    """A motor of the catalog in place of one of the robot.
 
     Attributes:
-        motor: its name.
-        ratio: of its gear: the best by the criterion, or that with which it comes nearest to its limits.
-        does: whether all limits are kept with it.
-        low, high: ratios between which they are; NaN if with none.
-        ratios: of those that are listed, the ones with which it does.
+        motor: name of the motor.
+        ratio: gear ratio: the best by the criterion, or if none suffices, that with the smallest violation.
+        does: whether all limits are kept at this ratio.
+        low, high: range of ratios at which all limits are kept; NaN if it is empty.
+        ratios: listed ratios at which all limits are kept.
         shares: used share of each limit, by name.
-        rms_torque: on its shaft, N m.
-        copper_loss: mean over time, W; NaN if constants are not known.
-        mass: of the motor, kg; None if it is not known.
+        rms_torque: rms torque on the shaft, N m.
+        copper_loss: mean copper loss, W; NaN if constants are unknown.
+        mass: mass of the motor, kg; None if unknown.
     """
 
     motor: str
@@ -71,22 +71,22 @@ class Choice(Published):
 
     @property
     def largest(self) -> tuple[str, float]:
-        """The limit with the largest used share, and the share."""
+        """Limit with the largest used share, and this share."""
         name = max(self.shares, key=lambda each: self.shares[each])
         return name, self.shares[name]
 
 
 def usual_criterion(motors: Sequence[CatalogueMotor]) -> str:
-    """Return the copper loss, if it is known of all motors."""
+    """Return the default criterion: "copper" if all resistances are known, otherwise "utilisation"."""
     known = all(motor.resistance is not None for motor in motors)
     return "copper" if known else "utilisation"
 
 
 def check_criterion(criterion: str, motors: Sequence[CatalogueMotor]) -> None:
-    """Refuse a criterion for which motors lack a number.
+    """Check that all motors have the value that a criterion needs.
 
     Raises:
-        InputError: naming the first of them.
+        InputError: some motors lack it; the error names the first.
     """
     needed = {"copper": "resistance", "mass": "mass"}.get(criterion)
     lacking = [motor.name for motor in motors if needed and getattr(motor, needed) is None]
@@ -99,12 +99,12 @@ def check_criterion(criterion: str, motors: Sequence[CatalogueMotor]) -> None:
 def choices(
     demand: MotorDemand, motors: Sequence[CatalogueMotor], gears: Gears, criterion: str
 ) -> tuple[Choice, ...]:
-    """Return every motor of a catalogue with its best gear: those that do first, and the best of these first.
+    """Return every motor of a catalog with its best gear, sufficient ones first, sorted by the criterion.
 
     Args:
-        demand: on the motor.
-        motors: those of the catalogue.
-        gears: of those that have none of their own.
+        demand: demand on the motor.
+        motors: motors of the catalog.
+        gears: gears for motors without their own.
         criterion: one of `CRITERIA`.
     """
     shafts = Shaft.of(motor.shaft for motor in motors)
@@ -121,14 +121,14 @@ def choices(
 
 
 class _Trials(NamedTuple):
-    """Motors with gears that were tried; (trials, motors).
+    """Combinations of motors and gear ratios, (trials, motors).
 
     Attributes:
-        ratio: of the gear.
-        used: of each limit, (trials, motors, limits).
-        largest: the largest of these shares.
+        ratio: gear ratio.
+        used: used share of each limit, (trials, motors, limits).
+        largest: largest of these shares.
         does: whether all limits are kept.
-        rms: of the torque on the shaft.
+        rms: rms torque on the shaft, N m.
     """
 
     ratio: FloatArray
@@ -146,7 +146,7 @@ def _trials(
     gears: Gears,
     criterion: str,
 ) -> _Trials:
-    """Return the listed ratios, or the best one of a range; gears that motors have stay."""
+    """Return trials with the listed ratios, or the best of a range; motors keep their own gears."""
     fixed = np.array([math.nan if motor.gear_ratio is None else motor.gear_ratio for motor in motors])
     listed = [np.full_like(fixed, ratio) for ratio in gears.listed]
     free = listed or [_best_of_range(demand, shafts, possible, gears, criterion)]
@@ -160,7 +160,7 @@ def _trials(
 def _best_of_range(
     demand: MotorDemand, shafts: Shaft, possible: Ratios, gears: Gears, criterion: str
 ) -> FloatArray:
-    """Return the best ratio of each motor, (motors,), or the one nearest to its limits if none will do."""
+    """Return the best ratio of each motor, (motors,); if none suffices, the one with the least violation."""
     ends = Ratios(np.full_like(possible.low, gears.low), np.full_like(possible.high, gears.high))
     within = possible.within(ends)
     wanted = least_rms(demand, shafts)
@@ -172,7 +172,7 @@ def _best_of_range(
 
 
 def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:
-    """Ratios with a few digits, if they stay within a range so."""
+    """Return ratios rounded to `DIGITS`, unless rounding leaves the range."""
     short = np.array([float(f"{ratio:.{DIGITS}g}") for ratio in ratios])
     return np.where((short >= within.low) & (short <= within.high), short, ratios)
 
@@ -180,7 +180,7 @@ def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:
 def _choice(
     motor: CatalogueMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
 ) -> Choice:
-    """Return a motor as it was best, in a trial."""
+    """Return the choice of a motor from its best trial."""
     _, index = place
     ends = (float(possible.low[index]), float(possible.high[index]))
     low, high = (math.nan, math.nan) if possible.empty[index] else ends
@@ -206,7 +206,7 @@ def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
 
 
 def cost_of(choice: Choice, criterion: str) -> float:
-    """Return the minimized quantity; for a choice that will not do, its largest share of a limit."""
+    """Return the value of the criterion; for an insufficient choice, its largest share of a limit."""
     _, largest = choice.largest
     wanted = {"copper": choice.copper_loss, "utilisation": largest, "mass": choice.mass or math.inf}
     return wanted[criterion] if choice.does else largest
@@ -219,17 +219,17 @@ def coupled_choices(
     motors: Mapping[str, CatalogueMotor],
     criterion: str,
 ) -> tuple[tuple[Choice, ...], tuple[Choice, ...]]:
-    """Return the choices for both motors of a joint that can be coupled with the best of the other's.
+    """Return the choices for each motor of a joint that can be coupled with the best choice for the other.
 
-    Of the pairs with which the robot can be built, the best has most motors that do, then least of the
-    criterion: the sum of both, or the larger share of a limit.
+    The best of the possible pairs has the most sufficient motors, then the smallest criterion: the sum over
+    both motors, or the larger share of a limit.
 
     Args:
-        joint: with a coupled inertia.
+        joint: joint with a coupled inertia.
         first: choices for motor 1, the best first.
-        second: choices for motor 2, as above.
-        motors: of the catalogue by name.
-        criterion: by which they are sorted.
+        second: choices for motor 2, the best first.
+        motors: motors of the catalog, by name.
+        criterion: criterion by which they are sorted.
 
     Raises:
         InputError: no two rotors are heavy enough.
@@ -250,7 +250,7 @@ def coupled_choices(
 
 
 def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) -> BoolArray:
-    """Return the pairs of rotors, by joint-side inertia, that can be coupled as they are."""
+    """Return a mask of the pairs of joint-side rotor inertias that allow the coupled inertia."""
     coupled = joint.actuator.coupled_rotors
     largest = np.array([[largest_coupling(one, other) for other in second] for one in first])
     possible: BoolArray = abs(coupled) < largest

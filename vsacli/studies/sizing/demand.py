@@ -1,4 +1,4 @@
-"""Requirements of trajectories on each motor and each spring of a robot, whatever motors it has."""
+"""Demands of trajectories on each motor and each spring of a robot, independent of its motors."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Peak(Published):
-    """The largest size of something, and when it is; NaN if it never exists.
+    """The largest absolute value of a quantity, and its time; NaN if the quantity never exists.
 
     Attributes:
-        value: the size.
-        trajectory: its name.
-        time: in it, s.
+        value: largest absolute value.
+        trajectory: name of the trajectory.
+        time: time in the trajectory, s.
     """
 
     value: float = math.nan
@@ -38,13 +38,13 @@ class Peak(Published):
 
     @classmethod
     def of(cls, values: FloatArray, time: FloatArray, trajectory: str) -> Self:
-        """Return the peak of the existing values, each (samples,)."""
+        """Return the peak of the finite values, (samples,)."""
         sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
         step = int(sizes.argmax())
         return cls(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else cls()
 
     def or_larger(self, other: Self) -> Self:
-        """Return the larger one of both."""
+        """Return the larger of two peaks."""
         return self if self.value >= other.value or math.isnan(other.value) else other
 
 
@@ -53,15 +53,15 @@ class MotorDemand:
     """The demand on a motor on the joint side of its gear, at all feasible samples; (samples,).
 
     Attributes:
-        joint, joint_type: whose motor it is.
-        number: 1 or 2.
-        trajectories: their names.
-        run: index of the trajectory that the step belongs to.
-        time: of the step in it, s.
-        weight: time that the step stands for in means over time, s.
-        velocity, acceleration: of the motor.
-        load: torque of springs, damper and coupled rotor against it.
-        torque: of the motor that the robot file has.
+        joint, joint_type: name and type of the joint.
+        number: number of the motor, 1 or 2.
+        trajectories: names of the trajectories.
+        run: index of each sample's trajectory.
+        time: time of each sample in its trajectory, s.
+        weight: weight of each sample in means over time, s.
+        velocity, acceleration: velocity and acceleration of the motor.
+        load: torque of springs, damper and coupled rotor against the motor.
+        torque: torque of the motor in the robot file.
     """
 
     joint: str
@@ -82,28 +82,28 @@ class MotorDemand:
         return f"{self.joint} {self.number}"
 
     def peak(self, values: FloatArray) -> Peak:
-        """Return the largest size of values, (samples,)."""
+        """Return the largest absolute value of values, (samples,)."""
         step = int(np.abs(values).argmax())
         return Peak(float(abs(values[step])), self.trajectories[int(self.run[step])], float(self.time[step]))
 
     def rms(self, values: FloatArray) -> float:
-        """Root mean square over time of values, (samples,)."""
+        """Return the rms over time of values, (samples,)."""
         return float(np.sqrt(self.mean(values * values)))
 
     @cached_property
     def signals(self) -> FloatArray:
-        """The seven that the torque on a shaft is a sum of, (7, samples)."""
+        """Seven signals of which the torque on a shaft is a linear combination, (7, samples)."""
         return shaft_signals(self.velocity, self.acceleration, self.load)
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Over time, of the last axis; over the steps if no two that follow each other can be done."""
+        """Return the mean over time along the last axis; over samples if no two consecutive ones exist."""
         weight = self.weight if self.weight.any() else np.ones_like(self.weight)
         mean: FloatArray = values @ weight / weight.sum()
         return mean
 
     @cached_property
     def moments(self) -> FloatArray:
-        """Means over time of the products of the signals, (7, 7), with which squares of torques average."""
+        """Means over time of products of the signals, (7, 7), from which mean squares of torques follow."""
         return self.mean(self.signals[:, None] * self.signals)
 
     @cached_property
@@ -117,12 +117,12 @@ class SpringDemand(Published):
     """The demand on a spring.
 
     Attributes:
-        joint, joint_type: whose it is.
-        spring: which of its springs.
-        energy: largest energy in it, J.
+        joint, joint_type: name and type of the joint.
+        spring: name of the spring.
+        energy: largest energy, J.
         torque: largest |torque|, N m (N).
         deflection: largest |deflection|, rad (m).
-        max_deflection: admitted by the robot file; infinite without one.
+        max_deflection: limit of the deflection in the robot file; infinite without one.
     """
 
     joint: str
@@ -137,19 +137,19 @@ class SpringDemand(Published):
 
     @property
     def share(self) -> float:
-        """Share of the admissible deflection; NaN without one."""
+        """Used share of the admissible deflection; NaN without a limit."""
         return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
 
 
 class SpringPeaks:
-    """The largest loads of springs; `add` blocks in order."""
+    """The largest loads of springs over trajectories; `add` their blocks."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._found: dict[tuple[str, str], SpringDemand] = {}
 
     def add(self, block: Block, trajectory: str) -> None:
-        """Merge a block of a trajectory."""
+        """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
             for load in joint.actuator.spring_loads(block.of_joint(index)):
                 energy, torque, deflection = (
@@ -168,7 +168,7 @@ class SpringPeaks:
 
 
 def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
-    """Return the larger of the peaks of both."""
+    """Return the demand with the larger of each peak."""
     return replace(
         one,
         energy=one.energy.or_larger(other.energy),
@@ -178,21 +178,21 @@ def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
 
 
 UNDONE = Flag.INFEASIBLE | Flag.SINGULAR | Flag.INTERNAL_INSTABILITY | Flag.NOT_FINITE
-"""Steps that have no motor torque, or none that a machine could follow."""
+"""Flags of samples without a motor torque, or with one that no machine could follow."""
 
 MOVED = ("time", "velocity", "acceleration", "load", "torque")
 
 
 @dataclass(frozen=True)
 class Outcome(Published):
-    """A run that was sized for.
+    """A run along one of the trajectories.
 
     Attributes:
-        trajectory: its name.
-        duration: s.
-        verdict: on the run with the motors of the robot file.
-        left_out: steps that some joint cannot do; what they would ask is not known.
-        samples: steps in all.
+        trajectory: name of the trajectory.
+        duration: duration, s.
+        verdict: verdict on the run with the motors of the robot file.
+        left_out: number of samples with `UNDONE` flags, whose demand is unknown.
+        samples: total number of samples.
     """
 
     trajectory: str
@@ -216,9 +216,9 @@ def demanded(
     """Run all trajectories, and keep the values that do not depend on the motors.
 
     Args:
-        robot: the robot.
-        trajectories: executed one after the other.
-        progress: is told how many further steps are done.
+        robot: robot to size.
+        trajectories: trajectories, executed one after the other.
+        progress: function to call with the number of further samples that are done.
 
     Raises:
         InputError: a trajectory does not fit the robot.
@@ -244,14 +244,14 @@ def demanded(
 
 
 def _distinguished(names: Sequence[str]) -> Iterator[str]:
-    """Names with a number behind those that were there already."""
+    """Yield the names, with a number appended to repeated ones."""
     for index, name in enumerate(names):
         earlier = names[:index].count(name)
         yield f"{name} ({earlier + 1})" if earlier else name
 
 
 def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
-    """Motion of the motors and their loads at the steps of a block, (samples, joints, 2)."""
+    """Return motion, loads and torques of the motors in a block, (samples, joints, 2)."""
     load = block.tau_spring.copy()
     for index, joint in enumerate(robot.joints):
         if joint.damper_at("transmission"):
@@ -275,7 +275,7 @@ def _motors(
 
 
 def _kept(part: dict[str, FloatArray], index: int, side: int) -> dict[str, FloatArray]:
-    """Return the demand of one trajectory on a motor, with weights of its samples, where feasible."""
+    """Return the demand of one trajectory on a motor at feasible samples, with their weights."""
     of_motor = {name: values if values.ndim == 1 else values[:, index, side] for name, values in part.items()}
     known: BoolArray = np.all(np.isfinite([of_motor[name] for name in MOVED]), axis=0)
     intervals = np.where(known[:-1] & known[1:], np.diff(of_motor["time"]), 0.0)

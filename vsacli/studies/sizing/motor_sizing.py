@@ -1,4 +1,4 @@
-"""One motor of a robot: its demand, its use, and motors of a catalog that will do."""
+"""The sizing of one motor of a robot: its demand, its use, and suitable motors of a catalog."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from vsacli.studies.sizing.shaft import LIMITS, Shaft
 
 @dataclass(frozen=True, eq=False)
 class WorkingPoints(Published):
-    """Torque over speed of a motor; NaN where it follows from constants that are not known.
+    """Torque and speed of a motor; values that follow from unknown constants are NaN.
 
     Attributes:
-        torque: largest in size, N m.
-        rms_torque: root mean square over time.
-        velocity: largest speed, rad/s.
-        rms_velocity: root mean square over time.
-        power: largest mechanical power that it gives, W; one that is taken back does not count.
-        current, rms_current: as the torque, A.
-        voltage: largest in size, V.
-        copper_loss: mean over time, W.
-        torques, velocities: at all steps, (samples,).
+        torque: largest |torque|, N m.
+        rms_torque: rms torque over time, N m.
+        velocity: largest |speed|, rad/s.
+        rms_velocity: rms speed over time, rad/s.
+        power: largest positive mechanical power, W.
+        current, rms_current: largest and rms current, A.
+        voltage: largest |voltage|, V.
+        copper_loss: mean copper loss over time, W.
+        torques, velocities: torque and speed at all samples, (samples,).
     """
 
     torque: Peak
@@ -74,18 +74,18 @@ class WorkingPoints(Published):
 
     @classmethod
     def with_gear(cls, demand: MotorDemand, shaft: Shaft, ratio: float) -> WorkingPoints:
-        """Return the points of a motor with a gear in the place of the robot's own."""
+        """Return the points of a motor with a gear in place of the robot's own."""
         (coefficients,) = Shaft.of([shaft]).coefficients(np.array([ratio]))
         return cls.of(demand, shaft, coefficients @ demand.signals, ratio * demand.velocity)
 
     @classmethod
     def as_it_is(cls, demand: MotorDemand, motor: JointMotor) -> WorkingPoints:
-        """Return the points of the robot's own motor; on the joint side if its gear is not known."""
+        """Return the points of the robot's own motor; on the joint side if its gear is unknown."""
         ratio = motor.gear_ratio or 1.0
         return cls.of(demand, Shaft.of_joint_motor(motor), demand.torque / ratio, demand.velocity * ratio)
 
     def shares(self, shaft: Shaft) -> dict[str, float]:
-        """Return the used share of each limit that exists."""
+        """Return the used share of each finite limit, by name."""
         values = (self.torque.value, self.rms_torque, self.velocity.value, self.voltage)
         used = dict(zip(LIMITS, values, strict=True))
         return {name: used[name] / shaft.bounds[name] for name in shaft.limited}
@@ -93,14 +93,14 @@ class WorkingPoints(Published):
 
 @dataclass(frozen=True)
 class Asked(Published):
-    """The demand on any motor, joint side of its gear.
+    """The demand on any motor, on the joint side of its gear.
 
     Attributes:
         load: largest |torque| of springs and everything parallel to them, N m (N).
-        rms_load: root mean square over time.
-        velocity: largest speed, rad/s (m/s).
-        acceleration: largest in size, rad/s^2 (m/s^2).
-        power: largest power that goes into the load, W.
+        rms_load: rms of this torque over time, N m (N).
+        velocity: largest |speed|, rad/s (m/s).
+        acceleration: largest |acceleration|, rad/s^2 (m/s^2).
+        power: largest power delivered to the load, W.
     """
 
     load: Peak
@@ -115,11 +115,11 @@ class OwnMotor(Published):
     """The performance of the robot's own motor.
 
     Attributes:
-        points: on its shaft; on the joint's side if its gear is not known.
+        points: working points on its shaft, or on the joint side if its gear is unknown.
         shares: used share of each of its limits, by name.
-        does: whether all are kept.
-        low, high: gear ratios between which they would be, NaN if with none; None if that is not known, as of
-            a motor without gear, or with smooth friction.
+        does: whether all limits are kept.
+        low, high: range of gear ratios at which they would be; NaN if it is empty, None if it is unknown, as
+            for a motor without gear ratio or with smooth friction.
     """
 
     points: WorkingPoints
@@ -131,16 +131,16 @@ class OwnMotor(Published):
 
 @dataclass(frozen=True, eq=False)
 class MotorSizing(Published):
-    """One motor of the robot.
+    """The sizing of one motor of the robot.
 
     Attributes:
-        demand: on it, sample by sample.
-        gear_ratio: of the robot's own motor; None if it is not known.
-        own: its use; None if no sample is feasible.
-        choices: motors of the catalogue in its place, those that do first, the best of these first.
-        record: the first of these in the catalogue.
-        shaft: its constants, or those of the robot's own motor without a catalogue.
-        points: of that motor on its shaft.
+        demand: demand on the motor, sample by sample.
+        gear_ratio: gear ratio of the robot's own motor; None if unknown.
+        own: use of the robot's own motor; None if no sample is feasible.
+        choices: motors of the catalog in its place, sufficient ones first, sorted by the criterion.
+        record: catalog entry of the first choice.
+        shaft: constants of the first choice, or of the robot's own motor without a catalog.
+        points: working points of that motor on its shaft.
     """
 
     demand: MotorDemand = field(repr=False)
@@ -166,36 +166,36 @@ class MotorSizing(Published):
 
     @property
     def motor(self) -> int:
-        """1 or 2."""
+        """Number of the motor, 1 or 2."""
         return self.demand.number
 
     @property
     def name(self) -> str:
-        """Joint and number."""
+        """Name of the joint and number of the motor."""
         return f"{self.joint} {self.motor}"
 
     @property
     def drive(self) -> str:
-        """Motor and gear of its points, as far as known."""
+        """Motor and gear of `points`, as far as known."""
         if self.best is not None:
             return f"{self.best.motor}, gear {self.best.ratio:.4g}"
         return "joint side" if self.gear_ratio is None else f"gear {abs(self.gear_ratio):.4g}"
 
     @property
     def units(self) -> tuple[str, str]:
-        """Units of the torques and velocities of its points."""
+        """Units of the torques and velocities of `points`."""
         known = self.best is not None or self.gear_ratio is not None
         joint_type = "revolute" if known else self.demand.joint_type
         return TORQUE.unit(joint_type), VELOCITY.unit(joint_type)
 
     @property
     def best(self) -> Choice | None:
-        """The motor that comes first: it does, or is the one that comes nearest to it."""
+        """First choice: the best sufficient motor, or the one with the smallest violation."""
         return self.choices[0] if self.choices else None
 
     @property
     def does(self) -> bool:
-        """Whether a motor of the catalogue does; without one, the robot's own."""
+        """Whether a motor of the catalog suffices; without a catalog, the robot's own."""
         judged = self.best or self.own
         return judged is not None and judged.does
 

@@ -1,10 +1,11 @@
 """Gear ratios that motors may be combined with, and those within all limits of a motor.
 
-At each step torque and voltage have the form A n + C + B/n in the ratio n. Where its size is at most T lies
-between roots of two quadratic equations; what all steps leave is an interval. Speed bounds it from above. The
-mean square of the torque falls towards its only minimum, and then rises, so that bisection finds where it is
-as large as it may be. (It could have two minima only if friction did more against the acceleration than with
-it: of a motion that begins faster than it ends, and a motor that hardly anything but its friction loads.)
+At each sample, torque and voltage have the form A n + C + B/n in the ratio n. The ratios at which its
+absolute value is at most T lie between roots of two quadratic equations; the intersection over all samples is
+an interval. Speed bounds it from above. The mean square torque decreases to its only minimum and then
+increases, so that bisection finds where it reaches its bound. (It could have two minima only if friction
+opposed the acceleration more than it supports it: for a motion that begins faster than it ends, and a motor
+loaded by hardly anything but its friction.)
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ FORM = "expected ratios such as 50,80,100, or a range such as 30..160"
 
 
 class Gears(NamedTuple):
-    """Ratios that a motor may be combined with; all of them positive, rad/m at a prismatic joint.
+    """Positive gear ratios that a motor may be combined with; rad/m at a prismatic joint.
 
     Attributes:
-        listed: the ratios there are; empty if any between two ends may be.
-        low, high: these ends.
+        listed: available ratios; empty for a range.
+        low, high: ends of the range.
     """
 
     listed: tuple[float, ...] = ()
@@ -40,10 +41,10 @@ class Gears(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> Self:
-        """Ratios such as `50,80,100`, or a range such as `30..160`.
+        """Parse ratios such as `50,80,100`, or a range such as `30..160`.
 
         Raises:
-            InputError: it is none of both.
+            InputError: the text is neither.
         """
         ends = _RANGE.fullmatch(text.strip())
         words = text.split(",") if ends is None else [ends["low"], ends["high"]]
@@ -65,11 +66,11 @@ def gears_of_joints(texts: Sequence[str], joints: Sequence[str]) -> dict[str, Ge
     """Return the gears of each joint.
 
     Args:
-        texts: as `Gears.read` takes them, for all joints, or as `slide=500..3000` for one of them.
-        joints: their names.
+        texts: texts for `Gears.read`, for all joints, or preceded by a joint as in `slide=500..3000`.
+        joints: names of the joints.
 
     Raises:
-        InputError: a text is no such thing, names no joint, or says twice what one has.
+        InputError: a text is invalid, names an unknown joint, or gives gears a second time.
     """
     common: Gears | None = None
     found: dict[str, Gears] = {}
@@ -88,21 +89,21 @@ def gears_of_joints(texts: Sequence[str], joints: Sequence[str]) -> dict[str, Ge
 
 
 LOWEST, HIGHEST = 1e-9, 1e9
-"""Ratios between which one is looked for; rad/m at a prismatic joint."""
+"""Range of the search for a ratio; rad/m at a prismatic joint."""
 
 HALVINGS = 64
-"""Bisections of the logarithm of the ratio, from the whole range to the last digit."""
+"""Bisections of the log of the ratio, from the whole range to the last digit."""
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SECTIONS = 40
-"""Sections of the logarithm of the ratio: 0.618^40 of the whole range are 2e-7 of the ratio."""
+"""Golden sections of the log of the ratio: 0.618^40 of the whole range is 2e-7 of the ratio."""
 
 SOLUTIONS_AT_A_TIME = 2_000_000
-"""Pairs of a motor and a step computed together, some 16 MB an array."""
+"""Number of pairs of a motor and a sample computed together, about 16 MB per array."""
 
 
 class Ratios(NamedTuple):
-    """Ranges of gear ratios, one of each motor, (motors,): none where `low` is above `high`."""
+    """Ranges of gear ratios, one for each motor, (motors,); empty where `low` is above `high`."""
 
     low: FloatArray
     high: FloatArray
@@ -113,12 +114,12 @@ class Ratios(NamedTuple):
 
     @property
     def empty(self) -> BoolArray:
-        """Whether no ratio will do."""
+        """Mask of empty ranges, (motors,)."""
         empty: BoolArray = ~(self.low <= self.high)
         return empty
 
     def nearest(self, ratio: FloatArray) -> FloatArray:
-        """Return the ratio of a range that is nearest to one; values not finite become an end, or 1."""
+        """Return the nearest ratio in each range; zero and infinity become an end of the range, or 1."""
         inside = np.minimum(np.maximum(ratio, self.low), self.high)
         finite = np.where((inside > 0) & (inside < math.inf), inside, np.where(self.low > 0, self.low, 1.0))
         nearest: FloatArray = np.minimum(finite, self.high)
@@ -126,12 +127,12 @@ class Ratios(NamedTuple):
 
 
 def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
-    """Return the shares of `LIMITS` that motors use, (motors, limits), 0 where unbounded.
+    """Return the used shares of `LIMITS`, (motors, limits), 0 for infinite limits.
 
     Args:
-        demand: on the motor.
-        shafts: the motors.
-        ratio: of their gears, (motors,).
+        demand: demand on the motor.
+        shafts: motors to compare.
+        ratio: gear ratios, (motors,).
     """
     torque, voltage = _peaks(demand, shafts, ratio)
     used = (torque, rms_torque(demand, shafts, ratio), demand.top_speed * ratio, voltage)
@@ -140,16 +141,14 @@ def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
 
 
 def rms_torque(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
-    """Root mean square over time of torques on shafts, (motors,)."""
+    """Return the rms over time of torques on shafts, (motors,)."""
     coefficients = shafts.coefficients(ratio)
     square = _mean_product(coefficients, demand.moments, coefficients)
-    return np.sqrt(
-        np.maximum(square, 0.0)
-    )  # where load and rotor cancel, rounding may leave less than nothing
+    return np.sqrt(np.maximum(square, 0.0))  # if load and rotor cancel, rounding may leave a negative value
 
 
 def _peaks(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Largest |torque| and |voltage|, each (motors,)."""
+    """Return the largest |torque| and |voltage|, each (motors,)."""
     coefficients = shafts.coefficients(ratio)
     of_voltage = shafts.volts_per_torque[:, None] * coefficients
     of_voltage[:, 1] += shafts.volts_per_speed * ratio
@@ -162,7 +161,7 @@ def _peaks(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> tuple[Float
 
 
 def _mean_product(one: FloatArray, moments: FloatArray, other: FloatArray) -> FloatArray:
-    """Means of products of torques, (motors,), from their coefficients."""
+    """Return mean products of torques, (motors,), from their coefficients."""
     mean: FloatArray = np.einsum("mi,ij,mj->m", one, moments, other)
     return mean
 
@@ -198,10 +197,8 @@ def _peak_within(
 
 
 def _below(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Ratios:
-    """Return where square n^2 + linear n + constant <= 0 for n > 0; nowhere if linear > 0.
-
-    The root with the plus sign is found without cancellation, the other one from the product of both.
-    """
+    """Return the range of n > 0 with square n^2 + linear n + constant <= 0; empty if linear > 0."""
+    # the root with the plus sign has no cancellation; the other one follows from the product of both
     discriminant = linear * linear - 4 * square * constant
     numerator = (np.sqrt(discriminant) - linear) / 2
     nowhere = (linear > 0) | ((discriminant < 0) & (square > 0))
@@ -210,9 +207,9 @@ def _below(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Rati
 
 
 def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
-    """Return the ratios at which the root mean square of the torque is smallest, (motors,).
+    """Return the ratios at which the rms torque is smallest, (motors,).
 
-    It is 0 or infinite where that becomes ever smaller.
+    A ratio is 0 or infinite if the rms torque decreases towards that end.
     """
     moments = demand.moments
     inertial, frictional, loaded = shafts.inertial, shafts.frictional, shafts.loaded
@@ -229,12 +226,12 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
 
 
 def _unbounded(ratio: FloatArray) -> FloatArray:
-    """Ratios, 0 or infinite at the ends of the searched range."""
+    """Return ratios, replaced by 0 or infinity at the ends of the searched range."""
     return np.where(ratio <= 2 * LOWEST, 0.0, np.where(ratio >= HIGHEST / 2, math.inf, ratio))
 
 
 def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios:
-    """Return the ratios at which the root mean square of the torque is at most a bound."""
+    """Return the ratios at which the rms torque is at most a bound."""
     best = np.clip(least_rms(demand, shafts), LOWEST, HIGHEST)
 
     def allowed(ratio: FloatArray) -> BoolArray:
@@ -251,7 +248,7 @@ def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios
 def _turning_point(
     turned: Callable[[FloatArray], BoolArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Return where a condition becomes true between two ratios, at the first of which it is false."""
+    """Return the ratio at which a condition becomes true, between two ratios; it is false at the first."""
     low, high = np.log(low), np.log(high)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -261,10 +258,10 @@ def _turning_point(
 
 
 def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
-    """Return the allowed ratios with the smallest largest share of a limit, (motors,).
+    """Return the allowed ratios that minimize the largest share of a limit, (motors,), by golden section.
 
-    By golden section: the largest share falls up to there, and then rises. It is 0 or infinite where that
-    becomes ever smaller.
+    The largest share decreases up to that ratio and then increases. A ratio is 0 or infinite if the share
+    decreases towards that end.
     """
 
     def largest(logarithm: FloatArray) -> FloatArray:
@@ -287,7 +284,7 @@ def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
 def _in_parts(
     compute: Callable[[slice], tuple[FloatArray, ...]], motors: int, demand: MotorDemand
 ) -> tuple[FloatArray, ...]:
-    """Return values computed for some motors at a time, for all."""
+    """Compute values for a part of the motors at a time; return those of all."""
     size = max(1, SOLUTIONS_AT_A_TIME // demand.signals.shape[1])
     parts = [compute(slice(start, start + size)) for start in range(0, motors, size)]
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))

@@ -1,13 +1,12 @@
-"""A motor on its own side of the gear, and its use there for a demand on the joint's side.
+"""A motor on its own side of the gear, and its torque there for a demand on the joint side.
 
-With the ratio n, a motor that moves by theta on the joint's side turns by n theta. On its shaft it exerts
+With the ratio n, a motor that moves by theta on the joint side turns by n theta. On its shaft it exerts
 
     tau = n (J theta'' + D theta') + friction + load/n
 
-where the load is what the springs and a damper exert against it on the joint's side. This is (73)-(74) over
-n: neither the motion of the motor nor the load depend on which motor it is. So its torque is the sum of seven
-signals of the motion, with coefficients that are those of motor and gear. A gear that passes on a share of
-the power makes the load larger where it is driven, and smaller where it is braked.
+where load is the torque of the springs and a damper against it on the joint side. This is (73)-(74) divided
+by n: neither motion nor load depend on the motor. So its torque is a sum of seven signals of the motion, with
+coefficients of motor and gear. The efficiency of a gear makes a driven load larger, and a braked one smaller.
 """
 
 from __future__ import annotations
@@ -23,24 +22,24 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 
 LIMITS = ("torque", "continuous_torque", "velocity", "voltage")
-"""Limits of a motor: peak torque or current, their root mean square, and so on."""
+"""Limits of a motor: peak and rms torque (both also by current), speed and voltage."""
 
 
 class Shaft(NamedTuple):
-    """Constants of a motor, SI units, or (motors,) of several; bounds are infinite where there are none.
+    """Constants of a motor, or of several, (motors,), in SI units; missing limits are infinite.
 
     Attributes:
-        inertia: of the rotor.
-        damping: viscous.
-        backward, forward: dry friction while the joint side moves that way.
-        offset: torque that is added.
-        max_torque: of peaks, as far as torque and current go.
-        continuous_torque: of the root mean square, as above.
-        max_velocity: of the shaft.
-        max_voltage: of the windings.
-        torque_constant: torque over current; NaN if it is not known.
-        resistance: of the windings; NaN if it is not known.
-        efficiency: of the gear.
+        inertia: inertia of the rotor.
+        damping: viscous damping.
+        backward, forward: dry friction while the joint side moves in that direction.
+        offset: constant part of the friction torque.
+        max_torque: limit of the peak torque, from torque and current.
+        continuous_torque: limit of the rms torque, from torque and current.
+        max_velocity: limit of the shaft's speed.
+        max_voltage: limit of the voltage of the windings.
+        torque_constant: torque over current; NaN if unknown.
+        resistance: resistance of the windings; NaN if unknown.
+        efficiency: efficiency of the gear.
     """
 
     inertia: Any
@@ -58,12 +57,12 @@ class Shaft(NamedTuple):
 
     @classmethod
     def of(cls, shafts: Iterable[Self]) -> Self:
-        """Return several motors."""
+        """Stack the constants of several motors."""
         return cls(*(np.array(column, dtype=float) for column in zip(*shafts, strict=True)))
 
     @classmethod
     def of_joint_motor(cls, motor: JointMotor) -> Self:
-        """Return the shaft of a robot's own motor, on the joint side if its gear is not known."""
+        """Return the shaft of a robot's own motor, on the joint side if its gear is unknown."""
         ratio = abs(motor.gear_ratio or 1.0)
         friction = motor.friction or NO_FRICTION
         constant = math.nan if motor.torque_constant is None else abs(motor.torque_constant) / ratio
@@ -91,60 +90,60 @@ class Shaft(NamedTuple):
 
     @property
     def limited(self) -> tuple[str, ...]:
-        """The limits that there are, of one motor."""
+        """Names of the finite limits, for one motor."""
         return tuple(name for name, bound in self.bounds.items() if math.isfinite(bound))
 
     @property
     def stall_torque(self) -> float:
-        """Largest torque at rest, by torque, current and voltage."""
+        """Largest torque at rest, limited by torque, current and voltage."""
         by_voltage = self.max_voltage / self.volts_per_torque if self.volts_per_torque else math.inf
         return float(min(self.max_torque, by_voltage))
 
     @property
     def volts_per_torque(self) -> Any:
-        """Resistance over torque constant, V/(N m); 0 where no voltage bounds anything."""
+        """Resistance over torque constant, V/(N m); 0 without a voltage limit."""
         return np.where(np.isfinite(self.max_voltage), self.resistance / self.torque_constant, 0.0)
 
     @property
     def volts_per_speed(self) -> Any:
-        """The torque constant, V s/rad; 0 where no voltage bounds anything."""
+        """Torque constant, V s/rad; 0 without a voltage limit."""
         return np.where(np.isfinite(self.max_voltage), self.torque_constant, 0.0)
 
     @property
     def heat_per_torque(self) -> Any:
-        """Copper loss over the square of the torque, W/(N m)^2; NaN if it is not known."""
+        """Copper loss over the square of the torque, W/(N m)^2; NaN if unknown."""
         return self.resistance / self.torque_constant**2
 
     @property
     def inertial(self) -> FloatArray:
-        """Coefficients of the seven signals in the part that grows with the ratio, (motors, 7)."""
+        """Coefficients of the seven signals in the part proportional to the ratio, (motors, 7)."""
         return self._coefficients(self.inertia, self.damping, 0, 0, 0, 0, 0)
 
     @property
     def frictional(self) -> FloatArray:
-        """Coefficients of the part that does not depend on the ratio."""
+        """Coefficients of the part independent of the ratio, (motors, 7)."""
         return self._coefficients(0, 0, -self.backward, self.forward, self.offset, 0, 0)
 
     @property
     def loaded(self) -> FloatArray:
-        """Coefficients of the part that falls with the ratio."""
+        """Coefficients of the part inversely proportional to the ratio, (motors, 7)."""
         return self._coefficients(0, 0, 0, 0, 0, 1 / self.efficiency, self.efficiency)
 
     def _coefficients(self, *columns: Any) -> FloatArray:
         return np.stack(np.broadcast_arrays(np.zeros_like(self.inertia), *columns)[1:], axis=-1)
 
     def coefficients(self, ratio: FloatArray) -> FloatArray:
-        """Return the coefficients of the torque on the shaft with ratios (motors,): (motors, 7)."""
+        """Return the coefficients of the torque on the shaft, (motors, 7), for ratios (motors,)."""
         over = np.asarray(ratio)[..., None]
         torque: FloatArray = over * self.inertial + self.frictional + self.loaded / over
         return torque
 
 
 def shaft_signals(velocity: FloatArray, acceleration: FloatArray, load: FloatArray) -> FloatArray:
-    """Return the seven signals of a demand, (7, samples), from those of the joint side, each (samples,).
+    """Return the seven signals of a demand, (7, samples), from joint-side values, each (samples,).
 
-    Acceleration, velocity, whether it moves backward, and forward, one, the load where it is driven, and
-    where it is braked. At rest a load counts as driven.
+    They are acceleration, velocity, 1 while moving backward, 1 while moving forward, 1, the driven load, and
+    the braked load. At rest a load counts as driven.
     """
     direction = direction_of(velocity)
     driven = direction * load >= 0

@@ -1,4 +1,7 @@
-"""Sizing of drives: the demands of trajectories, motors that will do, and the robot's file with them."""
+"""Sizing of drives: the demands of trajectories, suitable motors, and the robot's file with these.
+
+`demanded` runs all trajectories, `choices` ranks the motors of a catalog for each motor of the robot.
+"""
 
 from __future__ import annotations
 
@@ -42,23 +45,23 @@ def size_drives(
     *,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Sizing:
-    """Return demands on motors and springs, and the motors and gears of a catalog that will do.
+    """Return the demands on motors and springs, and the motors and gears of a catalog that meet them.
 
-    Peaks are the largest of all trajectories, means are over all of them, one after the other as a cycle.
+    Peaks are the largest over all trajectories; means are over all trajectories executed in turn as a cycle.
 
     Args:
-        robot: the robot.
-        trajectories: to be executed.
-        catalogue: path of a CSV file of motors; None to look at the robot's own alone.
-        gears: ratios such as "50,80,100", or a range such as "30..160", for all joints, or for one of them as
-            in "slide=500..3000"; any if empty. Motors that have a gear in the catalogue keep it.
-        minimize: "copper", "utilisation" or "mass", by which the best is chosen; the first if the catalogue
-            says enough for it, else the second.
-        progress: is told how many further steps are done.
+        robot: robot to size.
+        trajectories: trajectories to execute.
+        catalogue: path of a CSV file of motors; None to check only the robot's own motors.
+        gears: ratios such as "50,80,100", or a range such as "30..160", for all joints, or for one joint as
+            in "slide=500..3000"; any ratio if empty. Motors that have a gear in the catalog keep it.
+        minimize: criterion for the best choice, "copper", "utilisation" or "mass"; if None, "copper" if the
+            catalog has all resistances, otherwise "utilisation".
+        progress: function to call with the number of further samples that are done.
 
     Raises:
-        InputError: there is no trajectory, one does not fit the robot, the catalogue cannot be read or has no
-            rotors that can be coupled as those of the robot are, or gears or criterion are none.
+        InputError: there is no trajectory, one does not fit the robot, the catalog cannot be read or has no
+            rotors heavy enough for a coupled inertia, or gears or criterion are invalid.
         TypeError: an argument is of another type.
     """
     check_robot(robot)
@@ -108,7 +111,7 @@ def _offered(
     gears: Mapping[str, Gears],
     criterion: str | None,
 ) -> list[tuple[Choice, ...]]:
-    """Motors of the catalogue in the place of each of the robot, with which the robot can be built."""
+    """Return the choices from the catalog for each motor of the robot that allow its coupled inertias."""
     if table is None or criterion is None:
         return [()] * len(demands)
     found = [
@@ -132,7 +135,7 @@ def _sized(
     found: tuple[Choice, ...],
     table: RecordTable[CatalogueMotor] | None,
 ) -> MotorSizing:
-    """One motor of the robot, which nothing is known of if no step can be done."""
+    """Return the sizing of one motor of the robot, without results if no sample is feasible."""
     if not demand.time.size:
         return MotorSizing(demand, motor.gear_ratio)
     own = WorkingPoints.as_it_is(demand, motor)
@@ -160,7 +163,7 @@ def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMo
 
 
 def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[str]:
-    """Yield notes on the basis of the numbers, where that is not obvious."""
+    """Yield notes on assumptions that are not obvious."""
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
@@ -169,19 +172,19 @@ def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[
 
 
 KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")
-"""Columns of a catalogue that a robot file has by the same name."""
+"""Columns of a catalog that a robot file has under the same name."""
 
 
 def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
-    """Return the text of the robot's file with the best motors in it, where one does.
+    """Return the text of the robot's file with the best motors.
 
-    Everything else, comments too, stays as the user wrote it. Masses of links stay as they are, and so does a
-    coupled inertia on the joint's side; a robot file knows no continuous torque and no efficiency of gears.
+    Everything else, comments included, remains as the user wrote it. Masses of links do not change, nor does
+    a coupled inertia on the joint side; a robot file has no continuous torque and no gear efficiency.
 
     Args:
-        robot: as it was read from its file.
-        sizing: its result, a motor for each place.
-        folder: where the text will stand.
+        robot: robot as read from its file.
+        sizing: result of the sizing, with a choice for each motor.
+        folder: folder of the new file.
 
     Raises:
         InputError: the robot was not read from a file.
@@ -201,7 +204,7 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
 
 
 def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:
-    """Return the motor that was chosen, with its gear, as `motor:` of an actuator."""
+    """Return the chosen motor with its gear, as `motor:` of an actuator."""
     motor, choice = place.record, place.best
     assert motor is not None, "as of every place"
     assert choice is not None, "likewise"

@@ -19,18 +19,18 @@ from vsacli.studies.sizing.shaft import LIMITS
 
 @dataclass(frozen=True, eq=False)
 class Sizing(Published):
-    """The demands of motions on the drives of a robot, and the drives that will do.
+    """The demands of motions on the drives of a robot, and the drives that meet them.
 
     Attributes:
-        robot: its name.
-        outcomes: the runs.
-        catalogue: path of the file; None if there is none.
-        candidates: how many motors are in it.
-        criterion: by which the best is chosen, one of `CRITERIA`; None without a catalogue.
-        motors: those of all joints in turn.
-        springs: load of each.
-        warnings: doubts about the inputs.
-        notes: how the numbers are meant, where that is not obvious.
+        robot: name of the robot.
+        outcomes: runs along the trajectories.
+        catalogue: path of the catalog; None without one.
+        candidates: number of motors in the catalog.
+        criterion: criterion of the best choice, one of `CRITERIA`; None without a catalog.
+        motors: sizing of each motor, joint by joint.
+        springs: demand on each spring.
+        warnings: warnings about the inputs.
+        notes: assumptions that are not obvious.
     """
 
     robot: str
@@ -52,10 +52,10 @@ class Sizing(Published):
 
     @property
     def verdict(self) -> str:
-        """The first that applies.
+        """First verdict that applies.
 
-        self_check_failed or doubtful as of a run; incomplete if steps were left out; insufficient if nothing
-        does for some motor; else ok.
+        They are self_check_failed (as for a run), insufficient if nothing suffices for some motor, incomplete
+        if samples were left out, doubtful (as for a run), and ok.
         """
         verdicts = [outcome.verdict for outcome in self.outcomes]
         applies = {
@@ -68,7 +68,7 @@ class Sizing(Published):
 
     @property
     def lacking(self) -> tuple[MotorSizing, ...]:
-        """Yield the nearest choice and its obstacle for each motor for which nothing will do."""
+        """Motors for which nothing suffices."""
         return tuple(motor for motor in self.motors if not motor.does)
 
     def __str__(self) -> str:
@@ -89,7 +89,7 @@ class Sizing(Published):
 
     @property
     def title(self) -> str:
-        """Robot and motions."""
+        """Names of robot and trajectories, with durations."""
         return ", ".join(
             [self.robot, *(f"{each.trajectory} ({each.duration:g} s)" for each in self.outcomes)]
         )
@@ -118,11 +118,11 @@ WORDS = {
     "velocity": "speed",
     "voltage": "voltage",
 }
-"""Words for the limits of a motor."""
+"""Limits of a motor in words."""
 
 
 def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """Yield effects that the sizing leaves out."""
+    """Yield a sentence for each trajectory with samples that were left out."""
     for outcome in outcomes:
         if outcome.left_out:
             yield (
@@ -132,7 +132,7 @@ def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
 
 
 def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """Yield the demand on any motor."""
+    """Yield the lines of the table of demands, whatever the motors."""
     if not motors:
         return
     rows = [("asked, joint side", "peak load", "at", "rms load", "speed", "acceleration")]
@@ -153,7 +153,7 @@ def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str
 
 
 def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """Yield the use of the robot's own motors, on their shafts or, without known gears, on the joint side."""
+    """Yield the lines of the table of the robot's own motors, on the joint side if gears are unknown."""
     if not motors:
         return
     rows = [
@@ -181,7 +181,7 @@ def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
 
 
 def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
-    """Yield the best motor of a catalogue for each place."""
+    """Yield the lines of the table of the best motor of a catalog for each motor."""
     if not motors:
         return
     used = [name for name in LIMITS if any(motor.best and name in motor.best.shares for motor in motors)]
@@ -214,7 +214,7 @@ def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
 
 
 def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
-    """Yield the nearest choice and its obstacle for each motor for which nothing will do."""
+    """Yield a sentence for each motor for which nothing suffices: nearest choice and violated limits."""
     for motor in motors:
         shares = motor.best.shares if motor.best else motor.own.shares if motor.own else {}
         beyond = [
@@ -239,7 +239,7 @@ def _other_gears(motor: MotorSizing) -> str:
 
 
 def spring_table(springs: Sequence[SpringDemand], *, several: bool) -> Iterator[str]:
-    """Yield the demand on each spring."""
+    """Yield the lines of the table of springs."""
     known = [spring for spring in springs if math.isfinite(spring.energy.value)]
     if not known:
         return
@@ -259,7 +259,7 @@ def _spring_row(spring: SpringDemand, *, several: bool) -> tuple[str, ...]:
 
 
 def _without_empty(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Rows below a header, without the columns that say nothing of any."""
+    """Return a table, header first, without columns that are empty in all rows."""
     kept = [index for index in range(len(rows[0])) if any(row[index] != "-" for row in rows[1:])]
     return [tuple(row[index] for index in kept) for row in rows]
 

@@ -1,4 +1,4 @@
-"""Studies: many runs of a robot whose numbers vary, or along many trajectories, as a table."""
+"""Studies: many runs of a robot with varied parameters, or along many trajectories, as a table."""
 
 from vsacli.studies.sweeps.run_study import run_study
 from vsacli.studies.sweeps.study_tables import merge

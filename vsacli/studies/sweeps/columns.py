@@ -1,8 +1,7 @@
 """Columns of the table of a study: scalars of the report of each run, and variables over time.
 
-Each is declared once as a `Column`. The values of a run stand in a row of numbers, those of one column after
-those of another: `scalars` and `Recorder` make such rows, `arrays_of` and `filled` turn many of them into
-arrays by name.
+Each is declared once as a `Column`. The values of a run form a row of numbers, column after column: `scalars`
+and `Recorder` make such rows, `arrays_of` and `filled` convert many rows to arrays by name.
 """
 
 from __future__ import annotations
@@ -29,13 +28,14 @@ class Column(NamedTuple):
     """A column of the table.
 
     Attributes:
-        name: in study files and tables.
+        name: name in study files and tables.
         dims: dimensions after `run`.
-        quantity: its unit.
-        long_name: a few words.
-        of: gives its value, or those of two motors, from the source; None takes the attribute `name`.
-        whole: whether it is NaN at a joint with infeasible or singular steps, since it would be that of the
-            others alone.
+        quantity: physical quantity, which determines the unit.
+        long_name: description in a few words.
+        of: function that returns the value, or those of two motors, from its source; None for the attribute
+            `name`.
+        whole: whether the value is NaN for a joint with infeasible or singular samples, since it would only
+            describe the other samples.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Column(NamedTuple):
     whole: bool = False
 
     def shape(self, joints: int) -> tuple[int, ...]:
-        """Return the shape of its values in one run, or at one step."""
+        """Return the shape of the values in one run, or at one sample."""
         return (joints, len(MOTORS))[: len(self.dims) - self.dims.count(STEP)]
 
     def scalar(self, joint: JointReport) -> float | tuple[float, float]:
-        """Return its value in the report of a joint, or those of its motors."""
+        """Return the value in the report of a joint, or those of its motors."""
         if self.whole and (joint.steps.get("infeasible") or joint.steps.get("singular")):
             return (math.nan, math.nan) if self.dims == MOTOR else math.nan
         found: float | tuple[float, float] = (self.of or attrgetter(self.name))(joint)
@@ -108,18 +108,18 @@ OVER_TIME = {
 
 
 def over_time(names: Sequence[str]) -> tuple[Column, ...]:
-    """Return the variables of these names, after the time; none if there are no names."""
+    """Return the columns of the named variables, preceded by the time; none without names."""
     return tuple(OVER_TIME[name] for name in dict.fromkeys((TIME, *names))) if names else ()
 
 
 def scalars(kept: Sequence[Column], report: Report) -> FloatArray:
-    """Return the values of a run one after the other, (columns,)."""
+    """Return the concatenated values of a run, (columns,)."""
     values = ([each.scalar(joint) for joint in report.joints] for each in kept)
     return np.concatenate([np.array(each, dtype=float).ravel() for each in values])
 
 
 def width(columns: Sequence[Column], joints: int) -> int:
-    """Return how many numbers a row has."""
+    """Return the number of values in a row."""
     return sum(math.prod(each.shape(joints)) for each in columns)
 
 
@@ -134,11 +134,11 @@ def arrays_of(columns: Sequence[Column], rows: FloatArray, joints: int) -> dict[
 
 
 class Recorder:
-    """Gathers variables from the blocks of a run, in order.
+    """A recorder of variables over the blocks of a run, in order.
 
     Args:
-        kept: the variables.
-        every: of this many steps one is kept, from the first on.
+        kept: variables to record.
+        every: decimation factor: one of this many samples is recorded, from the first on.
     """
 
     def __init__(self, kept: Sequence[Column], every: int) -> None:
@@ -147,7 +147,7 @@ class Recorder:
         self._rows: list[FloatArray] = []
 
     def add(self, block: Block) -> None:
-        """Gather the kept values of the next samples."""
+        """Record the next samples."""
         if self._kept:
             first, count = -self._step % self._every, len(block.time)
             columns = [
@@ -159,12 +159,12 @@ class Recorder:
 
     @property
     def curves(self) -> FloatArray:
-        """Return the gathered values, sample after sample, all variables of each; flat."""
+        """Recorded values, flat: all variables of the first sample, then of the next."""
         return np.concatenate(self._rows).ravel() if self._rows else np.empty(0)
 
 
 def steps_of(curves: FloatArray, kept: Sequence[Column], joints: int) -> int:
-    """Return how many steps were gathered."""
+    """Return the number of recorded samples."""
     return len(curves) // width(kept, joints) if kept else 0
 
 

@@ -1,7 +1,7 @@
-"""Dimensions of a study with the values of each run: entries of `vary:` checked against its files.
+"""Dimensions of a study and the values of each run: entries of `vary:`, checked against the files.
 
-An entry becomes one `Dimension`, or several if a distribution fits several numbers. A `Design` combines the
-values of all: a grid, or points that are drawn.
+An entry becomes one `Dimension`, or several if a distribution matches several numbers. A `Design` combines
+the values of all dimensions: a grid, or random points.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from vsacli.trajectory.changes import divided
 from vsacli.trajectory.file import read_trajectory
 
 MOST_VALUES = 1_000_000
-"""Most values of one path: more than any study has runs."""
+"""Largest number of values of one path: more than any study has runs."""
 
 
 class FileNumber(NamedTuple):
-    """A number of one of the files: the path as users write it, also with indices, its unit and its value."""
+    """A number in one of the files: its path with names and with indices, its unit and its value."""
 
     path: str
     indexed: str
@@ -47,11 +47,11 @@ class FileNumber(NamedTuple):
 
 
 def file_numbers(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) -> list[FileNumber]:
-    """Numbers of a file as they are looked up by paths.
+    """Return the numbers of a file with their paths.
 
     Args:
-        numbers: as `documents.plausibility.numbers` has them.
-        joint_types: type of each joint by name, on which units depend.
+        numbers: numbers from `documents.record_values.numbers`.
+        joint_types: type of each joint, which determines units, by name.
     """
     return [
         FileNumber(
@@ -77,14 +77,14 @@ class Dimension(NamedTuple):
     """The values of one path over a study.
 
     Attributes:
-        path: to a number, or to several that take the same value, or to anything else.
-        unit: SI unit of the number; empty if it is none, or not known.
-        values: as in files; empty if it is drawn.
-        centre: about which it is drawn.
-        tolerance: by which it is drawn; None if its values are listed.
-        linked: path of the dimension that it is a multiple of, if it is of one.
-        factor: this multiple.
-        numeric: whether all its values are numbers.
+        path: path of a number, of several that have the same value, or of anything else.
+        unit: SI unit of the number; empty if it is not a number, or the unit is unknown.
+        values: values as in files; empty if they are drawn.
+        centre: center of the distribution.
+        tolerance: distribution about the center; None if values are listed.
+        linked: path of the dimension of which it is a multiple; "" if independent.
+        factor: factor on the linked dimension.
+        numeric: whether all values are numbers.
     """
 
     path: str
@@ -97,7 +97,7 @@ class Dimension(NamedTuple):
     numeric: bool = True
 
     def drawn(self, share: float) -> Any:
-        """Return the value that so large a share of all is below; of listed ones each has an equal share."""
+        """Return the quantile for a share; listed values have equal shares."""
         if self.tolerance is not None:
             return self.centre + self.tolerance.below(share)
         return self.values[int(share * len(self.values))]
@@ -120,9 +120,9 @@ def dimensions_of(
     """Yield the dimensions of a path: one, or one for each parameter of a distribution.
 
     Args:
-        varied: the entry of the file.
-        numbers: of robot and trajectories.
-        before: dimensions of the entries before it.
+        varied: entry of the file.
+        numbers: numbers of robot and trajectories.
+        before: dimensions of previous entries.
 
     Raises:
         InputError: the variation does not fit the value.
@@ -202,13 +202,13 @@ def _number(text: str, unit: str) -> float:
 
 
 class Entries:
-    """The entries of `vary:`, with their problems.
+    """The entries of `vary:`, checked against the files of the study.
 
     Args:
         file: content of the study file.
-        path: of the study file.
-        read: the robot file.
-        robot: its content.
+        path: path of the study file.
+        read: robot file as read.
+        robot: robot of the file.
         trajectories: paths of the trajectory files.
     """
 
@@ -226,10 +226,10 @@ class Entries:
         return tuple(dimension for _, dimension in self._found)
 
     def dimensions(self) -> tuple[Dimension, ...]:
-        """Return the dimensions.
+        """Return the dimensions of all entries.
 
         Raises:
-            InputError: entries do not fit the values, each with its line.
+            InputError: some entries do not fit the files; with the line of each.
         """
         problems, held_numbers = Problems(self._path), self._numbers()
         for varied in self._file.vary:
@@ -244,10 +244,10 @@ class Entries:
         return self._dimensions
 
     def try_values(self) -> None:
-        """Make the change of each listed value alone.
+        """Try each listed value alone as a change of its file.
 
         Raises:
-            InputError: some cannot be made.
+            InputError: some changes are not possible.
         """
         problems = Problems(self._path)
         for varied, dimension in self._found:
@@ -282,21 +282,21 @@ def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
 
 
 MOST_RUNS = 1_000_000
-"""Most runs: at some 10 ms each that is three hours; the table has 300 MB."""
+"""Largest number of runs: at about 10 ms each they take three hours, and the table has 300 MB."""
 
 
 class Design:
-    """The points of a study, the same for each trajectory.
+    """The points of a study, which are the same for each trajectory.
 
     Attributes:
-        points: how many there are.
+        points: number of points.
     """
 
     def __init__(self, file: StudyFile, dimensions: Sequence[Dimension], trajectories: int) -> None:
-        """Find the points.
+        """Determine the points.
 
         Raises:
-            InputError: they are more than can be computed.
+            InputError: there would be more than `MOST_RUNS` runs.
         """
         self._dimensions = dimensions
         self._own = [each for each in dimensions if not each.linked]
@@ -311,7 +311,7 @@ class Design:
         self._shares = None if file.method == GRID else _shares(file, self.points, len(self._own))
 
     def different(self, dimensions: Sequence[Dimension]) -> int:
-        """Return how many different values some dimensions have together."""
+        """Return the number of different combinations of values of some dimensions."""
         own = [each for each in dimensions if not each.linked]
         if self._shares is not None and own:
             return self.points
@@ -338,10 +338,10 @@ class Design:
 
 
 def _shares(file: StudyFile, points: int, dimensions: int) -> FloatArray:
-    """Shares from 0 to 1, (points, dimensions): of each dimension's values those below the one to take.
+    """Return shares from 0 to 1, (points, dimensions), whose quantiles are the values of the points.
 
-    A Latin hypercube has one point in each of as many layers of a dimension as there are points (McKay,
-    Beckman and Conover 1979).
+    A Latin hypercube divides each dimension into as many layers as there are points, with one point in each
+    layer (McKay, Beckman and Conover 1979).
     """
     random = np.random.default_rng(file.seed)
     shares: FloatArray = random.random((points, dimensions))

@@ -1,7 +1,7 @@
-"""Executors of the rows of a study: this process, several of this machine, or the workers of a Dask cluster.
+"""Executors for the rows of a study: this process, several processes, or the workers of a Dask cluster.
 
-The latter two are executors of `concurrent.futures`, which `Executor.rows` gives tasks of a few runs. Whoever
-computes a task reads the study again, by its `Job`, and returns an `Answer`; rows do not depend on who it is.
+`Executor.rows` submits tasks of a few runs to processes or a cluster and waits for their futures. A worker
+reads the study again from its `Job` and returns an `Answer`; rows do not depend on the worker.
 """
 
 from __future__ import annotations
@@ -29,43 +29,44 @@ if TYPE_CHECKING:
     from distributed import Client
 
 RUNS_A_PROCESS = 25
-"""A process takes as long to begin as some 25 short runs."""
+"""Smallest number of short runs per process: starting a process takes as long as about 25 of them."""
 
 LOCAL = "local"
-"""Stands for an address: a cluster of processes of this machine."""
+"""Address that stands for a cluster of processes on this machine."""
 
 TASK_SECONDS = 0.5
-"""Seconds of a task: about a hundred times the overhead of Dask, and the loss by a killed worker."""
+"""Duration of a task, s: about a hundred times the overhead of Dask; it is lost if a worker is killed."""
 
 TASKS_A_THREAD = 2
-"""Given to the cluster at a time: one is computed, the next one waits at the worker."""
+"""Submitted tasks per thread of the cluster: one is computed while the next waits at the worker."""
 
 CONNECT_SECONDS = 10.0
-"""After which a scheduler that does not answer counts as absent."""
+"""Time after which a scheduler that does not answer is considered absent, s."""
 
 CRITICAL = 50
-"""The level of messages of Python's `logging` from which on Dask prints its own."""
+"""Logging level from which on Dask prints messages."""
 
 Rows: TypeAlias = Callable[[Sequence[int]], Iterator[Row]]
-"""The rows of runs, in the order in which they are finished; raises what `Job.study` raises."""
+"""Function that yields the rows of runs in the order in which they finish; it raises as `Job.study`."""
 
 
 @contextmanager
 def executor(
     study: Study, runs: int, processes: int | None, dask: str | None, tell: Callable[[str], object]
 ) -> Iterator[Rows]:
-    """Return the executor of the rows of a study, for as long as the context lasts.
+    """Yield a function that computes the rows of a study, valid within the context.
 
     Args:
-        study: the study.
-        runs: how many are to be computed.
-        processes: how many compute on this machine; as many as pay if None.
-        dask: address of the scheduler of a Dask cluster whose workers compute instead, or "local" for one
-            of `processes` of this machine.
-        tell: receives sentences on delays.
+        study: study to compute.
+        runs: number of runs to compute.
+        processes: number of worker processes on this machine; chosen by the number of runs and CPU cores if
+            None.
+        dask: address of the scheduler of a Dask cluster to use instead, or "local" for a cluster of
+            `processes` on this machine.
+        tell: function to call with messages about delays.
 
     Raises:
-        InputError: there is no such cluster, or Dask is not installed.
+        InputError: the cluster does not answer, or Dask is not installed.
     """
     short = dask is None and study.file.optimize is None
     paying = 1 + runs // RUNS_A_PROCESS if short else runs
@@ -81,10 +82,10 @@ def executor(
 
 
 class Executor(ABC):
-    """Context manager around workers that compute tasks, as executors of `concurrent.futures` do.
+    """A context manager around workers that compute tasks, like the executors of `concurrent.futures`.
 
     Args:
-        study: whose runs.
+        study: study to compute.
     """
 
     def __init__(self, study: Study) -> None:
@@ -102,22 +103,22 @@ class Executor(ABC):
 
     @abstractmethod
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
-        """Take the next runs that go together; none while enough tasks are given."""
+        """Take the runs of the next task from those waiting; none while enough tasks are submitted."""
 
     @abstractmethod
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
-        """Give a task to a worker."""
+        """Submit a task to a worker."""
 
     @abstractmethod
     def reason(self, task: Future[Answer], error: Exception) -> str:
-        """Return the fate of the process whose task was lost.
+        """Return, as a clause, how the process of a lost task ended.
 
         Raises:
-            InputError: no other one would do better.
+            InputError: another process would fail as well.
         """
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
-        """See `Rows.rows`."""
+        """Yield the rows of runs in the order in which they finish; see `Rows`."""
         waiting, given = deque(runs), dict[Future[Answer], list[int]]()
         while waiting or given:
             while waiting and (task := self.next_task(waiting, len(given))):
@@ -139,12 +140,13 @@ class Executor(ABC):
 
 
 class Worker:
-    """A process and the thread that waits for it: if it is killed, no other task is lost.
+    """A process and the thread that waits for it; if it is killed, no other task is lost.
 
-    A `ProcessPoolExecutor` has named semaphores, which stay in the system if all is killed; a pipe does not.
+    A `ProcessPoolExecutor` has named semaphores, which remain in the system if everything is killed; a pipe
+    does not.
 
     Args:
-        job: which the process begins to read.
+        job: job that the process reads at its start.
     """
 
     def __init__(self, job: Job) -> None:
@@ -158,7 +160,7 @@ class Worker:
         self.task: Future[Answer] = Future()
 
     def compute(self, runs: Sequence[int]) -> Future[Answer]:
-        """Give it a task."""
+        """Submit runs to the process."""
         self.task = self._thread.submit(self._answer, runs)
         return self.task
 
@@ -170,7 +172,7 @@ class Worker:
         return found
 
     def end(self) -> None:
-        """End it at once."""
+        """Kill the process and close the connection."""
         self.process.kill()
         self.process.join()
         self._thread.shutdown()
@@ -178,11 +180,11 @@ class Worker:
 
 
 class Processes(Executor):
-    """Processes of this machine, each with one run at a time.
+    """Processes on this machine, each with one run at a time.
 
     Args:
-        study: whose runs.
-        count: how many.
+        study: study to compute.
+        count: number of processes.
     """
 
     def __init__(self, study: Study, count: int) -> None:
@@ -191,11 +193,11 @@ class Processes(Executor):
         self.workers: list[Worker] = []
 
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
-        """One run, which a process that is killed costs."""
+        """See `Executor.next_task`; a single run, so that a killed process loses no more."""
         return [waiting.popleft()] if given < self._count else []
 
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
-        """See `Executor.submit`; a process begins when there is a task for it."""
+        """See `Executor.submit`; processes start when there are tasks for them."""
         free = next((worker for worker in self.workers if worker.task.done()), None)
         if free is None or len(self.workers) < self._count:
             free = Worker(self._job)
@@ -204,7 +206,7 @@ class Processes(Executor):
         return free.compute(runs)
 
     def reason(self, task: Future[Answer], _error: Exception) -> str:
-        """See `Executor.reason`; the process goes, and another begins for the next task."""
+        """See `Executor.reason`; the process is removed, and another starts for the next task."""
         worker = next(each for each in self.workers if each.task is task)
         worker.end()
         self.workers.remove(worker)
@@ -217,23 +219,23 @@ class Processes(Executor):
 
 
 def _work(connection: Connection, job: Job) -> None:
-    """Read the study, then compute requested runs until there are none."""
+    """Read the study, then compute requested runs until the connection ends."""
     leave_interrupts_to_others()
-    with suppress(EOFError, OSError):  # whoever asked has gone
-        answer(job, ())  # what is wrong with it the first task says
+    with suppress(EOFError, OSError):  # the parent process has ended
+        answer(job, ())  # reads the study; the answer to the first task reports problems
         connection.send(True)
         while True:
             connection.send(answer(job, connection.recv()))
 
 
 class Cluster(Executor):
-    """The workers of a Dask cluster, which read the same files; one that is local lasts as long.
+    """The workers of a Dask cluster, which must see the same files; a local cluster ends with the context.
 
     Args:
-        study: whose runs.
-        address: of the scheduler, or `LOCAL`.
-        processes: workers of a local cluster.
-        tell: receives sentences on delays.
+        study: study to compute.
+        address: address of the scheduler, or `LOCAL`.
+        processes: number of workers of a local cluster.
+        tell: function to call with messages about delays.
     """
 
     def __init__(self, study: Study, address: str, processes: int, tell: Callable[[str], object]) -> None:
@@ -241,7 +243,7 @@ class Cluster(Executor):
         self._address, self._processes, self._tell = address, processes, tell
 
     def __enter__(self) -> Self:
-        """Connect.
+        """Connect to the cluster.
 
         Raises:
             InputError: Dask is not installed, or no scheduler answers.
@@ -278,7 +280,7 @@ class Cluster(Executor):
             raise InputError.one(f"--dask {self._address}: {error}; {expected}") from None
 
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
-        """Runs of some time, but so few that the last tasks end together."""
+        """See `Executor.next_task`; about `TASK_SECONDS` of runs, fewer at the end to end together."""
         tasks = TASKS_A_THREAD * max(1, sum(self._client.nthreads().values()))
         count = min(1 + len(waiting) // tasks, max(1, int(TASK_SECONDS / self._seconds_a_run)), len(waiting))
         return [waiting.popleft() for _ in range(count)] if given < tasks else []
@@ -303,21 +305,25 @@ class Cluster(Executor):
         ) from error
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
-        """See `Rows.rows`."""
+        """See `Executor.rows`.
+
+        Raises:
+            InputError: the connection to the scheduler was lost.
+        """
         try:
             yield from super().rows(runs)
         except InputError:
             raise
-        except Exception as error:  # which one it is depends on what was asked when the scheduler went
+        except Exception as error:  # its type depends on the request during which the scheduler was lost
             if self._client.status == "running" and not isinstance(error, OSError | CancelledError):
                 raise
             raise InputError.one(f"the connection to the scheduler {self._address} was lost") from error
 
 
 def _compute() -> Callable[[Sequence[Any], Sequence[int]], Answer]:
-    """Return what a task does: a function within a function, since Dask sends such a one as code.
+    """Return the function of a task, nested so that Dask sends it as code.
 
-    One that is sent by its name ends workers that do not have the module, before they could say so.
+    A function sent by name would end workers without this module before they could report it.
     """
 
     def compute(job: Sequence[Any], runs: Sequence[int]) -> Answer:

@@ -1,8 +1,8 @@
-"""Rows that are finished, in a file that is only ever added to: whatever ends the study, they stay.
+"""The journal of finished rows, an append-only file that survives any end of the study.
 
-The first line says that the file is a journal. Each further line holds the checksum of its rest, the key of
-the row, and the row. The remainder of a last line after a kill or a full disk is cut off when the journal is
-opened again; damaged lines before it are passed over.
+The first line identifies the file as a journal. Each further line has a checksum of the rest, the key of the
+row, and the row. An incomplete last line, after a kill or a full disk, is cut off when the journal is opened
+again; damaged lines before it are skipped.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from vsacli.base.storage import reason, reporting_storage_errors
 from vsacli.studies.sweeps.rows import Row
 
 FIRST_LINE = b"vsacli-study-journal/1\n"
-"""Without it a file is somebody else's, whatever it is called."""
+"""First line of a journal; a file without it is not overwritten."""
 
 SYNC_SECONDS = 1.0
-"""Interval at which rows are forced to the disk: the loss by a power failure; a kill loses none."""
+"""Interval at which rows are forced to the disk, s: a power failure loses no more, a kill loses nothing."""
 
 
 class Journal:
-    """Context manager that holds a journal open, and locked where the system can; an empty one is removed.
+    """A context manager that keeps a journal open, and locked if the system can; it removes an empty one.
 
     Args:
-        path: of the journal; it is made if it does not exist.
+        path: path of the journal, which is created if it does not exist.
 
     Attributes:
-        path: the same.
-        damaged: numbers of the lines, from 1, that hold no row although they were written whole.
+        path: path of the journal.
+        damaged: numbers of damaged lines, from 1.
 
     Raises:
-        StorageError: it cannot be opened, is no journal, or another process works with it.
+        StorageError: the file cannot be opened, is not a journal, or another process uses it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -79,7 +79,11 @@ class Journal:
         return len(self._places)
 
     def _lock(self) -> None:
-        """Refuse a journal that another process works with, where the system has locks."""
+        """Lock the journal, if the system has locks.
+
+        Raises:
+            StorageError: another process uses the journal.
+        """
         try:
             import fcntl
 
@@ -92,10 +96,10 @@ class Journal:
             pass  # a system or file system without locks
 
     def _index(self) -> None:
-        """Find the rows; the end of a line that was being written is cut off.
+        """Find the rows, and cut off an incomplete last line.
 
         Raises:
-            StorageError: the file is no journal; it stays as it is.
+            StorageError: the file is not a journal; it is left unchanged.
         """
         with open(self._file, "rb", closefd=False) as file:
             self._check_first_line(file.readline(len(FIRST_LINE)))
@@ -112,7 +116,7 @@ class Journal:
         os.ftruncate(self._file, self._end)
 
     def _check_first_line(self, line: bytes) -> None:
-        """Begin a journal in an empty file, or in one whose beginning a kill cut off."""
+        """Check the first line; write it to a file that is empty, or has only a part of it after a kill."""
         if line == FIRST_LINE:
             return
         if not FIRST_LINE.startswith(line):
@@ -132,7 +136,7 @@ class Journal:
         """Add a row.
 
         Raises:
-            StorageError: the disk is full or fails; the rows before stay.
+            StorageError: the disk is full or fails; previous rows are kept.
         """
         line = _line(row)
         try:
@@ -152,10 +156,10 @@ class Journal:
         self._end += len(line)
 
     def row(self, run: int, key: str) -> Row:
-        """Return the row of a run that is there.
+        """Return the row of a run.
 
         Raises:
-            KeyError: it is not.
+            KeyError: the journal does not have it.
         """
         start, size = self._places[key]
         os.lseek(self._file, start, os.SEEK_SET)
@@ -164,7 +168,7 @@ class Journal:
         return Row(run, key, content["verdict"], content["error"], values, curves)
 
     def remove(self) -> None:
-        """Remove the file, whose rows are kept elsewhere."""
+        """Remove the file."""
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
 
@@ -172,7 +176,7 @@ class Journal:
 _ARRAYS = ("values", "curves")
 
 _CHECK = 8
-"""Hexadecimal digits of a checksum."""
+"""Number of hexadecimal digits of a checksum."""
 
 
 _BEGINNING = re.compile(rb'[0-9a-f]{8} \{"key": ')
@@ -186,10 +190,8 @@ def _line(row: Row) -> bytes:
 
 
 def _row_in(line: bytes) -> tuple[int, str]:
-    """Return the start of the row at the end of a line, and its key; no key without such a row.
-
-    A line whose break is damaged is followed by a row that is whole.
-    """
+    """Return the start of the row at the end of a line, and its key; "" if the line has no valid row."""
+    # if the line break before a row is damaged, the row is intact but does not start its line
     for start in (0, *(found.start() for found in _BEGINNING.finditer(line, 1))):
         text = line[start + _CHECK + 1 : -1]
         if line[start : start + _CHECK] == b"%08x" % zlib.crc32(text):

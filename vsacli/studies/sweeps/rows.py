@@ -1,6 +1,6 @@
-"""The row of a run: its kept values, or why it could not be computed; and tasks of several runs.
+"""The row of a run: its kept values, or the reason why there are none; and tasks of several runs.
 
-A task is computed by another process, here or on another machine, which reads the study again by its `Job`.
+Another process, here or on another machine, computes a task; it reads the study again from its `Job`.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ IMPOSSIBLE = "impossible"
 """Verdict of a run without a feasible optimum."""
 
 LOST = "the process that computed it"
-"""Beginning of the error of a run that was lost with its process."""
+"""Prefix of the error of a run that was lost with its process."""
 
 
 class Row(NamedTuple):
     """The row of a run.
 
     Attributes:
-        run: its number.
-        key: of all that it depends on.
-        verdict: of its report, or `FAILED`, or `IMPOSSIBLE`.
-        error: the reason of the latter two, else empty.
-        values: costs of the optimum, if there is one, and the kept columns, (columns,); empty if there is
-            nothing of which they could be.
+        run: number of the run.
+        key: digest of everything that the row depends on.
+        verdict: verdict of the report, `FAILED` or `IMPOSSIBLE`.
+        error: reason for `FAILED` or `IMPOSSIBLE`; otherwise empty.
+        values: costs of the optimum, if there is one, and the kept columns, (columns,); empty without a
+            report.
         curves: columns over time, flat; see `Recorder`.
     """
 
@@ -60,7 +60,7 @@ class Row(NamedTuple):
 
     @property
     def lost(self) -> bool:
-        """Whether it went with the process that computed it, so that another trial may do."""
+        """Whether the run was lost with its process, so that another attempt may succeed."""
         return self.error.startswith(LOST)
 
 
@@ -79,10 +79,9 @@ def lost(study: Study, run: int, how: str) -> Row:
 
 
 class Computer:
-    """Computes runs of a study, one after the other.
+    """Computation of the runs of a study, one after the other.
 
-    Equal inputs of consecutive runs are read once: the trajectory, as long as neither it nor who it is
-    for changes.
+    The trajectory is read again only if it, or the robot's joints, differ from those of the previous run.
     """
 
     def __init__(self, study: Study) -> None:
@@ -90,10 +89,10 @@ class Computer:
         self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
 
     def row(self, run: int) -> Row:
-        """Return the row of a run; no error of the run is raised.
+        """Return the row of a run; errors of the run become part of the row.
 
         Raises:
-            ChangedError: a file has changed.
+            ChangedError: a file of the study has changed.
         """
         point = self._study.point(run)
         key = self._study.key(point)
@@ -139,13 +138,13 @@ class Computer:
 
 
 class Job(NamedTuple):
-    """A study as another process reads it again, on this machine or on another one.
+    """A description of a study by which another process, perhaps on another machine, reads it again.
 
     Attributes:
-        path: of the study file.
-        engine: that computes.
-        computed_by: versions of all that rows depend on, and their names.
-        fingerprint: of the study.
+        path: absolute path of the study file.
+        engine: name of the engine.
+        computed_by: names and versions of the software that rows depend on.
+        fingerprint: fingerprint of the study.
     """
 
     path: str
@@ -155,16 +154,15 @@ class Job(NamedTuple):
 
     @classmethod
     def of(cls, study: Study) -> Self:
-        """Return that of a study, whose path does not depend on the working folder."""
+        """Return the job of a study."""
         path = os.path.abspath(study.source.path)
         return cls(path, study.engine, tuple(study.computed_by.items()), study.fingerprint)
 
     def study(self) -> Study:
-        """Read the study here.
+        """Read the study in this process.
 
         Raises:
-            InputError: it cannot be read here, what computes here is not what computes there, or a file has
-                another content here.
+            InputError: the study cannot be read here, versions differ, or a file has another content here.
         """
         study = load_study(self.path, self.engine)
         differing = [
@@ -182,7 +180,7 @@ class Job(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Result of a task: the seconds that it took, and rows of its runs, or problems why there are none."""
+    """The result of a task: its duration, s, and the rows of its runs, or the problems that prevent them."""
 
     seconds: float
     rows: tuple[Row, ...] = ()
@@ -190,7 +188,7 @@ class Answer(NamedTuple):
 
 
 def answer(job: Job, runs: Sequence[int]) -> Answer:
-    """Compute the rows of runs here."""
+    """Compute the rows of runs in this process."""
     try:
         computer = _computer(job, threading.get_ident())
         begin = time.perf_counter()
@@ -202,5 +200,5 @@ def answer(job: Job, runs: Sequence[int]) -> Answer:
 
 @lru_cache(maxsize=4)
 def _computer(job: Job, _thread: int) -> Computer:
-    """Return the computer of a thread, kept for its next tasks: threads share none."""
+    """Return the computer of a thread, cached for its next tasks; threads do not share one."""
     return Computer(job.study())

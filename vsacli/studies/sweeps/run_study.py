@@ -1,4 +1,4 @@
-"""Execution of a study: missing rows are computed and kept in the journal, then all become a table."""
+"""Execution of a study: missing rows are computed and added to the journal, then all become a table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vsacli.studies.sweeps.study import Study, load_study
 from vsacli.studies.sweeps.study_tables import write
 
 MOST_LINES_NAMED = 5
-"""Damaged lines of a journal up to which all are named."""
+"""Largest number of damaged lines of a journal that a message lists."""
 
 
 def run_study(
@@ -34,32 +34,32 @@ def run_study(
     progress: Progress = unseen,
     tell: Callable[[str], object] = unheard,
 ) -> StoredStudy:
-    """Compute the runs of a study file, and write a table with a row for each.
+    """Compute the runs of a study file, and write a table with one row per run.
 
-    Finished rows are kept in a journal beside the table until that is written. Whatever ends the study, the
-    same call goes on with the missing rows.
+    Finished rows are kept in a journal next to the table until the table is written. If the study is
+    interrupted, the same call continues with the missing rows.
 
     Args:
-        path: the study file.
-        table: the HDF5 file to write; by default as the study file is called, in the working folder.
-        shard: which part of how many is computed, such as (2, 8).
-        processes: how many compute; by default one a processor. Rows do not depend on it. A script that calls
-            this with more than one needs `if __name__ == "__main__":`, as the module `multiprocessing` says.
-        dask: address of the scheduler of a Dask cluster that computes instead, or "local".
-        engine: the backend, "numpy" or compiled "c", or "auto", which takes the latter for all runs where
-            that saves time.
-        overwrite: whether a table that exists may be replaced.
-        command_line: of the caller, for the provenance.
-        progress: opens a bar over the runs that are missing.
-        tell: receives the number of kept rows, and losses.
+        path: path of the study file.
+        table: HDF5 file to write; by default it has the name of the study file, in the working folder.
+        shard: part to compute and number of parts, such as (2, 8).
+        processes: number of worker processes; default: number of CPU cores, or fewer for short studies. Rows
+            do not depend on it. A script that uses more than one needs `if __name__ == "__main__":`; see
+            the module `multiprocessing`.
+        dask: address of the scheduler of a Dask cluster to use instead, or "local".
+        engine: "numpy", compiled "c", or "auto", which chooses "c" for all runs if that saves time.
+        overwrite: whether an existing table may be replaced.
+        command_line: command line of the caller, for the provenance.
+        progress: function that opens a progress bar over the missing runs.
+        tell: function to call with messages about kept and lost rows.
 
     Returns:
-        The table, open; a context manager that closes it.
+        Open table, a context manager that closes it.
 
     Raises:
-        InputError: a file is wrong, or nobody can compute.
+        InputError: a file is wrong, or no worker can compute.
         StorageError: the table exists and must not be replaced, or the disk is full or fails.
-        TypeError: path is of another type.
+        TypeError: `path` is of another type.
     """
     check_path(path, "run_study(path)")
     study = load_study(path, engine)
@@ -84,7 +84,7 @@ def run_study(
 
 
 def _part(study: Study, number: int, parts: int) -> tuple[range, str]:
-    """Return the runs of a part of a study, and the ending of the name of its table."""
+    """Return the runs of a part of a study, and the suffix for the name of its table."""
     if not 1 <= number <= parts:
         raise InputError.one(
             f"shard must be the number of a part and how many there are, not {(number, parts)}"
@@ -111,7 +111,7 @@ def _computed(
     progress: Progress,
     tell: Callable[[str], object],
 ) -> dict[int, Row]:
-    """Compute rows missing in the journal; the rows of runs that were lost with their processes."""
+    """Compute rows missing in the journal; return the rows of runs that were lost with their processes."""
     missing = [run for run in runs if study.key(study.point(run)) not in journal]
     if len(missing) < len(runs):
         tell(f"{len(runs) - len(missing):,} of {len(runs):,} runs are in {journal.path} already")
@@ -122,20 +122,20 @@ def _computed(
 
 
 def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object]) -> dict[int, Row]:
-    """Add rows to the journal as they come.
+    """Add rows to the journal as they arrive.
 
     Args:
-        rows: of further runs.
-        journal: gets them.
-        done: is told how many further runs are done.
+        rows: rows of further runs.
+        journal: journal to extend.
+        done: function to call with the number of further runs that are done.
 
     Returns:
-        The rows of runs that were lost with their process, by run, which the journal does not get: another
-        trial may do.
+        Rows of runs that were lost with their process, by run. They are not in the journal, since another
+        attempt may succeed.
 
     Raises:
         InputError: a process cannot read the study as it was.
-        StorageError: the disk is full or fails; the rows before are in the journal.
+        StorageError: the disk is full or fails; previous rows are in the journal.
     """
     lost = {}
     for row in rows:
@@ -149,7 +149,7 @@ def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object])
 
 @contextmanager
 def _telling_what_is_kept(journal: Journal, tell: Callable[[str], object]) -> Iterator[None]:
-    """Report, when the study ends early, the rows that are kept."""
+    """Report the kept rows if the study ends early."""
     try:
         yield
     except BaseException:

@@ -1,4 +1,4 @@
-"""A study as it is computed: files, dimensions, values of each run, and the backend of all of them."""
+"""A study as it is computed: its files, its dimensions, the values of each run, and the engine."""
 
 from __future__ import annotations
 
@@ -34,18 +34,19 @@ from vsacli.trajectory.file import load_trajectory
 def settled_engine(
     name: str, robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> Settled:
-    """Return the engine of a study. Code is compiled for each robot, so it pays by the runs that each has.
+    """Return the engine of a study.
 
     Args:
-        name: as of `settle`.
-        robot: as in its file.
-        trajectories: paths of their files.
-        dimensions: the varied quantities.
-        design: the points of each trajectory.
+        name: name of the engine, see `settle`.
+        robot: robot as in its file.
+        trajectories: paths of the trajectory files.
+        dimensions: varied quantities.
+        design: points for each trajectory.
 
     Raises:
-        InputError: there is no such engine, or no C compiler for it.
+        InputError: the engine is unknown, or its C compiler is missing.
     """
+    # C code is compiled for each robot, so it pays if each robot has enough samples
     samples = _samples(robot, trajectories, dimensions, design) if name == "auto" else 0
     return settle(name, InverseDynamics(robot), samples)
 
@@ -53,14 +54,14 @@ def settled_engine(
 def _samples(
     robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> int:
-    """Return the samples of the runs of one robot, if all last as the first along each trajectory."""
+    """Return the samples in all runs of one robot, assuming those of the first run of each trajectory."""
     changes = divided(design.values(0)).trajectory
     robots = design.different([each for each in dimensions if divided({each.path: None}).robot])
     return sum(_steps(path, robot, changes) for path in trajectories) * design.points // robots
 
 
 def _steps(path: str, robot: Robot, changes: Changes) -> int:
-    """Return the samples of the first run, or of the file if that cannot be computed."""
+    """Return the samples of the first run, or of the file if the changes do not fit."""
     try:
         return load_trajectory(path, robot, changes).samples
     except InputError:
@@ -68,18 +69,18 @@ def _steps(path: str, robot: Robot, changes: Changes) -> int:
 
 
 class ChangedError(InputError):
-    """A file has changed since the study was read."""
+    """Error: a file has changed since the study was read."""
 
 
 class Point(NamedTuple):
-    """The inputs of a run: the trajectory by its index, and the value of each dimension by path."""
+    """The inputs of a run: the index of the trajectory, and the value of each dimension by path."""
 
     trajectory: int
     values: dict[str, Any]
 
     @property
     def changes(self) -> Divided:
-        """The values by the file that they are for."""
+        """Values divided into those for the robot file and those for the trajectory file."""
         return divided(self.values)
 
 
@@ -89,15 +90,15 @@ class Study:
 
     Attributes:
         file: content of the study file.
-        source: the study file.
-        read: the robot file.
-        robot: its content, without changes.
+        source: study file as read.
+        read: robot file as read.
+        robot: robot without changes.
         trajectories: paths of the trajectory files.
-        trajectory_sources: the files of each that were read.
-        dimensions: the varied quantities.
-        design: which values each run has.
-        engine: the backend, "numpy" or "c".
-        compiler: of the latter, else empty.
+        trajectory_sources: files that were read for each trajectory.
+        dimensions: varied quantities.
+        design: combination of values for each run.
+        engine: engine, "numpy" or "c".
+        compiler: C compiler of the engine; otherwise empty.
     """
 
     file: StudyFile
@@ -133,7 +134,7 @@ class Study:
 
     @property
     def sources(self) -> list[Source]:
-        """Every file that was read, each once."""
+        """All files that were read, without duplicates."""
         files = (
             self.source,
             *self.robot.sources,
@@ -142,13 +143,13 @@ class Study:
         return list(dict.fromkeys(files))
 
     def point(self, run: int) -> Point:
-        """Return the inputs of a run; those of one trajectory are consecutive."""
+        """Return the inputs of a run; runs of one trajectory are consecutive."""
         trajectory, point = divmod(run, self.design.points)
         return Point(trajectory, self.design.values(point))
 
     @cached_property
     def digest(self) -> str:
-        """Digest of all that the rows of the study depend on, apart from the values of a run; in hex."""
+        """Hexadecimal digest of everything that rows depend on, except trajectory and values of a run."""
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
         curves = [self.file.every, *(each.name for each in self.over_time)]
@@ -158,7 +159,7 @@ class Study:
 
     @property
     def computed_by(self) -> dict[str, str]:
-        """Backend and versions, by words for them: with others rows may differ in the last digit."""
+        """Engine and versions, by name; with others, rows may differ in the last digit."""
         return {
             "vsacli": __version__,
             "NumPy": np.__version__,
@@ -168,12 +169,12 @@ class Study:
 
     @property
     def fingerprint(self) -> str:
-        """Digest of the study as a whole, with all its files and its backend; in hex."""
+        """Hexadecimal digest of the whole study, with all its files and its engine."""
         return _digest([self.digest, [source.sha256 for source in self.sources]])
 
     @cached_property
     def _named_files(self) -> dict[str, str]:
-        """SHA-256 of each file that a listed value names, beside the robot or a trajectory, by path."""
+        """SHA-256, by path, of files that listed values name relative to the robot or a trajectory."""
         folders = {Path(each).parent for each in (self.robot.sources[0].path, *self.trajectories)}
         texts = (text for each in self.dimensions for value in each.values for text in _texts_in(value))
         files = (file for text in texts for file in sorted(folder / text for folder in folders))
@@ -181,24 +182,24 @@ class Study:
 
     @cached_property
     def _known(self) -> dict[str, str]:
-        """SHA-256 of every file that rows depend on, by path."""
+        """SHA-256 of all files that rows depend on, by path."""
         return self._named_files | {source.path: source.sha256 for source in self.sources}
 
     def check_read(self, sources: Iterable[Source]) -> None:
-        """Refuse to compute with files that were read again and have changed.
+        """Check that files that were read again have not changed.
 
         Raises:
-            ChangedError: one has another content than when the study was read.
+            ChangedError: a file has changed since the study was read.
         """
         for source in sources:
             if self._known.get(source.path, source.sha256) != source.sha256:
                 raise _changed(source.path)
 
     def check_files(self) -> None:
-        """Refuse to go on if a file has changed.
+        """Check that no file of the study has changed.
 
         Raises:
-            ChangedError: one has another content than when the study was read, or has gone.
+            ChangedError: a file has changed since the study was read, or is missing.
         """
         for path, sha256 in self._known.items():
             try:
@@ -209,7 +210,7 @@ class Study:
                 raise _changed(path)
 
     def as_named(self, error: InputError) -> InputError:
-        """Return the error with file names relative to the study, equal wherever it is computed."""
+        """Return the error with file names relative to the study, so that it is equal on every machine."""
         folder = Path(self.source.path).parent
         return InputError(
             problem._replace(file=str(Path(problem.file).relative_to(folder)))
@@ -219,7 +220,7 @@ class Study:
         )
 
     def key(self, point: Point) -> str:
-        """Return the digest of all that a row depends on; in hex."""
+        """Return the hexadecimal digest of everything that a row depends on."""
         trajectory = [source.sha256 for source in self.trajectory_sources[point.trajectory]]
         return _digest([self.digest, trajectory, point.values])
 
@@ -246,8 +247,8 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     """Read a study, its robot and its trajectories.
 
     Raises:
-        InputError: with every problem of the first file that has some; or there is no such engine, or no C
-            compiler for it.
+        InputError: a file is wrong (with every problem of the first such file), the engine is unknown, or its
+            C compiler is missing.
     """
     file, source = read_document(path, StudyFile, FORMAT)
     folder = Path(source.path).parent

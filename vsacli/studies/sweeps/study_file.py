@@ -1,4 +1,4 @@
-"""Study files, `vsacli-study/1`: their declarations, ways of varying, and the optimization of each run."""
+"""Study files, `vsacli-study/1`: their fields, the forms of variation, and the optimization of each run."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ FORMS = (
 
 
 class Listed(NamedTuple):
-    """Values one by one, as in files."""
+    """A list of values, as in files."""
 
     values: tuple[Any, ...]
 
 
 class Spaced(NamedTuple):
-    """Numbers from the first to the last, evenly or by equal factors; texts as written."""
+    """Numbers from first to last, linearly or logarithmically spaced; texts as written."""
 
     shape: str
     first: str
@@ -65,13 +65,13 @@ class Spaced(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A distribution, of each number that the path fits on its own; the node is as of `distribution`."""
+    """A distribution for each number that the path matches; see `distribution` for the node."""
 
     node: Node
 
 
 class Ranged(NamedTuple):
-    """Numbers between two, all as likely; texts as written."""
+    """A uniform distribution between two numbers; texts as written."""
 
     least: str
     largest: str
@@ -165,7 +165,7 @@ def _text(node: Node, form: str) -> str:
 STIFFNESS, TIMING = "stiffness", "timing"
 MINIMIZED = ("torque", "energy", "copper", "peak", TIME)
 VARIED = (STIFFNESS, TIMING, "both")
-"""The words of `vsacli optimize`; with the optimisation itself they would take long to load."""
+"""Words of `vsacli optimize`, repeated here because importing the optimization is slow."""
 
 _MARGIN = Check(
     lambda share: SINGULAR_MARGIN < share < 1,
@@ -177,7 +177,7 @@ _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
 
 @dataclass(frozen=True)
 class Optimised:
-    """The optimization of each run, by names and defaults of the options of `vsacli optimize`."""
+    """The optimization of each run, with the names and defaults of the options of `vsacli optimize`."""
 
     minimize: str = choice(
         MINIMIZED,
@@ -220,7 +220,7 @@ class Optimised:
         return optimize(robot, trajectory, self.minimize, self.varied, margin=self.margin, seed=self.seed)
 
     def costs_of(self, optimum: Optimum) -> list[FloatArray]:
-        """Return the values of the costs in a run; NaN of joints for which nothing is chosen."""
+        """Return the costs of a run before and after; NaN for joints without an optimum."""
         found = map(optimum.joints.get, optimum.robot.joint_names)
         each = list(found) if optimum.timing is None else [optimum.timing]
         return [
@@ -230,7 +230,7 @@ class Optimised:
 
     @property
     def costs(self) -> tuple[Column, Column]:
-        """Columns of the table for it."""
+        """Columns of the table for the costs."""
         dims, quantity, words = self._cost
         return (
             Column("cost_before", dims, quantity, f"{words} as commanded"),

@@ -1,4 +1,4 @@
-"""Tables of a study: written from the rows in its journal, or put together from the tables of its parts."""
+"""Tables of a study: written from the rows in its journal, or merged from the tables of its parts."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def write(
     """Write the table of runs.
 
     Args:
-        study: the study.
-        runs: in their order.
-        lost: rows that are not in the journal.
-        journal: has the others.
-        file: where the table is staged.
+        study: study of the runs.
+        runs: numbers of the runs, in order.
+        lost: rows that are not in the journal, by run.
+        journal: journal with the other rows.
+        file: staged file of the table.
         **provenance: further root attributes.
 
     Raises:
@@ -56,7 +56,7 @@ def write(
         return lost[run] if run in lost else journal.row(run, study.key(study.point(run)))
 
     steps = 0
-    if study.over_time:  # known once all rows were read
+    if study.over_time:  # the longest run determines the size, so all rows are read first
         steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
     at_once = rows_at_once(steps)
     with StudyWriter(file, _head_of_study(study, steps, provenance), len(runs)) as writer:
@@ -120,21 +120,21 @@ def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
 
 
 MOST_NAMED = 5
-"""Runs that a message names."""
+"""Largest number of runs that a message lists."""
 
 
 def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
-    """Write the whole table of a study from parts that have all its runs between them.
+    """Merge tables of parts, which together have all runs, into the whole table of a study.
 
     A run that failed in one part and not in another counts as computed.
 
     Args:
-        paths: the parts.
-        file: where the whole is staged.
-        **provenance: root attributes in place of those of the parts.
+        paths: paths of the parts.
+        file: staged file of the whole table.
+        **provenance: root attributes that replace those of the parts.
 
     Raises:
-        InputError: they are parts of different studies, or some runs are in none of them.
+        InputError: the parts belong to different studies, or some runs are in none of them.
         StorageError: the disk is full or fails.
     """
     with ExitStack() as stack:
@@ -160,7 +160,7 @@ def _check_alike(parts: Sequence[StoredStudy]) -> None:
 
 
 def _order(parts: Sequence[StoredStudy]) -> IndexArray:
-    """Return the place of each run among all rows of the parts, one part after the other."""
+    """Return the index of each run's row in the concatenated parts."""
     runs = np.concatenate([part.read("run") for part in parts])
     lost = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
     order = np.full(parts[0].runs, -1)
@@ -174,7 +174,7 @@ def _order(parts: Sequence[StoredStudy]) -> IndexArray:
 
 
 def _arrays(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
-    """Return all columns of some runs, whose rows are those among all rows of the parts."""
+    """Return all columns of some runs; `rows` are indices into the concatenated parts."""
     first = parts[0]
     texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}
     arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in texts}
@@ -192,7 +192,7 @@ def _arrays(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[
 def _fill(
     arrays: dict[str, Any], texts: Collection[str], here: IndexArray, part: StoredStudy, rows: IndexArray
 ) -> None:
-    """Put rows of a part in their places; those that have fewer steps than others end with NaN."""
+    """Copy rows of a part to their places; runs with fewer samples than others end with NaN."""
     span = slice(int(rows.min()), int(rows.max()) + 1)
     for name, array in arrays.items():
         found = np.array(part.texts(name, span), dtype=object) if name in texts else part.read(name, span)

@@ -1,4 +1,4 @@
-"""Summary of a study in a few lines, and as JSON."""
+"""Summary of a study as text and as JSON."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from vsacli.results.store.study_table import StoredStudy
 from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
 
 MOST_ERRORS = 3
-"""Failed runs that the text names."""
+"""Largest number of failed runs that the text lists."""
 
 
 MOST_NUMBERS = 3
-"""Most parameters shown with a run; the table has the others."""
+"""Largest number of parameters shown with a run; the table has them all."""
 
 
 @dataclass(frozen=True)
 class Failure(Stored):
-    """A run that could not be computed: its number, and why."""
+    """A run that could not be computed: its number and the reason."""
 
     run: int
     error: str
@@ -34,9 +34,9 @@ class Extreme(Stored):
 
     Attributes:
         joint: name of the joint.
-        margin: relative.
-        run: its number.
-        at: varied values, as texts by path.
+        margin: smallest relative margin.
+        run: number of the run.
+        at: varied values as text, by path.
     """
 
     joint: str
@@ -50,11 +50,11 @@ class StudySummary(Stored):
     """The findings of a study.
 
     Attributes:
-        study, robot: names.
-        runs: in the table.
-        verdicts: how many runs have each verdict.
+        study, robot: names of study and robot.
+        runs: number of runs in the table.
+        verdicts: number of runs by verdict.
         failures: runs that could not be computed.
-        worst: the smallest margin of each joint that has one.
+        worst: smallest margin of each joint that has one.
     """
 
     study: str
@@ -119,7 +119,7 @@ def _worst(table: StoredStudy) -> list[Extreme]:
 
 
 def _shown(table: StoredStudy, row: int) -> dict[str, str]:
-    """Return the values of a row that are not equal in all."""
+    """Return the values of a row that differ between rows."""
     shown = {}
     for path in (*table.parameters, "trajectory"):
         is_text = table.parameter_is_text(path)

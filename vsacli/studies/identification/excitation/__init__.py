@@ -1,4 +1,4 @@
-"""Excitation trajectories, planned so that records of them tell the numbers of the robot."""
+"""Excitation trajectories, planned so that recordings of them identify the parameters of the robot."""
 
 from vsacli.studies.identification.excitation.fisher import USUAL_NOISE, Noise
 from vsacli.studies.identification.excitation.plan import TRIALS, plan_excitation

@@ -1,8 +1,8 @@
 """Excitation trajectories of a family: sums of sinusoids for position and stiffness, from rest to rest.
 
-`allowed` gives the range of each joint: the limits of the robot, cautious ones where it has none. A
-`Design` makes members of its family from numbers, and `feasible` makes each as small as the limits of
-torques, currents and the like require.
+`allowed` gives the range of each joint: the limits of the robot, or cautious ones if it has none. A `Design`
+makes members of its family from parameters, and `feasible` scales each down as the limits of torques,
+currents and other variables require.
 """
 
 from __future__ import annotations
@@ -33,29 +33,30 @@ from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.05
-"""Relative distance that an excitation keeps from each limit and from the ends of stiffness corridors, as far
-as a robot that is not known yet may be off; the paper's own example keeps 6 % from its corridor."""
+"""Relative distance that an excitation keeps from each limit and from the ends of the attainable stiffness:
+an allowance for errors of unidentified parameters; the paper's own example keeps 6 % from these ends."""
 
 USUAL_REACH = {"revolute": np.pi / 4, "prismatic": 0.1}
-"""Either way from the middle, rad and m, of joints whose range nobody gave."""
+"""Range in either direction of joints without position limits, rad and m."""
 
 USUAL_SPEED = {"revolute": 1.0, "prismatic": 0.25}
-"""Rad/s and m/s of joints whose velocity has no limit; 0.25 m/s is the reduced speed of ISO 10218-1."""
+"""Speed of joints without velocity limit, rad/s and m/s; 0.25 m/s is the reduced speed of ISO 10218-1."""
 
 USUAL_STIFFENING = 2.0
-"""Largest stiffness over the least that carries the load, where nothing else bounds it."""
+"""Ratio of maximum to minimum stiffness if nothing else bounds the maximum."""
 
 SPREAD = 100.0
-"""Ratio of both ends of a corridor from which on the upper one bounds nothing: a four-bar comes to 1e9."""
+"""Ratio of the ends of the attainable stiffness above which the upper one is no bound: for a four-bar it is
+1e9."""
 
 
 class Allowed(NamedTuple):
-    """Bounds of all joints, the margins taken off.
+    """Bounds of all joints, reduced by `MARGIN`.
 
     Attributes:
-        lowest, highest: positions, (joints,), rad (m).
-        speed: largest velocity either way, (joints,), rad/s (m/s).
-        assumptions: where the robot has no limit, one sentence each.
+        lowest, highest: smallest and largest positions, (joints,), rad (m).
+        speed: largest speed in either direction, (joints,), rad/s (m/s).
+        assumptions: assumptions in place of missing limits, as sentences.
     """
 
     lowest: FloatArray
@@ -68,8 +69,8 @@ def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
     """Return the allowed ranges of a robot's joints.
 
     Args:
-        robot: the robot.
-        middle: about which joints move whose range is not known, (joints,); zero if None.
+        robot: robot with limits.
+        middle: positions about which joints without position limits move, (joints,); zero if None.
     """
     about = np.zeros(len(robot.joints)) if middle is None else middle
     words = "zero" if middle is None else "its middle in the motion given"
@@ -82,7 +83,7 @@ def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
 
 
 def _range(joint: Joint, middle: float) -> tuple[float, float]:
-    """Positions; an end that is not limited lies as far off the middle, or the other end, as is usual."""
+    """Return the position range of a joint; a missing limit is `USUAL_REACH` from the middle or further."""
     lower, upper = joint.limits.position
     reach = USUAL_REACH[joint.type]
     if not np.isfinite(lower):
@@ -94,7 +95,7 @@ def _range(joint: Joint, middle: float) -> tuple[float, float]:
 
 
 def _assumptions(robot: Robot, middle: str) -> Iterator[str]:
-    """One clause for all joints that lack the same."""
+    """Yield a clause for each kind of missing limit, with all joints that lack it."""
     places: dict[str, list[str]] = {}
     for joint in robot.joints:
         for lacking in _lacking(joint, middle):
@@ -104,7 +105,7 @@ def _assumptions(robot: Robot, middle: str) -> Iterator[str]:
 
 
 def _lacking(joint: Joint, middle: str) -> Iterator[str]:
-    """Missing limits of a joint, each with its assumption."""
+    """Yield the missing limits of a joint, each with its assumption."""
     position, velocity = units.POSITION.unit(joint.type), units.VELOCITY.unit(joint.type)
     if not np.isfinite(joint.limits.position).all():
         reach = f"{USUAL_REACH[joint.type]:.3g} {position} either way from {middle} assumed"
@@ -119,37 +120,38 @@ def _lacking(joint: Joint, middle: str) -> Iterator[str]:
 
 
 LEAST_SHARE = 0.1
-"""Share of the largest stiffness that it does not fall below where springs may go slack."""
+"""Smallest stiffness as a share of the largest, for springs that may go slack."""
 
 HARMONICS = 5
 """Harmonics of each signal of a joint, as in Swevers et al. (1997)."""
 
 RATE = 1000.0
-"""Samples per second of the trajectory, and so of the recording that is planned for."""
+"""Sample rate of the trajectory, and so of the planned recording, Hz."""
 
 RAMP = 0.1
-"""Share of the duration in which the sums rise from rest, and fall to it."""
+"""Share of the duration in which the sums rise from rest, and in which they fall back."""
 
 SAMPLES_PER_PERIOD = 24
-"""Samples per period of the highest harmonic, where limits are watched and information is summed: an
-extreme lies at most 0.9 % of an amplitude beyond such samples, within `MARGIN`."""
+"""Samples per period of the highest harmonic at which limits are checked and information is summed: extremes
+exceed them by at most 0.9 % of the amplitude, which is within `MARGIN`."""
 
 DIGITS = 4
-"""Significant ones of amplitudes and offsets, as the file has them."""
+"""Significant digits of amplitudes and offsets in the file."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """A family of excitations of a robot; its members are told apart by numbers about zero.
+    """A family of excitations of a robot, whose members have parameters of about unit size around zero.
 
-    For each signal and joint these are sine and cosine of each harmonic, divided by its number, so that all
-    have about the same speed; then how much of the room is taken, and where in it.
+    For each signal and joint these are the sine and cosine amplitude of each harmonic, to be divided by the
+    harmonic's number so that all have about the same speed; then the used share of the allowed range, and the
+    position within it.
 
     Attributes:
-        robot: the robot.
-        allowed: ranges of its joints.
-        duration: s.
-        frequency: of the lowest harmonic, Hz.
+        robot: robot to excite.
+        allowed: allowed ranges of its joints.
+        duration: duration, s.
+        frequency: frequency of the lowest harmonic, Hz.
     """
 
     robot: Robot
@@ -164,12 +166,12 @@ class Design:
 
     @property
     def counts(self) -> BoolArray:
-        """Parameters that count, (signals, joints)."""
+        """Mask of the signals that joints have, (signals, joints)."""
         return np.array([[True] * len(self.robot.joints), self._takes_stiffness])
 
     @property
     def grid(self) -> FloatArray:
-        """Times at which members are looked at, s."""
+        """Times at which members are evaluated, s."""
         highest = HARMONICS * self.frequency
         return np.linspace(0.0, self.duration, 1 + round(SAMPLES_PER_PERIOD * highest * self.duration))
 
@@ -177,8 +179,8 @@ class Design:
         """Return a trajectory of the family.
 
         Args:
-            numbers: of the `shape`.
-            share: 0 to 1, of the position and stiffness that the numbers ask for; 0 is nearly at rest.
+            numbers: parameters of the member, in the `shape` of the design.
+            share: share of the specified amplitudes, 0 to 1; 0 is nearly at rest.
 
         Raises:
             ImpossibleError: no stiffness carries the motion.
@@ -206,17 +208,17 @@ class Design:
         return _placed(raw, numbers, scale, (self.allowed.lowest, self.allowed.highest), (low, high))
 
     def _stiffness(self, numbers: FloatArray, position: Sinusoids, share: float) -> Sinusoids:
-        """Within the part that carries the motion."""
+        """Return the stiffness within the range that carries the motion at all times."""
         lowest, highest = self._corridors(position)
         raw = self._raw(STIFFNESS, numbers)
         rows = raw.at(self.grid)
         low, high = rows[0].min(axis=1), rows[0].max(axis=1)
-        highest = lowest + share * (highest - lowest)  # the less, the softer: preload takes torque, too
+        highest = lowest + share * (highest - lowest)  # softer for smaller shares: preload requires torque
         scale = _reach(numbers) * (highest - lowest) / (high - low)
         return _placed(raw, numbers, scale, (lowest, highest), (low, high))
 
     def _corridors(self, position: Sinusoids) -> tuple[FloatArray, FloatArray]:
-        """Least and largest stiffness of each joint that will do all the time; NaN where it takes none."""
+        """Return the stiffness range that is admissible at all times, NaN for joints without stiffness."""
         motion = self._motion(position)
         commanded = {**motion.variables(), **elastic_torques(self.robot, motion)}
         ends = np.full((2, len(self.robot.joints)), np.nan)
@@ -244,7 +246,7 @@ class Design:
         return with_devices(Trajectory(times, position, {}, name=""), self.robot).at(self.grid)
 
     def _raw(self, signal: Signal, numbers: FloatArray) -> Sinusoids:
-        """Return the sums before they are placed; of joints that do not take the signal as well."""
+        """Return the sums before scaling and offset, also for joints that do not have the signal."""
         amplitudes = numbers[:, : 2 * HARMONICS].T / np.repeat(np.arange(1, HARMONICS + 1), 2)[:, None]
         return Sinusoids(
             signal=signal,
@@ -258,7 +260,7 @@ class Design:
 
 
 def _reach(numbers: FloatArray) -> FloatArray:
-    """Share of the room that is taken, (joints,): all at zero."""
+    """Return the used share of the allowed range, (joints,), which is 1 for a parameter of zero."""
     share: FloatArray = np.exp(-np.abs(numbers[:, -2]) / 2)
     return share
 
@@ -270,7 +272,7 @@ def _placed(
     room: tuple[FloatArray, FloatArray],
     extent: tuple[FloatArray, FloatArray],
 ) -> Sinusoids:
-    """Return the sums scaled, and moved to a place in the room that they leave; digits as a file has them."""
+    """Return the sums scaled, offset within the remaining range, and rounded to `DIGITS`."""
     lowest, highest = room[0] - scale * extent[0], room[1] - scale * extent[1]
     offset = (lowest + highest + np.tanh(numbers[:, -1]) * (highest - lowest)) / 2
     sine, cosine = (
@@ -284,21 +286,21 @@ def _digits(value: float) -> float:
 
 
 BISECTIONS = 6
-"""Bisections of the share of a motion that limits allow, down to 1.6 %."""
+"""Bisections of the share of a motion that limits allow, to 1.6 %."""
 
 ROUNDED = 1e-3
-"""Relative clearance by which digits of a file, and what lies between samples, may miss the margin."""
+"""Shortfall of the relative clearance that rounding in the file, and extremes between samples, may cause."""
 
 
 class Member(NamedTuple):
     """A member of a family that keeps all limits of its robot at the times of its design's grid.
 
     Attributes:
-        design: the family.
-        numbers: of the member.
-        trajectory: the excitation.
-        block: all that inverse dynamics finds there.
-        value: its merit, the larger the better; NaN if nobody asked.
+        design: family of the member.
+        numbers: parameters of the member.
+        trajectory: excitation.
+        block: results of inverse dynamics on the grid.
+        value: merit, the larger the better; NaN until it is computed.
     """
 
     design: Design
@@ -309,9 +311,9 @@ class Member(NamedTuple):
 
 
 def feasible(design: Design, numbers: FloatArray) -> Member | None:
-    """Return the member of a family, made as small as limits of torques, currents and the like ask for.
+    """Return the member of a family, scaled down as far as the limits require.
 
-    None if it keeps them not even nearly at rest.
+    Return None if it violates a limit even nearly at rest.
     """
     found = _tried(design, numbers, 1.0)
     if found is not None:
@@ -328,13 +330,13 @@ def feasible(design: Design, numbers: FloatArray) -> Member | None:
 
 
 def least_clearances(design: Design, block: Block) -> FloatArray:
-    """Return the least relative distance of everything that is `watched` to its bounds."""
+    """Return the smallest relative distance of each `watched` quantity from its bounds."""
     least: FloatArray = clearances(watched(design), block).min(axis=1, initial=np.inf)
     return least
 
 
 def watched(design: Design) -> list[Bounded]:
-    """Return the bounded quantities that move; dampers are at their minimum."""
+    """Return the bounded quantities of a robot, without dampers, which stay at their minimum."""
     quantities = bounded_quantities(design.robot)
     return [each for each in quantities if Flag.DAMPING_LIMIT not in each.bits]
 
@@ -351,7 +353,7 @@ def _tried(design: Design, numbers: FloatArray, share: float) -> Member | None:
 
 
 def obstacle(design: Design, numbers: FloatArray) -> str:
-    """Return the obstacle that makes a member nearly at rest infeasible, a clause."""
+    """Return the reason why a member is infeasible even nearly at rest, as a clause."""
     try:
         trajectory = design.member(numbers, 0.0)
     except ImpossibleError as error:

@@ -1,7 +1,7 @@
 """Information of a motion on the parameters of its robot: Fisher information, predicted standard errors.
 
-`Information` compares motions by the slopes of the equations of identification alone. `predicted_errors`
-draws noisy recordings of one motion and identifies the robot from them.
+`Information` compares motions by the slopes of the identification equations only. `predicted_errors`
+simulates noisy recordings of one motion and identifies the robot from them.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ ALL_PASS = Filter(bandwidth=np.inf, sections=np.array([[1.0, 0.0, 0.0, 1.0, 0.0,
 """Filter for motions without noise."""
 
 TOLERANCE = 1e-6
-"""Share of a column that no combination of others explains, from which on its unknown can be told by some
-motion: dependent ones leave 1e-12 of rounding."""
+"""Relative distance of a column from the span of others above which some motion identifies its unknown:
+rounding leaves 1e-12 for dependent columns."""
 
 
 CONDITION = 20.0
-"""Largest condition that costs nothing. On the paper's arm it cost 0 to 1.5 % of the standard errors to come
-below; without, one search in three left 30 and more, which multiplies what the equations lack of truth."""
+"""Largest condition number without a penalty. On the paper's arm, staying below it increased standard errors
+by 0 to 1.5 %; without a penalty, one search in three ended at 30 or more, which amplifies model errors."""
 
 
 class Information:
     """The information of motions on the parameters of a robot.
 
-    The motors and springs of each joint are a system of equations of their own, the links of all joints
-    another. There the torques of each joint count by their size, since those of a wrist are far smaller than
-    those of a base.
+    The motors and springs of each joint form one system of equations, the links of all joints another one.
+    There, rows are divided by the rms torque of their joint, since the torques of a wrist are far smaller
+    than those of a base.
 
     Args:
-        robot: the robot.
-        examples: motions from which it follows what no motion tells apart, and the size of torques.
+        robot: robot to identify.
+        examples: motions that determine which parameters no motion distinguishes, and the size of torques.
 
     Attributes:
-        structural: parameters that no motion identifies, clauses.
+        structural: parameters that no motion identifies, as clauses.
     """
 
     def __init__(self, robot: Robot, examples: Sequence[Block]) -> None:
@@ -73,12 +73,12 @@ class Information:
         self.structural = tuple(self._unidentifiable(splits))
 
     def _splits(self, examples: Sequence[Block]) -> list[Independence]:
-        """Return for each system the unknowns that some motion distinguishes, and the others."""
+        """Return the split of each system's unknowns into those that motions distinguish and others."""
         systems = zip(*map(self._slopes, examples), strict=True)
         return [independence(np.concatenate(slopes), TOLERANCE) for slopes in systems]
 
     def _unidentifiable(self, splits: Sequence[Independence]) -> Iterator[str]:
-        """Yield the parameters that no motion identifies, in words."""
+        """Yield clauses on the parameters that no motion identifies."""
         for system, split in zip(self._systems, splits, strict=True):
             own = system.names
             if split.nothing.size:
@@ -94,7 +94,7 @@ class Information:
             yield ", ".join(of_links[at] for at in silent)
 
     def _slopes(self, block: Block) -> Iterator[FloatArray]:
-        """Slopes of the equations of each system by its unknowns, (rows, unknowns)."""
+        """Yield the slopes of the equations of each system by its unknowns, (rows, unknowns)."""
         signals = exact_signals(block)
         for system in self._systems:
             slopes = system.of_record(system.before, signals).slopes
@@ -104,11 +104,11 @@ class Information:
             yield slopes
 
     def worth(self, block: Block) -> float:
-        """Return the information of a motion, less a penalty for poorly conditioned equations.
+        """Return the information of a motion minus a penalty for poorly conditioned equations.
 
-        The information is the logarithm of the determinant of the information matrix, of one row on average,
-        over twice the unknowns: D-optimality. It does not depend on the units of the unknowns, and is greater
-        by 1 where standard errors are smaller by a factor e, on average.
+        The information is the log determinant of the information matrix per row, divided by twice the number
+        of unknowns (D-optimality). Comparisons do not depend on the units of the unknowns; an increase by 1
+        means that standard errors are smaller by a factor e on average.
         """
         separable = [slopes for _, slopes in self._separable(block)]
         excess = sum(max(0.0, math.log(_condition(slopes) / CONDITION)) for slopes in separable)
@@ -117,11 +117,11 @@ class Information:
         return logarithms / sum(map(len, self._kept)) - excess
 
     def conditions(self, block: Block) -> dict[str, float]:
-        """Condition of each system, its columns divided by their norms, by name."""
+        """Return the condition number of each system by title; its columns are divided by their norms."""
         return {name: _condition(slopes) for name, slopes in self._separable(block)}
 
     def _separable(self, block: Block) -> Iterator[tuple[str, FloatArray]]:
-        """Title and slopes by the unknowns that some motion tells apart, of systems that have any."""
+        """Yield the title and the slopes by distinguishable unknowns of each system that has any."""
         for kept, system, slopes in zip(self._kept, self._systems, self._slopes(block), strict=True):
             if kept.size:
                 yield system.title, slopes[:, kept]
@@ -135,31 +135,31 @@ def _condition(slopes: FloatArray) -> float:
 
 
 def exact_signals(block: Block) -> Signals:
-    """Return a motion without noise as a record."""
+    """Return a motion as a recording without noise."""
     motion = {name: getattr(block, name) for name in ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")}
     return Signals(**motion, tau_motor=block.tau_motor, rate=np.nan, filter=ALL_PASS)
 
 
 POSITION_NOISE = 2e-5
-"""Rad (m), of the last step of an encoder with 16 bits."""
+"""Standard deviation of positions, rad (m), about the quantization noise of a 16-bit encoder."""
 
 RECORDS = 3
-"""Recordings that are drawn, each with its own noise.
+"""Number of simulated recordings, each with its own noise.
 
-A parameter that may not be negative and comes out at zero is held there, which reduces standard errors of
-others, of some by a third: so their mean is taken.
+A parameter that must not be negative and comes out at zero is held there, which reduces the standard errors
+of others, of some by a third; therefore standard errors are averaged.
 """
 
 TORQUE_SHARE = 0.005
-"""Noise of a motor's torque over the largest of it, where nobody says more: as of measured currents."""
+"""Default noise of a motor's torque relative to its largest torque, as for measured currents."""
 
 
 class Noise(NamedTuple):
     """Standard deviations of sensor readings, joint side of the gears.
 
     Attributes:
-        position: of joints and motors, rad (m).
-        torque: of motors, N m (N); None is a share of the largest torque of each.
+        position: noise of joint and motor positions, rad (m).
+        torque: noise of motor torques, N m (N); None means `TORQUE_SHARE` of each motor's largest torque.
     """
 
     position: float = POSITION_NOISE
@@ -176,13 +176,13 @@ USUAL_NOISE = Noise()
 
 @dataclass(frozen=True)
 class PredictedError(Published):
-    """A number that an identification looks for.
+    """The predicted standard error of a parameter.
 
     Attributes:
-        path: to it, from the robot; or the name of a base parameter.
-        unit: of it.
-        value: by the robot file.
-        standard_error: predicted, NaN if it cannot be told.
+        path: path of the parameter in the robot, or name of a base parameter.
+        unit: unit of value and standard error.
+        value: value in the robot file.
+        standard_error: predicted standard error; NaN if unidentifiable.
     """
 
     path: str
@@ -194,16 +194,16 @@ class PredictedError(Published):
 def predicted_errors(
     robot: Robot, trajectory: Trajectory, noise: Noise, seed: int
 ) -> tuple[PredictedError, ...]:
-    """Return the predicted identification from one recording of a motion, if the robot is as in its file.
+    """Return the predicted errors of an identification from one recording, for the robot as in its file.
 
     Args:
-        robot: the robot.
-        trajectory: which it executes, recorded at its rate, but at no more than that of excitations.
-        noise: of the sensors.
-        seed: of the noise.
+        robot: robot to identify.
+        trajectory: executed motion, recorded at its sample rate but at most at `RATE`.
+        noise: noise of the sensors.
+        seed: seed of the noise.
 
     Raises:
-        InputError: the robot cannot execute it, or it is too short.
+        InputError: the robot cannot execute the motion, or it is too short.
     """
     block, random = executed(robot, trajectory), np.random.default_rng(seed)
     drawn = [_identified(robot, noisy_record(robot, block, noise, random)) for _ in range(RECORDS)]
@@ -220,14 +220,14 @@ def predicted_errors(
 
 
 def _identified(robot: Robot, record: Signals) -> list[Number]:
-    """Return all numbers, by a record of all joints."""
+    """Return the results for all parameters, from a recording of all joints."""
     joints = range(len(robot.joints))
     systems = solutions(with_friction(robot, joints), joints, WORDS, [record])
     return [number for system in systems for number in numbers_of(system)]
 
 
 def noisy_record(robot: Robot, block: Block, noise: Noise, random: np.random.Generator) -> Signals:
-    """Return a simulated recording of a motion, ready for equations."""
+    """Return a simulated noisy recording of a motion, conditioned."""
     q, theta = (each + noise.position * random.standard_normal(each.shape) for each in (block.q, block.theta))
     for index, joint in enumerate(robot.joints):
         if not joint.actuator.sprung:
@@ -239,10 +239,10 @@ def noisy_record(robot: Robot, block: Block, noise: Noise, random: np.random.Gen
 
 
 def executed(robot: Robot, trajectory: Trajectory) -> Block:
-    """Inverse dynamics along a trajectory, from time zero on.
+    """Return the inverse dynamics along a trajectory, shifted to start at time zero.
 
     Raises:
-        InputError: the robot cannot execute it.
+        InputError: the robot cannot execute the trajectory.
     """
     steps = min(trajectory.samples - 1, round(trajectory.duration * RATE))
     elapsed = np.linspace(0.0, trajectory.duration, steps + 1)

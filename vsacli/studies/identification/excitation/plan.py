@@ -1,6 +1,6 @@
-"""A plan of an experiment: the excitation by which the numbers of a robot can be told best.
+"""Design of experiments: the excitation that identifies the parameters of a robot best.
 
-The search takes the best of random members of all families, then improves it by an evolution strategy.
+The search selects the best of random members of all families, then improves it by an evolution strategy.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
 
 STARTS = 60
-"""Random members, in turn of each family."""
+"""Number of random members, taken from the families in turn."""
 
 STEPS = 540
-"""Steps of the strategy.
+"""Number of steps of the strategy.
 
-On the paper's arm these made standard errors 30 % smaller than those of the best start, on average; 240 steps
-left them 10 % larger, and searches with other seeds differ by 5 %.
+On the paper's arm these reduced the standard errors of the best start by 30 % on average; with 240 steps they
+were 10 % larger, and searches with other seeds differ by 5 %.
 """
 
 FIRST_STEP = 0.5
-"""Standard deviation of the first change, of numbers whose own is 1."""
+"""Standard deviation of the first change of parameters whose own standard deviation is 1."""
 
 GROWTH = 1.5
-"""Factor of the next change after a success; after a failure its fourth root less: the one-fifth rule."""
+"""Factor on the step size after a success; its fourth root divides it after a failure (one-fifth rule)."""
 
 LEAST_STEP = 0.02
-"""Below, changes are lost; the strategy begins anew with large ones."""
+"""Step size below which changes have no effect and the strategy restarts with `FIRST_STEP`."""
 
 
 def search(
@@ -63,18 +63,19 @@ def search(
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Member | None:
-    """Return the best member of some families that is found; None if no member is feasible.
+    """Return the best member of several families that is found; None if no start is feasible.
 
-    The (1+1) evolution strategy with the one-fifth success rule (H.-G. Beyer, H.-P. Schwefel, "Evolution
-    strategies", Natural Computing 1 (2002)), each step of one signal of one joint. With as many trials from
-    the same starts, `scipy.optimize.differential_evolution` left standard errors 25 % larger with the paper's
-    arm and 6 % with one joint, the same with two; `dual_annealing` hardly improved the starts.
+    The method is the (1+1) evolution strategy with the one-fifth success rule (H.-G. Beyer, H.-P. Schwefel,
+    "Evolution strategies", Natural Computing 1 (2002)); each step changes one signal of one joint. With the
+    same number of trials from the same starts, `scipy.optimize.differential_evolution` gave 25 % larger
+    standard errors for the paper's arm, 6 % larger for one joint, and the same for two; `dual_annealing`
+    hardly improved the starts.
 
     Args:
-        designs: the families.
-        value: of a member, the larger the better.
-        seed: of the random numbers; the same one finds the same.
-        progress: is told how many further members were tried.
+        designs: families to search.
+        value: function that returns the merit of a member, the larger the better.
+        seed: seed of the random numbers; equal seeds give equal results.
+        progress: function to call with the number of further members tried.
     """
     random = np.random.default_rng(seed)
     best: Member | None = None
@@ -100,7 +101,7 @@ def search(
 def _better(
     best: Member | None, design: Design, numbers: FloatArray, value: Callable[[Member], float]
 ) -> Member | None:
-    """Return the member with these numbers; None if it is not feasible, or no better than the best."""
+    """Return the member with given parameters; None if it is infeasible or no better than `best`."""
     member = feasible(design, numbers)
     if member is None:
         return None
@@ -111,20 +112,20 @@ def _better(
 
 
 FREQUENCIES = (0.05, 0.1, 0.2)
-"""Lowest harmonics tried, Hz: at five harmonics motions are of 1 Hz at most, well within the low-pass of
-recordings, and below the resonance of arms of robots."""
+"""Lowest harmonics of the families, Hz: five harmonics reach at most 1 Hz, well within the low-pass filter of
+recordings and below the resonances of robot arms."""
 
 SHORTEST = 5.0
-"""Duration, s: one period of the fastest family."""
+"""Shortest duration, s: one period of the fastest family."""
 
 EXAMPLES = 4
-"""Members that show which parameters no motion distinguishes."""
+"""Number of members that determine which parameters no motion distinguishes."""
 
 DRAWN = 10
-"""Members of each family that are drawn for them at most."""
+"""Largest number of random members per family for these examples."""
 
 ACTIVE = 0.02
-"""Relative clearance beyond `MARGIN` up to which a limit keeps a motion from being larger."""
+"""Relative clearance beyond `MARGIN` up to which a limit is active."""
 
 
 def plan_excitation(
@@ -136,24 +137,24 @@ def plan_excitation(
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Excitation:
-    """Plan a motion, with a stiffness profile, from which the numbers of a robot can be identified.
+    """Plan a motion, with a stiffness profile, that identifies the parameters of a robot.
 
-    Sums of sinusoids (Swevers et al., IEEE Transactions on Robotics and Automation 13, 1997) within all
-    limits, from rest to rest, with the largest determinant of the information matrix that a search finds.
+    The motion consists of sums of sinusoids (Swevers et al., IEEE Transactions on Robotics and Automation 13,
+    1997) within all limits, from rest to rest, with the largest determinant of the information matrix found.
 
     Args:
-        robot: with the numbers that are known so far.
-        own: a motion to compare with, about whose middle joints move whose range is not limited.
-        duration: s.
-        noise: standard deviations of sensor readings, for which standard errors are predicted: of positions
-            of joints and motors, rad (m), and of motor torques, N m (N), joint side of the gears; None is
+        robot: robot with the parameters known so far.
+        own: user's motion to compare with; joints without position limits move about its middle.
+        duration: duration, s.
+        noise: standard deviations of sensor readings for the predicted standard errors: of joint and motor
+            positions, rad (m), and of motor torques, N m (N), on the joint side of the gears; None means
             0.5 % of the largest torque of each motor.
-        seed: of the search, and of the noise.
-        progress: is told how many further ones of `TRIALS` motions were tried.
+        seed: seed of the search and of the noise.
+        progress: function to call with the number of further motions tried, of `TRIALS` in all.
 
     Raises:
-        InputError: the duration is too short, the noise out of range, or the robot cannot execute its own
-            motion.
+        InputError: the duration is too short, the noise is out of range, or the robot cannot execute the
+            user's motion.
         ImpossibleError: no excitation is feasible.
     """
     if not SHORTEST <= duration < np.inf:
@@ -173,14 +174,14 @@ def plan_excitation(
 
 
 TRIALS = STARTS + STEPS
-"""Motions that a plan tries."""
+"""Number of motions that a plan tries."""
 
 
 def _examples(designs: list[Design], seed: int) -> list[Member]:
-    """Members of the families.
+    """Return random feasible members of the families.
 
     Raises:
-        ImpossibleError: none is feasible.
+        ImpossibleError: no member is feasible.
     """
     random = np.random.default_rng(seed)
     found: list[Member] = []
@@ -207,7 +208,7 @@ def _excitation(
     noise: Noise,
     seed: int,
 ) -> Excitation:
-    """Return the excitation, checked by a run of its own."""
+    """Return the excitation with the report of a run along it."""
     design, trajectory, block = found.design, found.trajectory, found.block
     run = Run(design.robot, trajectory)
     for _ in run:

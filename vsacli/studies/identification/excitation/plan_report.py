@@ -1,4 +1,4 @@
-"""A planned excitation and its merits, as text, as JSON and as a trajectory file with comments."""
+"""A planned excitation and its usefulness, as text, as JSON and as a trajectory file with comments."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class ActiveLimit(Published):
-    """A bound that keeps an excitation from being larger.
+    """A bound that limits the amplitude of an excitation.
 
     Attributes:
-        joint: name.
-        nearest: where it comes next to the bound.
+        joint: name of the joint.
+        nearest: sample closest to the bound.
     """
 
     joint: str
@@ -53,10 +53,10 @@ class Usefulness(Published):
     """The information of a motion on the parameters of a robot.
 
     Attributes:
-        conditions: of the equations of each joint's motors and springs by name of the joint, and of `links`;
-            columns divided by their norms.
-        numbers: with the standard errors that are predicted.
-        reason: why none are predicted, a clause; empty if they are.
+        conditions: condition numbers of the equations of motors and springs, by joint name, and of `links`;
+            columns are divided by their norms.
+        numbers: predicted standard errors of the parameters.
+        reason: reason why none are predicted, as a clause; otherwise empty.
     """
 
     conditions: Mapping[str, float]
@@ -68,19 +68,19 @@ class Usefulness(Published):
 
 @dataclass(frozen=True)
 class Excitation(Published):
-    """A motion and a stiffness profile by which the numbers of a robot can be identified.
+    """A motion with a stiffness profile that identifies the parameters of a robot.
 
     Attributes:
-        robot: for which it is.
-        trajectory: the motion.
-        report: of inverse dynamics along it.
-        seed: of the search that found it, and of the noise.
-        noise: for which standard errors are predicted, in words.
-        planned: its information.
-        own: information of the user's own motion; None without one.
-        structural: parameters that no motion of the robot distinguishes, sentences.
-        active: bounds that keep it from being larger.
-        assumptions: where the robot has no limits.
+        robot: robot to identify.
+        trajectory: planned motion.
+        report: report of inverse dynamics along the motion.
+        seed: seed of the search and of the noise.
+        noise: assumed sensor noise in words.
+        planned: usefulness of the planned motion.
+        own: usefulness of the user's own motion; None without one.
+        structural: parameters that no motion of the robot distinguishes, as sentences.
+        active: bounds that limit the amplitude.
+        assumptions: assumptions in place of missing limits.
     """
 
     robot: Robot = field(repr=False)
@@ -104,7 +104,7 @@ class Excitation(Published):
 
     @property
     def condition(self) -> float:
-        """The largest one."""
+        """Largest condition number of the planned motion."""
         return max(self.planned.conditions.values())
 
     def __str__(self) -> str:
@@ -151,7 +151,7 @@ def _error(number: PredictedError | None) -> str:
 
 
 def _share(number: PredictedError) -> str:
-    """Return the error as a share of the value, unless that is zero."""
+    """Return the standard error as a percentage of the value, or "-" if the value is zero."""
     if number.value == 0 or math.isnan(number.standard_error):
         return "-"
     share = number.standard_error / abs(number.value)
@@ -178,7 +178,7 @@ def excitation_text(excitation: Excitation) -> str:
 
 
 def _head(excitation: Excitation) -> Iterator[str]:
-    """Yield comments for readers of the file."""
+    """Yield the comments at the top of the file."""
     names = ", ".join(excitation.robot.joint_names)
     yield (
         f"Excitation to identify {excitation.robot.name} by; planned by vsacli {__version__}, seed "
