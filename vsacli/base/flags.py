@@ -24,7 +24,7 @@ class Flag(enum.IntFlag):
     """Bits of the variable `flags`, each with its meaning and, if it marks a limit, the bounded quantity.
 
     Attributes:
-        meaning: words for people that complete a sentence beginning with "this step is"/"has".
+        meaning: description of the finding, a clause.
         quantity: quantity over the limit, to be followed by the number of the motor if it is a motor's; None
             if the bit does not mark a limit.
     """

@@ -256,7 +256,7 @@ def _permitted(change: Callable[..., None], *arguments: object) -> bool:
 
 
 def _name_without_replacing(file: Staged, *, optional: bool) -> None:
-    """Name a file without ever replacing another one, as a rename would."""
+    """Name a file without ever replacing another one, unlike a rename."""
     try:
         os.link(file.temporary, file.target)
     except FileExistsError as error:

@@ -173,7 +173,7 @@ class TimeColumn(NamedTuple):
 
 
 def time_column(rows: FirstRows) -> TimeColumn | None:
-    """Return the column of stamps, if there is one: by its name, clock texts, or even steps."""
+    """Return the column of stamps, if there is one: by its name, clock texts, or even intervals."""
     pair = _seconds_and_nanoseconds(rows)
     if pair is not None:
         seconds, rest = map(rows.called, pair)
@@ -227,7 +227,7 @@ def _called(rows: FirstRows) -> list[int]:
 
 
 def _like_stamps(rows: FirstRows, place: int) -> bool:
-    """Return whether a column without a telling name rises in nearly even steps, and does not count rows."""
+    """Return whether a column, not named as a quantity, rises nearly evenly and does not count rows."""
     words = words_of(split_heading(rows.columns[place])[0])
     if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place) or not rows.rises(place):
         return False
