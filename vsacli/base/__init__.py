@@ -1,4 +1,4 @@
-"""The vocabulary that everything shares: errors, units, flags, variables, arrays, and files written whole."""
+"""Foundations of all other packages: errors, units, flags, variables, arrays, and atomic file output."""
 
 from typing import TYPE_CHECKING
 

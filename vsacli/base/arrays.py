@@ -1,8 +1,8 @@
 """Array types, and the memory layout used throughout.
 
-Arrays over time have the shape (samples, joints) or (samples, joints, 2) for the user, and are laid out with
-the samples contiguous (`over_time` and `by_joint` change the view, not the memory), because every operation
-runs along the samples of one joint.
+Public arrays over time have the shape (samples, joints) or (samples, joints, 2). Their samples are contiguous
+in memory (`over_time` and `by_joint` change the view, not the memory), because every operation runs along the
+samples of one joint.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def over_time(rows: FloatArray) -> FloatArray:
 
 
 def by_joint(array: ArrayLike) -> FloatArray:
-    """Return the inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
+    """Invert `over_time`; the samples are contiguous, and copied only if the memory layout differs."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
 
 
@@ -42,10 +42,10 @@ def contiguous_rows(array: FloatArray) -> list[FloatArray]:
 
 
 def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
-    """Return the array as float64, if it has this shape, or one axis of samples before it.
+    """Return the array as float64 if it has this shape, or this shape after an axis of samples.
 
     Raises:
-        InputError: it has another shape, or holds something else than numbers.
+        InputError: the shape differs, or an element is not a number.
     """
     try:
         values = np.asarray(array, dtype=np.float64)
@@ -65,5 +65,5 @@ def evenly(length: int, count: int) -> IndexArray:
 
 
 def of_joint(arrays: Mapping[str, AnyArray], index: int) -> dict[str, AnyArray]:
-    """Views of one joint, (samples,) or (2, samples), of arrays (samples, joints) or (samples, joints, 2)."""
+    """Return views (samples,) or (2, samples) of one joint's part of arrays (samples, joints[, 2])."""
     return {name: array[:, index].T for name, array in arrays.items()}

@@ -1,6 +1,6 @@
-"""Work ahead of the caller, in one thread of its own.
+"""Background computation in a single thread, one result ahead of the caller.
 
-Signals never reach that thread: a run that is ended waits for the computation in progress.
+Signals never reach that thread: an interrupted run waits for the computation in progress.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ _Result = TypeVar("_Result")
 def ahead(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
     """Yield results of a function, each computed in a thread while the caller uses the previous one.
 
-    The items themselves are taken in the caller's thread: two that are both busy in the interpreter would
-    wait for one another. An exception of the function is raised here, in the place of its result.
+    The items are produced in the caller's thread: two threads that both execute Python code would wait for
+    one another. An exception of the function is raised here, in place of its result.
     """
     coming: deque[Future[_Result]] = deque()
     with ThreadPoolExecutor(1, "vsacli-ahead") as thread:

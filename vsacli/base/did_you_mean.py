@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from vsacli.base.renamed import successor
 
 MOST_NEAR = 3
-"""Largest number of proposals: more words with the same beginning are no help."""
+"""Maximum number of proposals; a longer list of words with the same beginning is no help."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
-    """Return the valid word that is most like this one or alone begins with it, or None if none is close."""
+    """Return the most similar valid word, or the only one with this beginning; None if none is close."""
     close = _near(word, list(valid))
     return close[0] if len(close) == 1 else None
 
@@ -27,8 +27,8 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
 
 
 def _near(word: str, options: list[str]) -> list[str]:
-    """Return the word most like this one, or those that begin with it."""
-    import difflib  # which a command that has nothing to complain of need not load
+    """Return the most similar word, or else all words that begin with this one."""
+    import difflib  # loaded for error messages only
 
     close = difflib.get_close_matches(word, options, n=1, cutoff=0.6)
     return close or [option for option in options if word and option.startswith(word)]

@@ -1,4 +1,4 @@
-"""Exceptions that carry their data and write their own sentence."""
+"""Exceptions that carry their data and compose their own message."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vsacli.base.texts import one_line
 
 
 class VsacliError(Exception):
-    """Root of every error the tool raises on purpose."""
+    """Base class of all errors that vsacli raises on purpose."""
 
 
 class Problem(NamedTuple):
@@ -33,7 +33,7 @@ class Problem(NamedTuple):
 
 
 class InputError(VsacliError, ValueError):
-    """An input file, or a value given from Python, cannot be used. Carries every problem found."""
+    """An input file, or a value passed from Python, that cannot be used; holds every problem found."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -46,16 +46,16 @@ class InputError(VsacliError, ValueError):
 
 
 def check_type(argument: str, value: object, expected: type, remedy: str) -> None:
-    """Refuse an argument of another type than a function expects.
+    """Refuse an argument whose type is not the one a function expects.
 
     Args:
-        argument: its name.
-        value: the argument.
-        expected: the type.
-        remedy: a clause with the call that would do; `{}` stands for a path.
+        argument: name of the argument.
+        value: argument as passed.
+        expected: type that the function expects.
+        remedy: clause with a valid call; `{}` stands for a path.
 
     Raises:
-        TypeError: with a sentence of all of these.
+        TypeError: with the name, both types, and the valid call.
     """
     if isinstance(value, expected):
         return
@@ -67,10 +67,10 @@ def check_type(argument: str, value: object, expected: type, remedy: str) -> Non
 
 
 def check_path(value: object, call: str) -> None:
-    """Refuse an argument that is no path of a file.
+    """Refuse an argument that is not a file path.
 
     Raises:
-        TypeError: with the call that would do.
+        TypeError: with a valid call.
     """
     if not isinstance(value, str | os.PathLike):
         raise TypeError(f"path must be a path, not {_described(value)}; call {call}")
@@ -88,12 +88,13 @@ def _described(value: object) -> str:
 
 
 class FieldProblem(NamedTuple):
-    """A field of a record that cannot hold its value.
+    """A field of a record whose value is invalid.
 
     Attributes:
-        path: leads to the field, e.g. ("inertia", "xx"); numbers are indices in lists, and of joints.
+        path: keys that lead to the field, e.g. ("inertia", "xx"); integers are indices of lists, and of
+            joints.
         message: as in `Problem`.
-        joint: index of the joint it concerns, if it is one of them; a file reader knows its name.
+        joint: index of the joint concerned, if any; a file reader replaces it by the joint's name.
     """
 
     path: tuple[str | int, ...]
@@ -104,7 +105,7 @@ class FieldProblem(NamedTuple):
         return self._sentence(map(str, self.path), None if self.joint is None else str(self.joint + 1))
 
     def in_file(self, joints: Sequence[str]) -> str:
-        """Return the sentence with names of joints, and without list indices: the line is known."""
+        """Return the sentence with joint names; list indices are omitted, since the line is known."""
         keys = (step for step in self.path if isinstance(step, str))
         return self._sentence(keys, None if self.joint is None else joints[self.joint])
 
@@ -113,12 +114,12 @@ class FieldProblem(NamedTuple):
         return f"{where}: {self.message}" if where else self.message
 
     def inside(self, *outer: str | int) -> FieldProblem:
-        """Return the same, seen from a record that holds this one; `outer` leads to it."""
+        """Return the same problem seen from an enclosing record; `outer` is the path from there."""
         return self._replace(path=(*outer, *self.path))
 
 
 class InvalidRecordError(InputError):
-    """A record was built with values it cannot have. A file reader adds file and line to each problem."""
+    """Values that a record cannot have. A file reader adds file and line to each problem."""
 
     def __init__(self, record: str, fields: Iterable[FieldProblem]) -> None:
         self.fields = tuple(fields)
@@ -126,7 +127,7 @@ class InvalidRecordError(InputError):
 
 
 class StorageError(VsacliError):
-    """A file cannot be written or read: disk full, permission, a name that is taken."""
+    """A file that cannot be written or read: disk full, no permission, or a name that is taken."""
 
     def __init__(self, path: str | Path, message: str) -> None:
         self.path = str(path)

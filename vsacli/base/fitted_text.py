@@ -1,4 +1,4 @@
-"""Reports fitted to the width of a terminal: lines broken between words, wide tables in parts."""
+"""Reports wrapped to the width of a terminal: lines broken between words, wide tables split into parts."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from itertools import groupby
 from vsacli.base.tables import BETWEEN_CELLS
 
 LEAST_WIDTH = 20
-"""Columns of a terminal below which a line may be too long for it."""
+"""Minimum width (columns); on a narrower terminal lines may be too long."""
 
 INDENT = "  "
 """Indent of continuation lines."""
 
 WIDEST_INDENT = 3
-"""Denominator of the largest indent, as a fraction of the width, that continuation lines repeat."""
+"""Inverse of the largest share of the width by which continuation lines are indented below a label."""
 
 BEFORE_UNIT = re.compile(r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)")
-"""Blanks at which a line is not broken: between a number and its unit, within newton metres, and before a
-number with a sign, which belongs to the joint before it."""
+"""Blanks at which a line is not broken: between a number and its unit, within newton meters, and before a
+signed number, which belongs to the joint name in front of it."""
 
 HARD_BLANK = "\N{NO-BREAK SPACE}"
 """Placeholder for blanks that must not break while a text is wrapped."""
 
 
 def fitted(text: str, width: int) -> str:
-    """Return a report with no line longer than a terminal is wide, as far as words and cells of tables allow.
+    """Return a report with no line longer than the width, as far as words and cells of tables allow.
 
-    Below the first line, tables are lines with cells that are apart by three blanks or more, as
-    `tables.aligned` makes them. One that is too wide follows in parts, each with the first column. Lines that
-    go on below a label, with a comma at their end, are broken anew.
+    Below the first line, tables are lines whose cells are separated by three or more blanks, as
+    `tables.aligned` writes them. A table that is too wide is split into parts, each with the first column.
+    Lines that continue a label's line, which ends with a comma, are joined and wrapped again.
     """
     width = max(width, LEAST_WIDTH)
     if all(len(line) <= width for line in text.split("\n")):
@@ -53,7 +53,7 @@ def _has_cells(line: str) -> bool:
 
 
 def _joined(lines: Sequence[str]) -> list[str]:
-    """Return the lines, with those that go on below a label joined to it."""
+    """Return the lines, with continuation lines below a label joined to it."""
     joined: list[str] = []
     for line in lines:
         if joined and joined[-1].endswith(",") and line.startswith(INDENT):
@@ -64,7 +64,7 @@ def _joined(lines: Sequence[str]) -> list[str]:
 
 
 def _broken(line: str, width: int) -> list[str]:
-    """Return a line broken between words; text aligned right, such as a verdict, gets a line of its own."""
+    """Return a line broken between words; right-aligned text, such as a verdict, gets its own line."""
     if len(line) <= width:
         return [line]
     if _has_cells(line):
@@ -81,7 +81,7 @@ def _broken(line: str, width: int) -> list[str]:
 
 
 def _indent(line: str, width: int) -> str:
-    """Below its label, if that leaves enough of the width."""
+    """Return the indent of continuation lines: below the text after a label, if that leaves enough width."""
     label, colon, _ = line.partition(": ")
     below = " " * len(label + colon)
     if colon and len(below) * WIDEST_INDENT <= width:

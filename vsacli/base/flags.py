@@ -1,4 +1,4 @@
-"""The bits that mark a step of a joint: one enum for result file, report and documentation."""
+"""Flags of a sample of a joint: one enum for result files, reports and documentation."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 
 SINGULAR_MARGIN = 1e-9
-"""Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
+"""Relative margin that counts as zero: deflections are accurate to about 1e-16/margin, so to 1e-7 here."""
 
 NEAR_SINGULAR_MARGIN = 0.01
-"""Relative margin to a critical point below which a step is near-singular; the paper's runs keep 3 %."""
+"""Relative margin to a critical point below which a sample is near-singular; the paper's runs keep 3 %."""
 
 
 class Flag(enum.IntFlag):
     """Bits of the variable `flags`, each with its meaning and, if it marks a limit, the bounded quantity.
 
     Attributes:
-        meaning: words for people that complete a sentence beginning with "this step is"/"has".
-        quantity: the quantity over the limit, followed by the number of the motor if it is one of a motor;
-            None if the bit does not mean "over a limit".
+        meaning: description of the finding, a clause.
+        quantity: quantity over the limit, to be followed by the number of the motor if it is a motor's; None
+            if the bit does not mark a limit.
     """
 
     meaning: str
@@ -61,7 +61,7 @@ class Flag(enum.IntFlag):
     )
 
     def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
-        """Return a bit with all that is said of it, none of which can be left out."""
+        """Return a bit with its attributes."""
         flag = int.__new__(cls, bit)
         flag._value_ = bit
         flag.meaning, flag.quantity = meaning, quantity
@@ -78,12 +78,12 @@ class Flag(enum.IntFlag):
 
     @classmethod
     def labelled(cls, label: str) -> Flag:
-        """Return the bit of a label."""
+        """Return the flag with this label."""
         return cls[label.upper()]
 
 
 LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
-"""The bits that mean "over a limit"."""
+"""All bits that mark an exceeded limit."""
 
 
 def has(flags: FlagArray, bits: Flag) -> BoolArray:
@@ -93,26 +93,26 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 
 
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
-    """Return the bit where it shall be set, else 0."""
+    """Return an array with the bit set where the condition holds, else 0."""
     return where.astype(np.uint32) * np.uint32(flag)
 
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:
-    """Return where all arrays are finite numbers; they have one shape."""
+    """Return where all arrays, which have one shape, are finite."""
     whole: BoolArray = reduce(and_, map(np.isfinite, arrays))
     return whole
 
 
 def not_finite_flags(where: BoolArray) -> FlagArray:
-    """NOT_FINITE, and INFEASIBLE with it: code that checks only INFEASIBLE stops there as well."""
+    """Set NOT_FINITE with INFEASIBLE, so that code that checks only INFEASIBLE also stops there."""
     return marked(Flag.NOT_FINITE | Flag.INFEASIBLE, where)
 
 
 def check_near_singular(threshold: float) -> None:
-    """Refuse a threshold for near-singular steps that no margin can be compared with.
+    """Refuse a threshold for near-singular samples that is not above `SINGULAR_MARGIN` and below 1.
 
     Raises:
-        InputError: it is not above `SINGULAR_MARGIN` and below 1.
+        InputError: with the allowed interval.
     """
     if not SINGULAR_MARGIN < threshold < 1:
         raise InputError.one(

@@ -1,4 +1,4 @@
-"""Signals that end a run from outside unwind it, as an exception does, so that nothing half-made stays."""
+"""Signals that end a run, raised as exceptions so that cleanup removes unfinished files."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Ctrl-C, the end of a batch job or its preemption, a terminal that is closed."""
+"""Signals of Ctrl-C, of the end or preemption of a batch job, and of a closed terminal."""
 
 AGAIN = 0.01
-"""After which a signal comes again that came where nothing can be unwound, s."""
+"""Delay (s) before a signal is sent again that arrived where an exception cannot propagate."""
 
 
 class Interrupted(BaseException):
-    """A signal asked the run to end."""
+    """Interruption of the run by a signal."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -31,10 +31,10 @@ class Interrupted(BaseException):
 
 @contextlib.contextmanager
 def unwinding_when_ended() -> Iterator[None]:
-    """Within this context signals that end a process raise `Interrupted`; after it they end it at once.
+    """Raise `Interrupted` within this context on signals that end a process; afterwards they end it at once.
 
-    A signal that the parent set to be ignored, as `nohup` does, stays ignored, and so do those that come once
-    all is written (`Deferred.disregard`).
+    A signal that the parent process ignores, as with `nohup`, stays ignored, and so do signals that arrive
+    after all output is written (`Deferred.disregard`).
     """
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -42,7 +42,7 @@ def unwinding_when_ended() -> Iterator[None]:
     otherwise = sys.unraisablehook
 
     def unraisable(what: sys.UnraisableHookArgs) -> None:
-        if isinstance(what.exc_value, Interrupted):  # in a callback of Python's own, as of an import's lock
+        if isinstance(what.exc_value, Interrupted):  # in a callback of the interpreter, as of an import lock
             ended = threading.Timer(AGAIN, os.kill, (os.getpid(), what.exc_value.number))
             ended.daemon = True
             ended.start()
@@ -60,7 +60,7 @@ def unwinding_when_ended() -> Iterator[None]:
 
 
 def leave_interrupts_to_others() -> None:
-    """Ignore Ctrl-C in a process that computes for another one: it reaches all, and that one ends this."""
+    """Ignore Ctrl-C in a worker process: the main process receives it too, and ends the worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -69,11 +69,11 @@ def _unwind(number: int, _frame: object) -> None:
 
 
 class Deferred:
-    """Signals that wait.
+    """Signals that are held back.
 
     Attributes:
-        handlers: actions afterwards, by signal.
-        arrived: those that came meanwhile.
+        handlers: handlers to restore afterwards, by signal.
+        arrived: signals that arrived meanwhile.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class Deferred:
         self.arrived: list[int] = []
 
     def disregard(self) -> None:
-        """Ignore signals that would unwind the run, now and later: its work is done."""
+        """Ignore signals that would interrupt the run, now and later: its work is done."""
         for number, handler in self.handlers.items():
             if handler is _unwind:
                 self.handlers[number] = signal.SIG_IGN
@@ -91,9 +91,9 @@ class Deferred:
 
 @contextlib.contextmanager
 def interrupts_deferred() -> Iterator[Deferred]:
-    """Let signals that come during the enclosed statements, and would unwind them, take effect after them.
+    """Defer signals that would interrupt the enclosed statements until these are done.
 
-    In a thread other than the main one, where no signal handler ever runs, this does nothing.
+    In a thread other than the main one, where signal handlers never run, this does nothing.
     """
     deferred = Deferred()
     if threading.current_thread() is not threading.main_thread():

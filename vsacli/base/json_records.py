@@ -1,4 +1,4 @@
-"""Conversion of records to JSON under published keys, and back; JSON has no numbers that are not finite."""
+"""Conversion of records to JSON under published keys, and back; non-finite numbers become null."""
 
 from __future__ import annotations
 
@@ -9,50 +9,50 @@ from functools import cache
 from typing import Any, ClassVar, Self, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 JsonObject: TypeAlias = Mapping[str, Any]
-"""An object of JSON."""
+"""A JSON object."""
 
 Shape: TypeAlias = Mapping[str, Union[str, "Shape"]]
-"""A JSON object with the name of an attribute in place of each value."""
+"""The keys of a JSON object, each with the name of an attribute in place of its value."""
 
 OPTIONAL = "?"
 
 
 def named(*attributes: str) -> dict[str, str]:
-    """Return the shape of attributes that stand under their own names."""
+    """Return the shape of attributes that are published under their own names."""
     return {name: name for name in attributes}
 
 
 class Published:
-    """A dataclass with a published form as JSON.
+    """A dataclass with a published JSON form.
 
-    Its `shape` mirrors that: the keys in their order, nested as they are, each with the attribute whose value
-    stands there. A key with `?` at its end is left out while that value is None or empty. A class without a
-    shape has its fields under their own names.
+    `shape` has the keys of the JSON object in their order and nesting, each with the attribute whose value it
+    holds. A key that ends with `?` is omitted while that value is None or empty. Without a shape, all fields
+    are published under their own names.
     """
 
     shape: ClassVar[Shape] = {}
 
     def as_json(self) -> dict[str, Any]:
-        """JSON values under the published keys, None for numbers that are not finite."""
+        """Return JSON values under the published keys; non-finite numbers are None."""
         return _written(self, _shape_of(type(self)))
 
 
 class Stored(Published):
-    """A published record that is read back, by the types of its fields.
+    """A published record that can be read back, by the types of its fields.
 
-    `key` names the field that is no part of the JSON object, since it is the key of the object in another.
+    `key` names the field that is not part of the JSON object because it is the key of that object in another.
     """
 
     key: ClassVar[str] = ""
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """Return a record from the result of `as_json` and `further` fields; None for a float is NaN.
+        """Return a record from the result of `as_json` and `further` fields; None for a float becomes NaN.
 
         Fields added to a format later have defaults, since earlier files lack them.
 
         Raises:
-            LookupError, TypeError, AttributeError, ValueError: it is no such record.
+            LookupError, TypeError, AttributeError, ValueError: the content is not such a record.
         """
         types = _types_of(cls)  # type: ignore[arg-type]  # mypy does not know that classes are hashable
         found = _found(content, _shape_of(cls))
@@ -60,7 +60,7 @@ class Stored(Published):
 
 
 def json_value(content: Any) -> Any:
-    """Anything as JSON values, None for numbers that are not finite."""
+    """Convert anything to JSON values; non-finite numbers become None."""
     match content:
         case Published():
             return content.as_json()
@@ -95,7 +95,7 @@ def _written(record: Published, shape: Shape) -> dict[str, Any]:
 
 
 def _found(content: JsonObject, shape: Shape) -> Iterator[tuple[str, Any]]:
-    """Yield the attributes of a shape for which there are values, and those."""
+    """Yield the names of attributes for which there is content, each with its content."""
     for key, inner in shape.items():
         key = key.removesuffix(OPTIONAL)
         if key not in content:
@@ -107,7 +107,7 @@ def _found(content: JsonObject, shape: Shape) -> Iterator[tuple[str, Any]]:
 
 
 def _read(expected: Any, content: Any) -> Any:
-    """Return a value of a type of fields: a number, a tuple, a mapping, a record, any of those or None."""
+    """Convert content to the type of a field: a number, tuple, mapping or record, or an optional one."""
     types = get_args(expected)
     match get_origin(expected) or expected:
         case origin if type(None) in types:
@@ -126,7 +126,7 @@ def _read(expected: Any, content: Any) -> Any:
 
 
 def _read_entry(expected: Any, key: str, content: Any) -> Any:
-    """Return the value under a key of a mapping, which may have the key as a field."""
+    """Convert the value under a key of a mapping; a record may have that key as a field."""
     if isinstance(expected, type) and issubclass(expected, Stored) and expected.key:
         return expected.from_json(content, **{expected.key: key})
     return _read(expected, content)

@@ -10,10 +10,10 @@ from typing import Any
 
 
 class LazyRegistry(Mapping[str, Any]):
-    """Things by name, each imported when it is looked up; the names alone import nothing.
+    """Objects by name, each imported when it is looked up; listing the names imports nothing.
 
     Args:
-        homes: where each thing is, "module:name".
+        homes: location of each object, "module:name".
     """
 
     def __init__(self, homes: Mapping[str, str]) -> None:
@@ -24,10 +24,10 @@ class LazyRegistry(Mapping[str, Any]):
         return getattr(importlib.import_module(module), thing)
 
     def name_of(self, cls: type) -> str:
-        """Return the name of a class that is one of the things; imports nothing.
+        """Return the name of a registered class, without importing anything.
 
         Raises:
-            KeyError: it is not among them.
+            KeyError: the class is not registered.
         """
         home = f"{cls.__module__}:{cls.__qualname__}"
         for name, other in self.homes.items():
@@ -48,11 +48,11 @@ class LazyRegistry(Mapping[str, Any]):
 def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return `__getattr__` and `__dir__` of a package that imports its exports at first use (PEP 562).
 
-    Its `__init__.py` lists the exports as imports under `if TYPE_CHECKING:`, in one place for type checkers
-    and the running program; `import *` stands for all that a package exports.
+    Its `__init__.py` lists the exports as imports under `if TYPE_CHECKING:`, one list for type checkers and
+    for the running program; `import *` stands for all exports of a package.
 
     Args:
-        package: its name.
+        package: name of the package.
     """
 
     @cache
@@ -68,7 +68,7 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         if name not in (homes() if listed is None else listed):
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         home = homes()[name]
-        if home == package:  # a module of its own
+        if home == package:  # a submodule
             return importlib.import_module(f"{package}.{name}")
         return getattr(importlib.import_module(home), name)
 

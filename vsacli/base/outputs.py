@@ -1,4 +1,4 @@
-"""All files that a command writes: staged beside their targets, and published together or not at all."""
+"""Files that a command writes: staged next to their targets, and published together or not at all."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from vsacli.base.storage import STANDARD, remove, reporting_storage_errors, stag
 
 @dataclass(frozen=True)
 class Staged:
-    """A file to be, or a folder of them. A full or failing disk raises a StorageError.
+    """An output file or folder that is not yet published. A full or failing disk raises a StorageError.
 
     Attributes:
-        path: its name as given by the user.
-        target: the file it refers to, links followed.
-        temporary: the file to write meanwhile; it exists and obeys the umask.
+        path: name as given by the user.
+        target: file that the name refers to, links resolved.
+        temporary: file to write meanwhile; it exists, with the permissions of the umask.
     """
 
     path: Path
@@ -33,20 +33,20 @@ class Staged:
 
     @classmethod
     def unnamed(cls, path: Path) -> Staged:
-        """Create a file that goes with the temporary folder it is in."""
+        """Create a file in a temporary folder, together with which it is removed."""
         with reporting_storage_errors(path):
             path.touch()
         return cls(path, path, path)
 
     @contextlib.contextmanager
     def opened(self, *, binary: bool = False) -> Iterator[Any]:
-        """Open for bytes, or for text whose lines end as the writer says."""
+        """Open for bytes, or for text without translation of line ends."""
         how: dict[str, Any] = {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": ""}
         with reporting_storage_errors(self.path), self.temporary.open(**how) as stream:
             yield stream
 
     def write_text(self, text: str) -> None:
-        """Write a text."""
+        """Write a text as UTF-8."""
         self.write_bytes(text.encode("utf-8"))
 
     def write_bytes(self, content: bytes) -> None:
@@ -58,14 +58,15 @@ class Staged:
 class Outputs:
     """Context manager around all files that a command writes.
 
-    They are checked and staged when they are named, before anything is computed, and get their names when the
-    context is left without an exception: all of them, or none if one cannot. A folder that is new appears
-    whole. With that the run counts as done, and signals no longer end it: whoever is told that it was ended
-    finds nothing new. A process that is killed leaves hidden files at most, which the next one in that folder
-    removes; and while files get their names in a folder that was there, some of them before the others.
+    Files are checked and staged when they are named, before anything is computed. When the context is left
+    without an exception, they all get their names, or none does if one cannot. A new folder appears with its
+    whole content. From then on the run counts as done and signals no longer end it: a run reported as
+    interrupted has published nothing. A killed process leaves only hidden files, which the next command in
+    that folder removes, unless it is killed while files get their names in an existing folder: then only some
+    have theirs.
 
     Args:
-        overwrite: whether files that exist may be replaced; None if the command has no option for that.
+        overwrite: whether existing files may be replaced; None if the command has no option for that.
         inputs: files that the command reads, which it never replaces.
     """
 
@@ -83,9 +84,9 @@ class Outputs:
         """Stage a file.
 
         Raises:
-            StorageError: it exists and must not be replaced, is no regular file, or its folder does not exist
-                and was not asked for, or cannot be written.
-            InputError: the command reads it, or writes another file of this name.
+            StorageError: the file exists and must not be replaced, or is not a regular file; or its folder is
+                neither there nor requested, or cannot be written to.
+            InputError: the command reads the file, or already writes one of this name.
         """
         target = self.check(path)
         staged = self._in_new_folder(target) or self._staging(target)
@@ -95,7 +96,7 @@ class Outputs:
         return self._files[-1]
 
     def check(self, path: str | Path) -> Path:
-        """Refuse a path that cannot be staged; return the file it refers to, links followed.
+        """Refuse a path that cannot be staged; return the file it refers to, links resolved.
 
         Raises:
             StorageError, InputError: as `file`.
@@ -116,10 +117,10 @@ class Outputs:
         return target
 
     def folder(self, path: str | Path) -> None:
-        """Ask for a folder, which is made if it does not exist.
+        """Request a folder, which is created if it does not exist.
 
         Raises:
-            StorageError: there is a file of that name, or it cannot be made.
+            StorageError: a file has that name, or the folder cannot be created.
         """
         with reporting_storage_errors(path):
             target = Path(os.path.realpath(path))
@@ -138,18 +139,18 @@ class Outputs:
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The files, in the order in which they were named."""
+        """Paths of the files, in the order in which they were named."""
         return tuple(file.path for file in self._files)
 
     def _in_new_folder(self, target: Path) -> Path | None:
-        """Return where a file or folder is staged as part of a folder that is new."""
+        """Return the place of a file or folder in a new folder that is staged; None if it belongs to none."""
         for folder in self._folders.values():
             if target.is_relative_to(folder.target):
                 return folder.temporary / target.relative_to(folder.target)
         return None
 
     def _staging(self, target: Path) -> Path:
-        """Return a name in the folder of a target, from which earlier runs' leavings are removed."""
+        """Return a temporary name next to a target; remove leftovers of earlier runs from that folder."""
         if all(target.parent != each.parent for each in self._temporaries):
             sweep(target.parent)
         self._temporaries.append(target.with_name(staging_name()))
@@ -166,7 +167,7 @@ class Outputs:
                 remove(path)
 
     def _publish(self) -> None:
-        """Name everything, once it has reached the disk; where one cannot be named, none keeps its name."""
+        """Give all files their names, once on the disk; if one cannot be named, none keeps its name."""
         for file in self._files:
             with reporting_storage_errors(file.path):
                 _sync(file.temporary, os.O_RDWR)
@@ -204,7 +205,7 @@ class Outputs:
 
 
 def _check_target(path: str | Path, target: Path, *, overwrite: bool | None) -> None:
-    """Refuse to write a file that `path` means if it is none, may not be replaced, or has several names."""
+    """Refuse a target that is not a regular file, may not be replaced, or has several hard links."""
     if target.is_dir():
         raise StorageError(path, "is a folder; give the name of a file")
     if not target.parent.is_dir():
@@ -226,15 +227,16 @@ def _check_target(path: str | Path, target: Path, *, overwrite: bool | None) -> 
 
 
 def _already_there(path: str | Path, *, optional: bool) -> StorageError:
-    """Return the error of a file that must not be replaced, by a command that may have an option for that."""
+    """Return the error for an existing file; the advice depends on whether the command can replace it."""
     advice = "replace it with --overwrite" if optional else "remove it first"
     return StorageError(path, f"exists already; choose another name, or {advice}")
 
 
 def _take_permissions(path: Path, replaced: os.stat_result) -> None:
-    """Give a file the owner, group and mode of the one that it replaces, as far as the system permits.
+    """Give a file the owner, group and mode of the file that it replaces, as far as the system permits.
 
-    A group that cannot be given is one of strangers: it may do no more with the file than all others may.
+    If the group cannot be set, members of the file's own group are strangers: they get no more rights than
+    others have.
     """
     mode, new = stat.S_IMODE(replaced.st_mode), path.stat()
     if hasattr(os, "chown"):
@@ -254,7 +256,7 @@ def _permitted(change: Callable[..., None], *arguments: object) -> bool:
 
 
 def _name_without_replacing(file: Staged, *, optional: bool) -> None:
-    """Name a file without ever replacing another one, which a rename would."""
+    """Name a file without ever replacing another one, unlike a rename."""
     try:
         os.link(file.temporary, file.target)
     except FileExistsError as error:

@@ -1,4 +1,4 @@
-"""Receivers of progress and of sentences for the user, with silent ones as defaults."""
+"""Interfaces for progress bars and notes to the user, with silent defaults."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class Bar(Protocol):
 
 
 Progress: TypeAlias = Callable[[int], AbstractContextManager[Bar]]
-"""Called with the number of steps before work begins: a bar for as long as it lasts."""
+"""Callable that gets the number of steps before work begins; returns a context manager of a bar."""
 
 
 class NoBar:
-    """A bar that nobody sees.
+    """A bar that is not shown.
 
     Attributes:
         pos: steps counted so far.
@@ -33,14 +33,14 @@ class NoBar:
 
 
 def unseen(steps: int) -> AbstractContextManager[NoBar]:
-    """Return a bar for work of this many steps that nobody watches."""
+    """Return a bar that is not shown, for any number of steps."""
     del steps
     return nullcontext(NoBar())
 
 
 Tell: TypeAlias = Callable[[str], object]
-"""Receives a sentence for the user."""
+"""Callable that receives a sentence for the user."""
 
 
 def unheard(_sentence: str) -> None:
-    """Drop the sentence: nobody listens."""
+    """Discard the sentence."""

@@ -1,7 +1,7 @@
-"""Signals that are commanded over time: the motion, others of joints such as stiffness, the wrench.
+"""Signals commanded over time: the motion, other signals of joints such as stiffness, and the wrench.
 
-Each signal is declared once. Keys and columns of trajectory files, variables of results with their
-attributes, rows of kernels and fields of commands follow from that. A further signal of joints is an entry of
+Each signal is declared once. Keys and columns of trajectory files, result variables and their attributes,
+rows of kernels and fields of commands follow from the declaration. To add a signal of joints, add an entry to
 `COMMANDED`.
 """
 
@@ -15,20 +15,20 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 
 
 class Signal(NamedTuple):
-    """A function of time: a value, and the derivatives of it that are needed.
+    """A function of time: its value and the time derivatives that are needed.
 
     Attributes:
-        key: in trajectory files.
-        names: of the value and its derivatives, as in tables of samples and in results.
+        key: key in trajectory files.
+        names: names of the value and its derivatives in tables of samples and in results.
         quantities: their units.
-        long_names: a few words on each.
-        meaning: a few words, for the documentation of trajectory files.
+        long_names: their short descriptions.
+        meaning: short description of the signal in the documentation of trajectory files.
         spline_degree: odd degree of the spline through recorded values.
         positive: whether the value must be positive.
-        optional: whether a component may have no value, so that it is NaN all the time.
-        components: how many numbers a value has; None: one a joint.
-        device: key in the robot file of what a joint takes it by, if that is not its actuator; a device that
-            is not commanded stays where it is.
+        optional: whether components without a value, NaN throughout, are allowed.
+        components: number of components of a value; None: one a joint.
+        device: key in the robot file of the joint's device that follows the signal, if that is not the
+            actuator; a device without a command stays where it is.
     """
 
     key: str
@@ -110,15 +110,15 @@ WRENCH = Signal(
 )
 
 COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS, DAMPING)}
-"""Signals besides the position that joints can be commanded by, by key."""
+"""Signals other than the position that joints can be commanded by, by key."""
 
 
 def commanded_names() -> tuple[str, ...]:
-    """Names of all commanded signals and their derivatives."""
+    """Return the names of all commanded signals and their derivatives."""
     return tuple(name for signal in COMMANDED.values() for name in signal.names)
 
 
 def orders_of_derivation() -> dict[str, int]:
-    """Return the order of derivation of each commanded variable of the joints."""
+    """Return the order of the time derivative of each commanded joint variable, by name."""
     signals = (POSITION, *COMMANDED.values())
     return {name: order for signal in signals for order, name in enumerate(signal.names)}

@@ -1,4 +1,4 @@
-"""The variables of a simulation: those of the inverse dynamics as commanded, as they were, and apart."""
+"""Variables of a simulation: commanded, actual (simulated) and measured ones, and errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from vsacli.base.variables import VARIABLES, Variable
 
 TRACKED = ("q", "dq", "ddq", "stiffness", "dstiffness")
-"""Commanded variables from which a simulation deviates."""
+"""Commanded variables that have an actual counterpart."""
 
 ACTUAL = (
     *TRACKED,
@@ -22,17 +22,17 @@ MEASURED = ("q", "theta", "tau_motor")
 
 
 def actual(name: str) -> str:
-    """Name under which the actual value of a variable is stored."""
+    """Return the name under which the actual value of a variable is stored."""
     return f"{name}_actual"
 
 
 def measured(name: str) -> str:
-    """Name under which the reading of a variable is stored."""
+    """Return the name under which the measured value of a variable is stored."""
     return f"{name}_measured"
 
 
 def error(name: str) -> str:
-    """Name under which the error of a variable is stored, actual minus commanded."""
+    """Return the name under which the error of a variable is stored, actual minus commanded."""
     return f"{name}_error"
 
 
@@ -58,4 +58,4 @@ def _declared() -> Iterator[Variable]:
 
 
 SIMULATION_VARIABLES: dict[str, Variable] = {variable.name: variable for variable in _declared()}
-"""Every variable of a simulation by name, `time` first."""
+"""All variables of a simulation by name, `time` first."""

@@ -1,7 +1,7 @@
 """Unfinished files and their names, temporary folders, and standard input.
 
-The hidden name of an unfinished file tells its process, so that a later run knows whether somebody still
-works on it. An error of the operating system becomes a `StorageError` with a sentence about the file.
+The hidden name of an unfinished file identifies its process, so that a later run knows whether it is still
+being written. An error of the operating system becomes a `StorageError` with a sentence about the file.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from typing import NamedTuple
 from vsacli.base.errors import StorageError
 
 STANDARD = "-"
-"""Stands for a standard stream on a command line; a file of that name is `./-`."""
+"""Name of a standard stream on a command line; a file of that name is given as `./-`."""
 
 BYTES_PER_READ = 2**20
 
 UNCHECKED_BYTES = 2**24
-"""Size up to which a file is sooner written than its disk is asked for room."""
+"""Size (bytes) below which free space is not checked, since writing such a file takes less time."""
 
 _REASON = {
     errno.ENOSPC: "the disk is full",
@@ -49,7 +49,7 @@ def reporting_storage_errors(path: str | Path) -> Iterator[None]:
 
 
 def storage_error(path: str | Path, error: OSError) -> StorageError:
-    """Return the sentence for an operating system error met while writing `path`."""
+    """Return the StorageError for an OSError raised while writing `path`."""
     return StorageError(path, f"cannot be written: {reason(error)}; nothing was changed there")
 
 
@@ -70,7 +70,7 @@ def reason(error: OSError) -> str:
 
 
 def check_free_space(path: str | Path, size: int) -> None:
-    """Refuse a file of `size` bytes that its disk has no room for, from `UNCHECKED_BYTES` on.
+    """Refuse a file that does not fit on its disk; sizes below `UNCHECKED_BYTES` are not checked.
 
     Raises:
         StorageError: with both sizes in MB.
@@ -92,11 +92,11 @@ def check_free_space(path: str | Path, size: int) -> None:
 _NAME = re.compile(r"\.vsacli-(?P<host>[0-9a-f]{12})-(?P<process>\d+)-(?P<start>\d+)-[0-9a-f]{16}\.tmp")
 
 UNKNOWN_START = 0
-"""Start of a process on systems that do not tell it."""
+"""Start time of a process on systems that do not report it."""
 
 
 class Owner(enum.StrEnum):
-    """The owner of an unfinished file: a process of this host or another one."""
+    """The owner of an unfinished file: a process of this host or of another one."""
 
     ENDED = "ended"
     RUNNING = "running"
@@ -104,11 +104,11 @@ class Owner(enum.StrEnum):
 
 
 class Unfinished(NamedTuple):
-    """A file, or a folder of them, that is not finished.
+    """An unfinished file or folder.
 
     Attributes:
         path: the file.
-        owner: who works on it.
+        owner: state of the process that wrote it.
         size: bytes so far.
     """
 
@@ -118,16 +118,16 @@ class Unfinished(NamedTuple):
 
 
 def staging_name() -> str:
-    """Return a hidden name of its own; it tells host, process, and when the process began."""
+    """Return a unique hidden name that identifies host, process, and start time of the process."""
     process = os.getpid()
     return f".vsacli-{_host()}-{process}-{_start(process)}-{os.urandom(8).hex()}.tmp"
 
 
 def sweep(folder: Path) -> None:
-    """Remove unfinished files in a folder that killed processes of this host left there.
+    """Remove unfinished files that killed processes of this host left in a folder.
 
-    Files of living processes stay, and files from other hosts, whose processes cannot be seen from here: the
-    folder may be on a network share.
+    Files of running processes stay, and so do files from other hosts, whose processes cannot be seen from
+    here: the folder may be on a network share.
     """
     for path, owner in _staged(folder):
         if owner is Owner.ENDED:
@@ -135,12 +135,12 @@ def sweep(folder: Path) -> None:
 
 
 def unfinished(folder: Path) -> list[Unfinished]:
-    """Return the unfinished files of a folder, also those of killed processes."""
+    """Return the unfinished files of a folder, including those of killed processes."""
     return [Unfinished(path, owner, size_of(path)) for path, owner in sorted(_staged(folder))]
 
 
 def _staged(folder: Path) -> list[tuple[Path, Owner]]:
-    """Return each staged file of a folder, if it can be read, with its owner."""
+    """Return each staged file of a folder with its owner; nothing if the folder cannot be read."""
     with contextlib.suppress(OSError):
         owners = ((path, owner_of(path.name)) for path in folder.iterdir())
         return [(path, owner) for path, owner in owners if owner is not None]
@@ -148,7 +148,7 @@ def _staged(folder: Path) -> list[tuple[Path, Owner]]:
 
 
 def owner_of(name: str) -> Owner | None:
-    """Return who works on a staged file of a name; None if it is no such name."""
+    """Return the owner of a staged file by its name; None if it is not the name of one."""
     found = _NAME.fullmatch(name)
     if found is None:
         return None
@@ -156,17 +156,17 @@ def owner_of(name: str) -> Owner | None:
         return Owner.ELSEWHERE
     process = int(found["process"])
     try:
-        os.kill(process, 0)  # asks only whether there is one
+        os.kill(process, 0)  # signal 0 only tests whether the process exists
     except ProcessLookupError:
         return Owner.ENDED
     except OSError:
-        return Owner.RUNNING  # somebody else's
+        return Owner.RUNNING  # exists, but belongs to another user
     same = _start(process) == int(found["start"])
-    return Owner.RUNNING if same else Owner.ENDED  # the number of an ended process is used again
+    return Owner.RUNNING if same else Owner.ENDED  # numbers of ended processes are reused
 
 
 def size_of(path: Path) -> int:
-    """Return the bytes of a file, or of all files in a folder; 0 if it has gone."""
+    """Return the size in bytes of a file, or of all files in a folder; 0 if it no longer exists."""
     size = 0
     with contextlib.suppress(OSError):
         size = sum(map(size_of, path.iterdir())) if is_folder(path) else path.lstat().st_size
@@ -174,12 +174,12 @@ def size_of(path: Path) -> int:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder itself, no link to one."""
+    """Return whether a path is itself a folder, not a link to one."""
     return path.is_dir() and not path.is_symlink()
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a folder, if it is there and the system allows it."""
+    """Remove a file or a folder, if it exists and the system allows it."""
     if is_folder(path):
         import shutil
 
@@ -191,7 +191,7 @@ def remove(path: Path) -> None:
 
 @cache
 def _host() -> str:
-    """Return a digest of the host and its namespace of process numbers: containers may share a host name."""
+    """Return a digest of the host and its process namespace: containers may share a host name."""
     import hashlib
 
     try:
@@ -202,7 +202,7 @@ def _host() -> str:
 
 
 def _start(process: int) -> int:
-    """Return when a process began, in clock ticks since the system did (proc(5))."""
+    """Return the start time of a process, in clock ticks since boot (proc(5))."""
     try:
         status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -212,13 +212,13 @@ def _start(process: int) -> int:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Make a folder that is removed with its content at the end of the context.
+    """Create a folder that is removed with its content at the end of the context.
 
-    Folders of killed processes are removed. An error of the disk is reported as one of the folder for
-    temporary files, whatever the file in it is called.
+    Folders of killed processes are removed. Disk errors on files in it are reported for the folder for
+    temporary files, since the user did not name those files.
 
     Raises:
-        StorageError: there is no place for one, or not enough of it.
+        StorageError: the folder cannot be created, or its disk is full.
     """
     from tempfile import gettempdir
 
@@ -244,13 +244,13 @@ _copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noq
 
 
 def place_of(path: str | os.PathLike[str]) -> str:
-    """Return where the content of a file can be read: at its path, or in a copy.
+    """Return the path at which the content of a file can be read: its own, or that of a copy.
 
-    Standard input has a copy, since it can be read only once, and so have files of `reading_copies`.
+    Standard input has a copy, since it can be read only once; so have the files of `reading_copies`.
 
     Raises:
         OSError: standard input is closed, or cannot be read.
-        StorageError: there is no room for the copy.
+        StorageError: the disk has no room for the copy.
     """
     name = os.fspath(path)
     copies = _copies.get()
@@ -261,7 +261,7 @@ def place_of(path: str | os.PathLike[str]) -> str:
 
 @contextlib.contextmanager
 def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
-    """Within this context, files of these paths are read elsewhere."""
+    """Read files of these paths from copies within this context."""
     token = _copies.set(copies)
     try:
         yield
@@ -271,7 +271,7 @@ def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
 
 @cache
 def _standard_input() -> str:
-    """Return a copy that goes with the process: inputs are read more than once, to name lines."""
+    """Copy standard input to a file, removed at exit: inputs are read more than once, to name lines."""
     import atexit
 
     if sys.stdin is None:

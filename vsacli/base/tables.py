@@ -1,4 +1,4 @@
-"""Tables of text, for reports and terminals, and the same for notebooks."""
+"""Tables as aligned text for reports and terminals, and as HTML for notebooks."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from html import escape
 from typing import NamedTuple
 
 BETWEEN_CELLS = "   "
-"""Separator of cells, which no other text of a report contains: tables are recognized by it."""
+"""Separator of cells; no other text of a report contains it, so tables are recognized by it."""
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield the lines of a table: the first column to the left, the others to the right."""
+    """Yield the lines of a table: the first column aligned left, the others right."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         name, *cells = (
@@ -22,12 +22,12 @@ def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
 
 
 class ReportText(NamedTuple):
-    """A report as people read it, in its parts; as a text, its lines without a final newline.
+    """A report in its parts; as a string, its lines without a final newline.
 
     Attributes:
         headline: robot and trajectory of the run, and the verdict.
-        rows: a table, its header first; none if there is no table.
-        lines: further findings, a line or more each.
+        rows: rows of a table, header first; empty if there is no table.
+        lines: further findings, one or more lines each.
     """
 
     headline: str
@@ -40,7 +40,7 @@ class ReportText(NamedTuple):
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
-    """Return a title and a table whose first row is its header, as HTML; the texts are escaped."""
+    """Return a title and a table as HTML; the first row is the header, and all texts are escaped."""
     header, *body = rows
     lines = "".join(_html_row(row, "td") for row in body)
     table = f"<table><thead>{_html_row(header, 'th')}</thead><tbody>{lines}</tbody></table>"

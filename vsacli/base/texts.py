@@ -1,4 +1,4 @@
-"""Texts from files, escaped for each output format, so that they cannot act on its reader."""
+"""Escaping of texts from files for each output format, so that they contain no control codes or markup."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
 
 
 MOST_LETTERS = 200
-"""Longest name."""
+"""Maximum length of a name."""
 
 
 def one_line(text: str) -> str:
-    r"""Return a text in one line; characters such as "\x1b", which move a cursor, are escaped."""
+    r"""Return a text in one line; control characters such as "\x1b", which can move a cursor, are escaped."""
     if text.isprintable():
         return text
     letters = (each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
@@ -23,42 +23,42 @@ def one_line(text: str) -> str:
 
 
 def as_name(text: str) -> str:
-    """Return a text that was not chosen as a name, such as a file name, in the form of one."""
+    """Return a text that was not chosen as a name, such as a file name, as a valid one."""
     return one_line(text)[:MOST_LETTERS]
 
 
 def for_terminal(text: str) -> str:
-    """Return the lines of a text, each as in `one_line`."""
+    """Return a text with each line escaped by `one_line`."""
     return "\n".join(map(one_line, text.split("\n")))
 
 
 def for_comment(text: str) -> str:
-    """Return a text for a comment in C, without anything that begins or ends one."""
+    """Return a text for a comment in C, free of comment delimiters."""
     return one_line(text).replace("*/", "* /").replace("/*", "/ *")
 
 
 def for_yaml(text: str) -> str:
-    """Return a text in double quotes for YAML, printable letters as they are; YAML has no surrogate pairs."""
+    """Return a text in double quotes for YAML, which has no surrogate pairs; escape unprintable letters."""
     quoted = json.dumps(text, ensure_ascii=False)
     return "".join(each if each.isprintable() else f"\\U{ord(each):08x}" for each in quoted)
 
 
 def for_markdown(text: str) -> str:
-    """Return a text for Markdown, in which no character is markup."""
+    """Return a text for Markdown in which all markup is escaped."""
     return _MARKDOWN.sub(r"\\\1", one_line(text))
 
 
 def sentence(clause: str) -> str:
-    """Return a clause as a sentence: with a full stop, unless it ends as a question."""
+    """Return a clause as a sentence, with a full stop unless it ends with a question mark."""
     return clause if clause.endswith(("?", ".")) else f"{clause}."
 
 
 FEWEST_IN_A_ROW = 3
-"""Names one after the other from which on only the first and the last are said."""
+"""Length from which a run of consecutive names is shortened to the first and the last."""
 
 
 def together(numbers: Sequence[int], names: Sequence[str]) -> str:
-    """Return the names with these numbers, which ascend; of those in a row the first and the last."""
+    """Return the names at ascending indices; a run of consecutive ones is shortened to first and last."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:
@@ -73,7 +73,7 @@ def together(numbers: Sequence[int], names: Sequence[str]) -> str:
 
 
 def shown(content: Any) -> Any:
-    """JSON values with every text in one line."""
+    """Return JSON values with each text in one line."""
     match content:
         case str():
             return one_line(content)

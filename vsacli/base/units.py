@@ -13,7 +13,7 @@ class Quantity:
     prismatic: str
 
     def unit(self, joint_type: str) -> str:
-        """Unit at a joint of the type "revolute" or "prismatic"."""
+        """Return the unit at a joint of type `revolute` or `prismatic`."""
         return self.revolute if joint_type == "revolute" else self.prismatic
 
     def __str__(self) -> str:
@@ -26,11 +26,11 @@ class WrenchQuantity(Quantity):
     """A wrench or a rate of it; its moments have the unit `revolute`, its forces the unit `prismatic`."""
 
     def unit(self, _joint_type: str) -> str:
-        """Both units, whatever the joint."""
+        """Return both units, whatever the joint."""
         return str(self)
 
     def of_axis(self, axis: int) -> str:
-        """Unit of a component: three forces, then three moments."""
+        """Return the unit of a component: three forces, then three moments."""
         return self.prismatic if axis < 3 else self.revolute
 
     def __str__(self) -> str:
@@ -38,7 +38,7 @@ class WrenchQuantity(Quantity):
 
 
 def time_text(time: float) -> str:
-    """Return a time with its unit: milliseconds, or microseconds where steps are that short."""
+    """Return a time with its unit, to milliseconds, or to microseconds where it is no multiple of 1 ms."""
     return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
 
 

@@ -1,6 +1,6 @@
 """The variables of a result, each declared once: dimensions, unit, long name, equation.
 
-The declaration feeds the pipeline, the HDF5 attributes, the CSV headers, the plots and the documentation.
+The declarations feed the pipeline, the HDF5 attributes, the CSV headers, the plots and the documentation.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from vsacli.base.wrench import wrench_columns
 
 MOTORS = (1, 2)
 SPRINGS = "springs"
-"""Requirement of variables that only joints with springs have, commanded signals apart."""
+"""Requirement of variables, other than commanded signals, that only joints with springs have."""
 
 MOTOR_CONSTANTS = ("torque_constant", "resistance")
-"""Constants of a motor that it must have to have a variable."""
+"""Motor constants that variables may require."""
 
 LOSSES = "friction"
 """Requirement of the variables of losses: friction or damping anywhere in the robot."""
 
 OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
-"""Requirements of variables that every result has, NaN where a joint does not meet them. Variables with other
-requirements are left out of a result if no joint of the robot meets them."""
+"""Requirements of variables that every result has, NaN at joints that do not meet them. A result omits
+variables with other requirements if no joint of the robot meets these."""
 
 
 class Variable(NamedTuple):
-    """A result variable as declared.
+    """Declaration of a result variable.
 
     Attributes:
-        name: as in the file and in Python.
+        name: name in files and in Python.
         dims: dimensions after `time`: (), ("joint",), ("joint", "motor") or ("wrench_axis",).
-        quantity: unit at revolute and prismatic joints, or of moments and forces.
-        long_name: a few words.
-        equation: number in Buondonno & De Luca (2016), or where the value comes from.
-        requires: condition on the joint, `SPRINGS`, a commanded signal by key, one of
-            `MOTOR_CONSTANTS`; else it is NaN. `LOSSES` all joints have if any has friction.
-        geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
+        quantity: units at revolute and prismatic joints, or of moments and forces.
+        long_name: short description.
+        equation: number in Buondonno & De Luca (2016), or source of the value.
+        requires: condition on a joint: `SPRINGS`, a commanded signal by key, or one of `MOTOR_CONSTANTS`;
+            values of other joints are NaN. All joints meet `LOSSES` if any has friction.
+        geared: exponent e: value on the motor shaft = value * gear_ratio**e (1 for position, -1 for torque).
     """
 
     name: str
@@ -63,7 +63,7 @@ def _given() -> Iterator[Variable]:
     yield Variable("time", (), units.TIME, "time", "given")
     yield from _of_signal(POSITION, "joint")
     for signal in COMMANDED.values():
-        # springs whose stiffness is not commanded have one of their own
+        # joints with springs have a stiffness even if it is not commanded
         yield from _of_signal(signal, "joint", SPRINGS if signal is STIFFNESS else signal.key)
     yield from _of_signal(WRENCH, "wrench_axis")
 
@@ -179,11 +179,11 @@ UNCERTAIN = (
     *(name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names),
     *("tau_e", "dtau_e", "ddtau_e", "phi", "theta", "dtheta", "tau_motor"),
 )
-"""The variables that have a standard deviation if a signal was recorded."""
+"""Variables that have a standard deviation if a signal was recorded."""
 
 
 def deviation(name: str) -> str:
-    """Name under which the standard deviation of a variable is stored."""
+    """Return the name under which the standard deviation of a variable is stored."""
     return f"{name}_std"
 
 
@@ -202,19 +202,19 @@ def _deviations(declared: Iterable[Variable]) -> Iterator[Variable]:
 VARIABLES: dict[str, Variable] = {
     variable.name: variable for variable in (*_given(), *_COMPUTED, *_deviations((*_given(), *_COMPUTED)))
 }
-"""Every variable by name, `time` first."""
+"""All variables by name, `time` first."""
 
 
 class Block:
-    """Variables over a block of consecutive steps, each an attribute of the shape (samples, joints[, 2]).
+    """Variables over consecutive samples, as attributes of shape (samples, joints[, 2]).
 
-    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
-    is NaN throughout. Variables missing from a block are None: the wrench, (samples, 6), if the trajectory
-    has none; `motor_energy`, which sums over the samples before, and the standard deviations until the block
-    has its place in a run; standard deviations without a recorded signal behind them.
+    A value that cannot be computed is NaN, and `flags` gives the reason; a variable that the joint's actuator
+    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6), of a trajectory
+    without one; `motor_energy`, an integral over all earlier samples, and standard deviations until the block
+    has its place in a run; standard deviations if no signal was recorded.
 
     Attributes:
-        declared: the variables that it may have, by name.
+        declared: variables that a block may have, by name.
     """
 
     declared: ClassVar[Mapping[str, Variable]] = VARIABLES
@@ -231,30 +231,30 @@ class Block:
         raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
-        """Return the variables of one joint by name, (samples,), those of its motors (2, samples)."""
+        """Return the variables of one joint by name: (samples,), or (2, samples) for its motors."""
         joints = {name: array for name, array in vars(self).items() if "joint" in self.declared[name].dims}
         return of_joint(joints, index)
 
     def arrays(self) -> dict[str, AnyArray]:
-        """Return the variables there are, by name."""
+        """Return the variables present, by name."""
         return {name: vars(self)[name] for name in self.declared if name in vars(self)}
 
     def taken(self, steps: slice | AnyArray) -> Self:
-        """Return some of its steps."""
+        """Return a block of the selected samples."""
         return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
 
     def replaced(self, **arrays: AnyArray) -> Self:
-        """Return the same with some variables that are other or further ones."""
+        """Return a copy of the block with variables replaced or added."""
         return type(self)(**{**self.arrays(), **arrays})
 
 
 def select_variables(
     names: Iterable[str], declared: Mapping[str, Variable] = VARIABLES
 ) -> tuple[Variable, ...]:
-    """Return the variables of these names, in declared order, `time` left out.
+    """Return the variables with these names in declared order, without `time`.
 
     Raises:
-        InputError: for each name that is no variable, the nearest one that is.
+        InputError: names are unknown; each is reported with the nearest valid one.
     """
     wanted = set(names)
     unknown = sorted(wanted - set(declared))
@@ -267,7 +267,7 @@ def select_variables(
 
 
 def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:
-    """CSV headers of a variable, in the order of its flattened values, e.g. `elbow.tau_motor_1`."""
+    """Return the CSV headers of a variable in the order of its flat values, e.g. `elbow.tau_motor_1`."""
     if "wrench_axis" in variable.dims:
         return wrench_columns(variable.name)
     endings = [f"_{motor}" for motor in MOTORS] if "motor" in variable.dims else [""]

@@ -19,10 +19,10 @@ WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components: the force, and the moment about the origin of the tool frame."""
 
 WRENCH_NAMES = ("wrench", "dwrench", "ddwrench")
-"""The wrench and its derivatives, as in `Wrench`, files and results."""
+"""Names of the wrench and its derivatives in `Wrench`, files and results."""
 
 WRENCH_FRAMES = ("end_effector", "base")
-"""Frames along whose axes the components may be given."""
+"""Frames along whose axes the components may be expressed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Wrench:
             `WRENCH_AXES`; N and N m, as are the derivatives per s^k.
         dwrench: first time derivative of these components.
         ddwrench: second time derivative of these components.
-        frame: along whose axes the components are, one of `WRENCH_FRAMES`.
+        frame: frame along whose axes the components are expressed, one of `WRENCH_FRAMES`.
     """
 
     wrench: FloatArray
@@ -58,20 +58,20 @@ class Wrench:
 
 
 def check_frame(frame: str, of: str = "wrench") -> None:
-    """Refuse a word that is no frame of a wrench, or of a similar quantity `of`.
+    """Refuse an unknown frame of a wrench, or of a similar quantity `of`.
 
     Raises:
-        InputError: naming the nearest one that is.
+        InputError: with the nearest valid frame.
     """
     if frame not in WRENCH_FRAMES:
         raise InputError.one(f"unknown frame {frame!r} of the {of}{did_you_mean(frame, WRENCH_FRAMES)}")
 
 
 def check_wrench(value: object) -> None:
-    """Refuse an argument that is no wrench.
+    """Refuse an argument that is not a wrench.
 
     Raises:
-        TypeError: saying how to make one.
+        TypeError: with the calls that create one.
     """
     check_type(
         "wrench", value, Wrench, "make one by Wrench.constant, or by Wrench(wrench, dwrench, ddwrench)"
@@ -79,5 +79,5 @@ def check_wrench(value: object) -> None:
 
 
 def wrench_columns(name: str) -> list[str]:
-    """CSV headers of the wrench or of a derivative of it, e.g. `dfx` for `dwrench`."""
+    """Return the CSV headers of the wrench or of a derivative of it, e.g. `dfx` for `dwrench`."""
     return [name.removesuffix("wrench") + axis for axis in WRENCH_AXES]

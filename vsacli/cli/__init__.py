@@ -1,4 +1,4 @@
-"""The command line: the only place that prints and sets exit codes."""
+"""The command line; only this package prints and sets exit codes."""
 
 from vsacli.cli.main import main
 

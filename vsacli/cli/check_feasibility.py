@@ -1,4 +1,4 @@
-"""`vsacli check-feasibility`."""
+"""`vsacli check-feasibility`: the report of a run without its result file, and fixes."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def check_feasibility(
 
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:
-    """Compute, and draw the figure from a result file that exists no longer than it takes."""
+    """Compute, and draw the figure from a temporary result file."""
     from vsacli.base.outputs import Staged
     from vsacli.base.storage import temporary_folder
     from vsacli.results.charts.figures import (
@@ -159,7 +159,7 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
 
 
 def _write_fixed(suggestions: Suggestions, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
-    """Write one of the fixes, if there is one, and print the name of the file."""
+    """Write the fix with this number, if it exists, and print the name of the file."""
     from vsacli.studies.search import write_fixed
 
     remedies = suggestions.remedies

@@ -1,4 +1,4 @@
-"""`vsacli codegen`."""
+"""`vsacli codegen`: C code of a robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts that commands share: arguments and options, reading inputs, running, showing the report."""
+"""Parts shared by commands: arguments and options, loading of inputs, runs, and the printed report."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
-    """Return a callback for words separated by commas, such as the example."""
+    """Return a click callback that splits a text such as the example at its commas."""
 
     def words(_context: click.Context, _parameter: click.Parameter, text: str | None) -> Any:
         if text is None:
@@ -41,7 +41,7 @@ def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
 
 
 def variables_option(default: str) -> Callable[[Any], Any]:
-    """`--variables`, of a command that otherwise takes those that `default` says."""
+    """Return the option `--variables`; the help text gives `default` as its default."""
     return click.option(
         "--variables",
         metavar="NAMES",
@@ -53,7 +53,7 @@ def variables_option(default: str) -> Callable[[Any], Any]:
 def numbers(
     _context: click.Context, _parameter: click.Parameter, written: str | None
 ) -> tuple[float, ...] | None:
-    """Return a callback for numbers separated by commas."""
+    """Convert numbers separated by commas, as a click callback."""
     if written is None:
         return None
     try:
@@ -63,7 +63,7 @@ def numbers(
 
 
 def example(command: str) -> str:
-    """Return the end of a help text: a command line that works."""
+    """Return the epilog of a help text: a command line that works."""
     return f"\b\nExample:\n  {command}"
 
 
@@ -106,10 +106,10 @@ set_option = click.option(
 
 
 def check_plotted(folder: str | None) -> None:
-    """Refuse `--format` of a command that draws only with `--plot`, if no folder is given.
+    """Refuse `--format` without the folder of `--plot`, in commands that draw only with `--plot`.
 
     Raises:
-        click.UsageError: the format would be of nothing.
+        click.UsageError: `--format` is given, but no folder.
     """
     source = click.get_current_context().get_parameter_source("file_format")
     if folder is None and source is not ParameterSource.DEFAULT:
@@ -126,7 +126,7 @@ engine_option = click.option(
 
 
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """`--engine` and `--threads`."""
+    """Add the options `--engine` and `--threads`."""
     threads = click.option(
         "--threads",
         type=click.IntRange(min=1),
@@ -137,7 +137,7 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Inputs(NamedTuple):
-    """The inputs of a computation."""
+    """The inputs of a computation: robot and trajectory."""
 
     robot: Robot
     trajectory: Trajectory
@@ -149,10 +149,11 @@ class Inputs(NamedTuple):
 
 
 def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tuple[str, ...] = ()) -> Inputs:
-    """Read and check both files, with changes as `--set` gives them.
+    """Read and check both files, with the changes of `--set`.
 
     Raises:
-        InputError: every problem of the robot, or else of the trajectory; or a change that cannot be made.
+        InputError: with every problem of the robot, or else of the trajectory; or a change that cannot be
+            made.
     """
     from vsacli.robot.file import load_robot
     from vsacli.trajectory.file import load_trajectory
@@ -170,7 +171,7 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
 
 @contextmanager
 def _naming_option() -> Iterator[None]:
-    """Say of a change that cannot be made where it comes from."""
+    """Add the name of the option `--set` to errors of changes."""
     from vsacli.documents.reading import ChangeError
 
     try:
@@ -180,7 +181,7 @@ def _naming_option() -> Iterator[None]:
 
 
 def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
-    """Return the changes of the robot and those of the trajectory."""
+    """Return the changes that concern the robot, and those that concern the trajectory."""
     if not changes:
         return {}, {}
     from vsacli.documents.reading import read_changes
@@ -190,14 +191,14 @@ def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
-    """Compute block by block; a writer gets each block as it comes, and the report at the end."""
+    """Run block by block; a writer receives each block when it is computed, and the report at the end."""
     talk.detail(run.choice.reason)
     with writer or nullcontext(), talk.progress(run.trajectory.samples) as progress:
         for block in run:
             if writer is not None:
                 writer.write(block)
             progress.update(len(block.time))
-            del block  # which would stay in memory while the next one is computed
+            del block  # else it stays in memory while the next one is computed
         report = run.report()
         if writer is not None:
             writer.finish(report.as_json())
@@ -205,19 +206,19 @@ def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
 
 
 def run_stem(robot_path: str, trajectory_path: str) -> str:
-    """Return the beginning of the names of output files, unless the user says otherwise."""
+    """Return the default beginning of the names of output files."""
     stems = ("stdin" if path == STANDARD else Path(path).stem for path in (robot_path, trajectory_path))
     return "-".join(stems)
 
 
 def result_line(result: StoredResult) -> str:
-    """Return a result file in one line, for `--verbose`."""
+    """Return a summary of a result file on one line, for `--verbose`."""
     names = f"{result.robot_name}, {result.trajectory_name}"
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
 
 
 def show_report(report: Report, as_json: bool, suggestions: Suggestions | None = None) -> Exit:
-    """Print the report, with fixes if there are any; the exit code follows from the verdict."""
+    """Print the report and any fixes; return the exit code of the verdict."""
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
         say_json({**report.as_json(), **extra})

@@ -1,4 +1,4 @@
-"""`vsacli compare`."""
+"""`vsacli compare`: a result compared with a recording of the same motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from vsacli.studies.measured import Comparison
 
 LARGEST_DRAWN = 1e30
-"""Value up to which axes have ticks and pages, in single precision, numbers."""
+"""Magnitude to which drawn values are limited: beyond it, axes have no ticks, and single precision
+overflows."""
 
 
 @click.command(
@@ -93,7 +94,7 @@ def compare(
 
 
 def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outputs: Outputs) -> None:
-    """A figure for each variable that was measured."""
+    """Draw a figure for each measured variable."""
     from vsacli.results.charts.measured import measured_sheet
     from vsacli.results.plots import FigureFiles
 
@@ -106,7 +107,7 @@ def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outp
 
 
 def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
-    """Return a page of the report and all variables, as HTML."""
+    """Return an HTML page with the report and all variables."""
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
@@ -126,7 +127,7 @@ def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
 
 
 def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
-    """Return the signals that were compared, by variable."""
+    """Return the compared signals, by variable."""
     import numpy as np
 
     from vsacli.results.charts.measured import MeasuredCurve

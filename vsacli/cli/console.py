@@ -1,4 +1,4 @@
-"""Talking to the user: results to stdout, notes and progress to stderr, and the exit code."""
+"""Output to the user: results on stdout, notes and progress on stderr, and exit codes."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
 
 PROGRESS_FROM = 100_000
-"""Steps from which on a run is long enough for a progress bar."""
+"""Number of samples from which a run takes long enough for a progress bar."""
 
 LOOKING_FROM = 20_000_000
-"""Bytes of a recording from which on looking at them takes longer than a second."""
+"""Size (bytes) from which the analysis of a recording takes longer than a second."""
 
 SECONDS_PER_LINE = 30.0
 """Time between two lines on progress where there is no terminal, s."""
 
 WRITING_FROM = 2_000_000
-"""Samples from which on writing them takes longer than a second, as CSV."""
+"""Number of samples from which writing them as CSV takes longer than a second."""
 
 
 class Exit(enum.IntEnum):
-    """Exit codes, each with its meaning: its line in the help and in the documentation."""
+    """Exit codes, each with its meaning as printed in the help and in the documentation."""
 
     meaning: str
 
@@ -63,10 +63,10 @@ class Exit(enum.IntEnum):
 
 GREEN, YELLOW, RED = ("\x1b[1;32m", "\x1b[1;33m", "\x1b[1;31m")
 PLAIN = "\x1b[0m"
-"""Escape sequence that ends colors; each color is bold, too, to be seen without them."""
+"""Escape sequence that ends a color. All colors are bold too, so that verdicts stand out without them."""
 
 COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "doubtful", "strayed", "untold"), YELLOW)}
-"""Colour of a verdict; every other is red."""
+"""Color of each verdict; verdicts not listed are red."""
 
 EXIT_OF_VERDICT = {
     "ok": Exit.OK,
@@ -80,32 +80,32 @@ EXIT_OF_VERDICT = {
     "incomplete": Exit.VERDICT,
     "self_check_failed": Exit.BUG,
 }
-"""Exit code of a run by the verdict of its report."""
+"""Exit code of a run for each verdict of its report."""
 
 
 class OutputError(StorageError):
-    """Standard output cannot be written."""
+    """Failure to write to standard output."""
 
 
 class OutputClosedError(OutputError):
-    """The reader of standard output has gone, as `head` does; nobody is left to be told."""
+    """Standard output whose reader has exited, as `head` does; there is nobody to report the error to."""
 
 
 def tell(message: str) -> None:
-    """Print a message on stderr; a run does not fail because nobody can read it."""
+    """Print a message on stderr; failure to print it does not fail the run."""
     with suppress(OSError):
         click.echo(for_terminal(message), err=True)
 
 
 class Reported(Protocol):
-    """A finding of a command: a text for people, and JSON values for programs."""
+    """The findings of a command: a text for people, and JSON values for programs."""
 
     def as_json(self) -> dict[str, Any]:
         """Return JSON values."""
 
 
 def say(found: Reported, as_json: bool) -> None:
-    """Print the findings of a command, as JSON or as a text."""
+    """Print the findings of a command, as JSON or as text."""
     if as_json:
         say_json(found.as_json())
     else:
@@ -113,13 +113,13 @@ def say(found: Reported, as_json: bool) -> None:
 
 
 def say_json(content: Mapping[str, Any]) -> None:
-    """Print JSON, whatever reads it."""
+    """Print JSON."""
     with _read_enough():
         click.echo(json.dumps(content, indent=1))
 
 
 def say_text(text: str, verdict: str = "") -> None:
-    """Print a text: on a terminal fitted to its width, the verdict at the end of its headline in colour."""
+    """Print a text; on a terminal, fit it to the width and color the verdict at the end of the headline."""
     text = for_width(text)
     place = headline_end(text, verdict)
     with _read_enough():
@@ -131,7 +131,7 @@ def say_text(text: str, verdict: str = "") -> None:
 
 
 def for_width(text: str) -> str:
-    """Return a text as it fits the terminal that standard output is; as it is where that is none."""
+    """Return a text fitted to the width of the terminal; unchanged if standard output is not a terminal."""
     width = _terminal_width(sys.stdout)
     if not width:
         return text
@@ -142,7 +142,7 @@ def for_width(text: str) -> str:
 
 @contextmanager
 def _read_enough() -> Iterator[None]:
-    """Treat a reader that has gone as one that has read enough, within this context; keep the exit code."""
+    """Ignore a closed reader of standard output within this context, so that the exit code is kept."""
     try:
         yield
     except OutputClosedError:
@@ -150,14 +150,14 @@ def _read_enough() -> Iterator[None]:
 
 
 def headline_end(text: str, verdict: str) -> slice | None:
-    """Return where the verdict stands at the end of a line, with its parenthesis; None without one."""
+    """Return the slice of the verdict at the end of a line, with its parenthesis; None if absent."""
     words = re.escape(verdict.upper().replace("_", " "))
     found = re.search(rf"(?<!\S){words}( \([^()\n]*\))?$", text, re.MULTILINE) if verdict else None
     return slice(*found.span()) if found else None
 
 
 def _terminal_width(stream: TextIO | None) -> int:
-    """Columns of the terminal that a stream goes to; 0 if it goes elsewhere."""
+    """Return the width (columns) of the terminal behind a stream; 0 if it is not a terminal."""
     try:
         if stream is None or not stream.isatty():
             return 0
@@ -196,23 +196,23 @@ class ProgressLines(NoBar):
 
 @dataclass(frozen=True)
 class Talk:
-    """Notes on stderr, as loud as the user wants them."""
+    """Notes on stderr, filtered by `--quiet` and `--verbose`."""
 
     quiet: bool
     verbose: bool
 
     def note(self, message: str) -> None:
-        """Something most users want to know."""
+        """Print a message that most users want to read."""
         if not self.quiet:
             tell(message)
 
     def wrote(self, outputs: Outputs) -> None:
-        """Print the files that were written."""
+        """Print the names of the files that were written."""
         for path in outputs.paths:
             self.note(f"wrote {path}")
 
     def detail(self, message: str) -> None:
-        """Something to know when looking closely."""
+        """Print a message only with `--verbose`."""
         if self.verbose and not self.quiet:
             tell(message)
 
@@ -227,20 +227,20 @@ class Talk:
         return nullcontext(ProgressLines(steps, label)) if self.verbose else unseen(steps)
 
     def fitting(self, samples: int) -> AbstractContextManager[Any]:
-        """Return the same over the samples of all components that splines are fitted to."""
+        """Return a progress bar over the samples of all components to which splines are fitted."""
         return self.progress(samples, label="fitting")
 
     def looking(self, size: int) -> AbstractContextManager[Any]:
-        """Return the same over the bytes of a recording that is looked at."""
+        """Return a progress bar over the bytes of a recording that is analyzed."""
         return self.progress(size, shown_from=LOOKING_FROM, label="looking")
 
     def writing(self, samples: int) -> AbstractContextManager[Any]:
-        """Return the same over the samples of all variables that are written."""
+        """Return a progress bar over the samples of all variables that are written."""
         return self.progress(samples, shown_from=WRITING_FROM, label="writing")
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--quiet` and `--verbose`; the command receives them as one argument `talk`, and no empty text."""
+    """Add `--quiet` and `--verbose`, passed to the command as one argument `talk`; refuse empty arguments."""
 
     @click.option("-q", "--quiet", is_flag=True, help="No notes and no progress bar on stderr.")
     @click.option("-v", "--verbose", is_flag=True, help="More notes on stderr.")
@@ -253,10 +253,10 @@ def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _refuse_empty_texts(context: click.Context) -> None:
-    """An argument of no letters is a variable of the shell that was not set, and never meant.
+    """Refuse empty arguments: they come from shell variables that are not set.
 
     Raises:
-        click.BadParameter: there is one.
+        click.BadParameter: an argument is empty.
     """
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
@@ -266,7 +266,7 @@ def _refuse_empty_texts(context: click.Context) -> None:
 
 @contextmanager
 def reporting_stdout_errors() -> Iterator[None]:
-    """Raise an OutputError, within this context, if standard output cannot be written."""
+    """Raise an OutputError within this context if standard output cannot be written to."""
     stream: Any = sys.stdout or _ClosedOutput()
     try:
         with redirect_stdout(cast("TextIO", _CheckedOutput(stream))):
@@ -278,15 +278,15 @@ def reporting_stdout_errors() -> Iterator[None]:
 
 
 class _ClosedOutput(io.TextIOBase):
-    """Standard output that was closed before the start, as by `>&-`: everything written to it is lost."""
+    """Standard output that was closed before the start, as by `>&-`."""
 
     def write(self, _text: str) -> int:
-        """Refuse it, as the system does."""
+        """Raise the error of a closed file descriptor."""
         raise OSError(errno.EBADF, "it is closed")
 
 
 class _CheckedOutput:
-    """Standard output whose failure is told from a bug: anything may print to it, click's help included."""
+    """Wrapper of standard output that raises OutputError, so that failures, even in click, are no bugs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -299,7 +299,7 @@ class _CheckedOutput:
             return self._stream.write(for_terminal(text))
 
     def write_colored(self, text: str, place: slice, color: str) -> None:
-        """Write a text and the end of its line, a place in it in a colour; nothing else of it may act."""
+        """Write a line with one part in color; all other control characters are escaped."""
         before, words, after = (
             for_terminal(part) for part in (text[: place.start], text[place], text[place.stop :])
         )
@@ -322,7 +322,7 @@ def _raising_output_errors() -> Iterator[None]:
 
 
 def _discard_buffer(stream: TextIO) -> None:
-    """Lead a stream nowhere: its buffer would fail once more when the interpreter ends."""
+    """Redirect a stream to the null device: its buffer would fail again when the interpreter exits."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

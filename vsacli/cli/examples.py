@@ -1,4 +1,4 @@
-"""`vsacli examples`."""
+"""`vsacli examples`: list or copy the bundled robots and trajectories."""
 
 from __future__ import annotations
 

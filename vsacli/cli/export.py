@@ -1,4 +1,4 @@
-"""`vsacli export`."""
+"""`vsacli export`: results or robots in the formats of other programs."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ ENDINGS = {
     "urdf": (".urdf", ".xml"),
     "mjcf": (".mjcf", ".xml"),
 }
-"""Endings of file names by format, where these are not its own name."""
+"""File name endings of formats for which these are not the name of the format."""
 
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
-"""Options that say nothing of a robot."""
+"""Options that do not apply to robots."""
 
 
 @click.command(
@@ -150,7 +150,7 @@ def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind:
 
 
 def _check_options() -> None:
-    """Refuse options of results."""
+    """Refuse options that apply to results only."""
     context = click.get_current_context()
     for name in ONLY_OF_RESULTS:
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
@@ -188,7 +188,7 @@ def _inputs(robot: Robot, start: str | None) -> list[str]:
 
 
 def _read_start(path: str, robot: Robot) -> Start:
-    """Return the first step of a result of the robot."""
+    """Return the first sample of a result of the robot."""
     from vsacli.results.store.reader import StoredResult
     from vsacli.robot.models.mjcf_drives import Start
 

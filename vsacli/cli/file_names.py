@@ -1,7 +1,7 @@
-"""Names of files and folders on the command line, which shells complete.
+"""Names of files and folders on the command line, with shell completion.
 
-The ending of a name says what the file holds: an output whose name promises another format is refused, since
-programs and later commands go by that name.
+The ending of a name determines what the file holds for other programs and later commands. An output whose
+ending is that of another format is therefore refused.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class NameType(StringParamType):
-    """A name that shells complete; unlike `click.Path` it leaves problems of the disk to commands."""
+    """A name with shell completion; unlike `click.Path`, it leaves errors of the disk to commands."""
 
     def __init__(self, name: str, completion: str) -> None:
         self.name = name
@@ -26,7 +26,7 @@ class NameType(StringParamType):
     def shell_complete(
         self, _context: click.Context, _parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Leave it to the shell, which knows how to complete names of this kind."""
+        """Delegate to the shell, which completes names of files and folders."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type=self.completion)]
@@ -46,19 +46,19 @@ ENDINGS = {
     "programs": (".c", ".h", ".py", ".m"),
     "other data": (".npy", ".npz", ".xlsx", ".tsv"),
 }
-"""Endings of file names by content."""
+"""Endings of file names, by content."""
 
 KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a name in lower case if it names the content of a file; else ""."""
+    """Return the ending of a name in lower case if it is a known one; else ""."""
     ending = PurePath(name).suffix.lower()
     return ending if ending in KNOWN else ""
 
 
 class OutputType(NameType):
-    """A file of one format: a name that promises another one is refused."""
+    """An output file of one format; a name with the ending of another format is refused."""
 
     def __init__(self, form: str, advice: str = "") -> None:
         super().__init__("file", "file")
@@ -75,7 +75,7 @@ class OutputType(NameType):
 
 
 class FolderType(NameType):
-    """A folder; the name of a file is refused, unless there is a folder of that name."""
+    """A folder; a name with the ending of a file is refused, unless a folder of that name exists."""
 
     def __init__(self) -> None:
         super().__init__("folder", "dir")

@@ -1,4 +1,4 @@
-"""`vsacli identify`."""
+"""`vsacli identify`: robot parameters from recordings; `--plan` is in `identify_plan`."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def identify(
 
 
 def _check_options(given: dict[str, object], reason: str) -> None:
-    """Refuse options that are given although they have no meaning."""
+    """Refuse options that do not apply."""
     for option, value in given.items():
         if value is not None:
             raise click.UsageError(f"{option} {reason}")

@@ -1,4 +1,4 @@
-"""`vsacli identify --plan`."""
+"""`vsacli identify --plan`: plan a motion to record."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from vsacli.studies.identification.excitation import Noise
 
 USUAL_DURATION = 20.0
-"""s"""
+"""Default duration of the excitation, s."""
 
 SHOWN_FROM = 1
-"""Motions tried from which on a progress bar is shown; each takes some 50 ms."""
+"""Number of trial motions from which a progress bar is shown; each takes some 50 ms."""
 
 
 def plan(
@@ -32,7 +32,7 @@ def plan(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Plan an excitation, beside a trajectory of the user's if there is one, and write it."""
+    """Plan an excitation, compare it with the user's trajectory if one is given, and write it."""
     if len(own_paths) > 1:
         raise click.UsageError("--plan compares with one trajectory at most")
     from vsacli.base.outputs import Outputs

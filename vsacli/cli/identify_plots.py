@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def draw_figures(found: Identification, robot: str, folder: str, file_format: str, outputs: Outputs) -> None:
-    """A figure for each record."""
+    """Draw a figure for each recording."""
     from vsacli.results.charts.measured import measured_sheet
     from vsacli.results.plots import FigureFiles
 
@@ -30,11 +30,11 @@ def draw_figures(found: Identification, robot: str, folder: str, file_format: st
 
 
 def identification_page(found: Identification, columns: str | None) -> str:
-    """Return a page of the report and all records, as HTML.
+    """Return an HTML page with the report and all recordings.
 
     Args:
-        found: the identification.
-        columns: the file with the mapping of columns, if there is one.
+        found: identification to show.
+        columns: path of the file with the column mapping, if any.
 
     Raises:
         InputError: a library that pages need is not installed.
@@ -63,7 +63,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
 
 
 def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:
-    """Return the torques of each record, by its path."""
+    """Return the torques of each recording, by its path."""
     from vsacli.results.charts.measured import MeasuredCurve
 
     curves: dict[str, list[MeasuredCurve]] = {}

@@ -1,4 +1,4 @@
-"""`vsacli import-urdf`."""
+"""`vsacli import-urdf`: a robot file from a serial chain of a URDF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`vsacli info`."""
+"""`vsacli info`: describe a file, or the cache of compiled code."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _extract(file: str, folder: str, talk: Talk) -> None:
 
 
 def _found(description: dict[str, Any], field: str) -> str:
-    """Return the value at a path as a script wants it: texts without quotes, everything else as JSON."""
+    """Return the value at a path for use in scripts: texts without quotes, everything else as JSON."""
     from vsacli.files.info import described_value
 
     try:

@@ -1,4 +1,4 @@
-"""`vsacli invdyn`."""
+"""`vsacli invdyn`: compute a result file, its report and its figures."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def invdyn(
 def _figures(
     inputs: Inputs, folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
 ) -> FigureFiles:
-    """Stage those that the variables which are stored allow, and that of a recording."""
+    """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
     from vsacli.cli.plot import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings

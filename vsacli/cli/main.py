@@ -1,4 +1,4 @@
-"""The command group, and the exit codes of its errors."""
+"""The command group, the program's entry point, and the exit codes of errors."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _COMMANDS = LazyRegistry({name: home for section in _SECTIONS.values() for name,
 
 
 class SectionedGroup(click.Group):
-    """Lists its commands in the order of `sections`, each a heading with names."""
+    """A command group whose help lists the commands by `sections`, headings with names."""
 
     def __init__(self, *args: Any, sections: Mapping[str, Sequence[str]], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -71,7 +71,7 @@ class SectionedGroup(click.Group):
         return [name for names in self.sections.values() for name in names]
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a list for each section, their columns in line."""
+        """Write a list for each section, with aligned columns."""
         width = max(map(len, self.list_commands(context)))
         for heading, names in self.sections.items():
             with formatter.section(heading):
@@ -83,7 +83,7 @@ class SectionedGroup(click.Group):
 @click.group(
     cls=SectionedGroup,
     sections={heading: tuple(section) for heading, section in _SECTIONS.items()},
-    commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click looks commands up, no more
+    commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click only looks commands up
     context_settings={"help_option_names": ["-h", "--help"]},
     short_help="Inverse dynamics of robots with variable stiffness actuators.",
     epilog=_EPILOG,
@@ -98,32 +98,32 @@ def vsacli() -> None:
 
 
 FIRST_OWN = 3
-"""The first number of a file that is no standard stream."""
+"""Lowest file descriptor that is not a standard stream."""
 
 SELDOM = 100_000
-"""New objects before Python looks for garbage: hardly anything that a short run makes is."""
+"""Allocations between garbage collections: a short run creates hardly any garbage."""
 
 
 def main() -> NoReturn:
-    """Entry point of the command `vsacli`."""
+    """Run the command `vsacli` and exit."""
     gc.set_threshold(SELDOM)
     _hold_closed_streams()
-    if not sys.warnoptions:  # a warning of NumPy helps a developer, who asks for it by `python -W`
+    if not sys.warnoptions:  # NumPy's warnings are for developers, who can set `python -W`
         warnings.simplefilter("ignore", RuntimeWarning)
-        os.environ["PYTHONWARNINGS"] = "ignore::RuntimeWarning"  # for processes that are started
-    os.environ["MPLBACKEND"] = "agg"  # a notebook, whose terminal this may be, sets one that is not here
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a name may hold letters that the terminal has not
+        os.environ["PYTHONWARNINGS"] = "ignore::RuntimeWarning"  # for worker processes
+    os.environ["MPLBACKEND"] = "agg"  # notebooks set a backend that may not be installed here
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names may have characters unknown to the terminal
         sys.stdout.reconfigure(errors="backslashreplace")
     with unwinding_when_ended():
         code = run(sys.argv[1:])
-    gc.freeze()  # else Python would go through everything once more before it ends
+    gc.freeze()  # else Python collects garbage once more before it exits
     sys.exit(code)
 
 
 def _hold_closed_streams() -> None:
-    """Open what the caller closed of the three standard streams, as by `>&-`.
+    """Open standard streams that the caller closed, as by `>&-`.
 
-    Otherwise the first opened file gets the number of one, and prints of a library end up in it.
+    Otherwise an opened file gets the descriptor of such a stream, and a library may print into it.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) < FIRST_OWN:
         os.set_inheritable(number, True)
@@ -131,7 +131,7 @@ def _hold_closed_streams() -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run a command line; errors become messages on stderr and an exit code."""
+    """Run a command line; turn errors into messages on stderr and an exit code."""
     try:
         with reporting_stdout_errors():
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
@@ -151,7 +151,7 @@ def run(arguments: Sequence[str]) -> int:
     except StorageError as error:
         return _fail(str(error), Exit.STORAGE)
     except Exception as error:
-        if isinstance(error.__cause__, Interrupted):  # Python 3.11 makes another of it in `__set_name__`
+        if isinstance(error.__cause__, Interrupted):  # Python 3.11 wraps errors raised in `__set_name__`
             return _interrupted(error.__cause__)
         import traceback
 
@@ -169,7 +169,7 @@ def _name_successor(error: click.ClickException) -> None:
 
 
 def _interrupted(ended: Interrupted) -> int:
-    return _fail(str(ended), 128 + ended.number)  # as shells call a process that a signal ended
+    return _fail(str(ended), 128 + ended.number)  # shell convention for processes ended by a signal
 
 
 def _fail(message: str, code: int) -> int:

@@ -1,4 +1,4 @@
-"""`vsacli new`."""
+"""`vsacli new`: commented robot and trajectory files as a starting point."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _write(
     inputs: Iterable[str] = (),
     tables: Iterable[Path] = (),
 ) -> None:
-    """Write the text, and beside the file copies of these tables; standard output gets the text alone."""
+    """Write the text, and copies of these tables next to the file; standard output gets the text alone."""
     if output is None or output == STANDARD:
         click.echo(text, nl=False)
         return

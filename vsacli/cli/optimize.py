@@ -1,4 +1,4 @@
-"""`vsacli optimize`."""
+"""`vsacli optimize`: the best stiffness or timing of a trajectory."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from vsacli.trajectory.trajectory import Trajectory
 
 CHANGE, PACE = "optimum", "pace"
-"""Names of figures."""
+"""Names of the figures."""
 
 
 def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
-    """Return a share such as `3%` or `0.03`."""
+    """Convert a share such as `3%` or `0.03`, as a click callback."""
     if text is None:
         return None
     try:
@@ -145,7 +145,7 @@ def optimize(
 def _draw(
     found: Optimum, best: Trajectory, asked: Trajectory, folder: str, stem: str, outputs: Outputs
 ) -> None:
-    """Draw the changes at each joint, and the timing if that varies."""
+    """Draw the changes at each joint, and the timing if it was varied."""
     from vsacli.analysis.run import inverse_dynamics
     from vsacli.results.charts.optimum import JointChange, change_sheet, pace_sheet
     from vsacli.results.plots import FigureFiles
@@ -174,7 +174,7 @@ def _draw(
 
 
 def _moved(result: Result, place: FloatArray, index: int) -> Moved:
-    """Return the motion of a joint, by index, at places."""
+    """Return stiffness, its attainable range, and motor torques of a joint over places along the motion."""
     from vsacli.results.charts.optimum import Moved
 
     stiffness, lower, upper = (
@@ -184,7 +184,7 @@ def _moved(result: Result, place: FloatArray, index: int) -> Moved:
 
 
 def _torque_limits(joint: Joint) -> FloatArray:
-    """Return the interval (2,) in which the torques of all motors of a joint have to lie."""
+    """Return the interval (2,) of torque that all motors of a joint allow."""
     import numpy as np
 
     ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
 
 RECORDING = "recording"
-"""Name of the figure that shows how noise in a recording was judged."""
+"""Name of the figure of recorded signals, with their splines and the noise found in them."""
 
 
 @click.command(
@@ -108,7 +108,7 @@ def plot(
 
 
 class _Target(NamedTuple):
-    """The destination of figures."""
+    """The folder, format and staged files of figures."""
 
     folder: Path
     file_format: str
@@ -122,10 +122,10 @@ class _Target(NamedTuple):
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:
-    """Refuse options that figures of recordings do not have.
+    """Refuse options that do not apply to figures of recordings.
 
     Raises:
-        click.UsageError: naming it.
+        click.UsageError: with the option, or for several files.
     """
     if len(files) > 1:
         raise click.UsageError(
@@ -137,7 +137,7 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
 
 
 def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw results, simulations or tables of studies."""
+    """Draw results, simulations or study tables."""
     studies = _are_studies(paths)
     if studies and shown != _EVERYTHING:
         raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
@@ -156,14 +156,14 @@ def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk
 
 
 class _Shown(NamedTuple):
-    """The selection that is drawn: joints (all if empty) and a span of time."""
+    """The selection to draw: joints (all if empty), a time span, and variables (default figures if None)."""
 
     joints: tuple[str, ...]
     span: tuple[float, float]
     variables: tuple[str, ...] | None
 
     def of(self, stored: StoredResult) -> StoredResult:
-        """Return the part of an open file that is drawn; the file itself if that is all of it."""
+        """Return the selected part of an open file; the file itself if all of it is selected."""
         from vsacli.results.store.excerpt import Excerpt
 
         everything = not self.joints and self.span == _EVERYTHING.span
@@ -174,10 +174,10 @@ _EVERYTHING = _Shown((), (-math.inf, math.inf), None)
 
 
 def _span(start: float | None, end: float | None) -> tuple[float, float]:
-    """Return the times between which is drawn.
+    """Return the first and the last time to draw.
 
     Raises:
-        click.UsageError: there are none.
+        click.UsageError: the first time is later than the last.
     """
     span = (-math.inf if start is None else start, math.inf if end is None else end)
     if not span[0] <= span[1]:
@@ -186,7 +186,7 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
 
 
 def _are_studies(paths: list[Path]) -> bool:
-    """Return whether the first file is the table of a study; then all have to be."""
+    """Return whether the first file is a study table; then all files must be."""
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
@@ -194,7 +194,7 @@ def _are_studies(paths: list[Path]) -> bool:
 
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:
-    """Draw the figures of a study, or compare how probable margins are in several."""
+    """Draw the figures of a study, or compare the distributions of margins of several studies."""
     from vsacli.results.charts.comparison import COMPARISON
     from vsacli.results.plots import compared_studies, study_figures
     from vsacli.results.store.study_table import StoredStudy
@@ -210,7 +210,7 @@ def _draw_studies(paths: list[Path], target: _Target) -> None:
 
 
 def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw the figures of one file, and that of the recording that it was computed from."""
+    """Draw the figures of one file, and of the recording that it was computed from."""
     from vsacli.results.charts.figures import chosen_figures
     from vsacli.results.store.reader import open_stored
 
@@ -244,7 +244,7 @@ def _draw(
     talk: Talk,
     variables: tuple[str, ...] | None = None,
 ) -> None:
-    """Draw the figures of an open file and say which it has not the variables for."""
+    """Draw the figures of an open file; report figures for which variables are missing."""
     from vsacli.results.charts.figures import drawings_of, omitted_figures
     from vsacli.results.plots import draw_stored
 
@@ -253,7 +253,7 @@ def _draw(
             talk.note(f"{path}: {reason}")
     for name, figure in draw_stored(stored, variables):
         figures.save({name: figure})
-        del figure  # which would stay in memory while the next one is drawn
+        del figure  # else it stays in memory while the next one is drawn
 
 
 def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
@@ -271,13 +271,13 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
 
 
 def is_recording(path: str) -> bool:
-    """Return whether a file is a CSV table or a trajectory; false if that cannot be told."""
+    """Return whether a file is a CSV table or a trajectory; False if its kind is unknown."""
     from vsacli.files.file_kinds import FileKind, recognise
 
     try:
         return recognise(path) in (FileKind.TABLE, FileKind.TRAJECTORY)
     except (InputError, StorageError):
-        return False  # those who read results and simulations say what is wrong with it
+        return False  # readers of results and simulations report its problems
 
 
 def draw_recording(
@@ -291,15 +291,16 @@ def draw_recording(
     """Draw the figure of a recording, or of a trajectory with recorded signals.
 
     Args:
-        path: the file.
-        robot_path: the robot that it is of; None: joints are those of the columns.
-        joints: names of those to show; all if there are none.
+        path: recording or trajectory file.
+        robot_path: robot file; None: joints are named by the columns.
+        joints: names of the joints to show; all if empty.
         span: first and last time to show, s.
-        staged: stages files for figures, given their names and what these begin with.
-        talk: shows how far the fit is.
+        staged: callable that stages the files of figures, given their names and the beginning of the file
+            names.
+        talk: shows the progress of the fit.
 
     Raises:
-        InputError: the file cannot be used, or nothing was fitted to it.
+        InputError: the file cannot be used, or no spline was fitted to it.
         StorageError: the figure cannot be written.
     """
     from vsacli.documents.source import is_table
@@ -330,14 +331,14 @@ def recording_figure(
     """Return the figure of recorded signals, by its name.
 
     Args:
-        robot: that was recorded.
-        profiles: the signals; a spline was fitted to at least one.
-        file: named in the title and in errors.
-        joints: names of those to show; all if there are none.
-        span: first and last time to show, s; all if it is None.
+        robot: robot that was recorded.
+        profiles: recorded signals; a spline was fitted to at least one.
+        file: path in the title and in errors.
+        joints: names of the joints to show; all if empty.
+        span: first and last time to show, s; all times if None.
 
     Raises:
-        InputError: there is no such joint, or no sample at these times.
+        InputError: a joint is unknown, or no sample lies in the span.
     """
     from vsacli.files.recordings.fit_curves import recorded_curves
     from vsacli.results.plots import recorded_figure
@@ -348,7 +349,7 @@ def recording_figure(
 
 
 def has_recording(stored: StoredResult, talk: Talk) -> bool:
-    """Return whether the recording that a result was computed from can be drawn; a note says if it cannot."""
+    """Return whether the recording behind a result can be drawn; print a note if it exists but cannot."""
     from vsacli.base.version import __version__
 
     if stored.kind != "result" or not stored.report_json.get("fits"):

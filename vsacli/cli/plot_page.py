@@ -1,4 +1,4 @@
-"""`--format html`: a page in place of figures."""
+"""Pages of `--format html`, which replace figures."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from vsacli.studies.search import Suggestions
 
 MENDABLE = ("infeasible", "singular", "over_limit")
-"""Verdicts on results for which remedies are looked for."""
+"""Verdicts of results for which fixes are searched."""
 
 LONG_PAGE = 2_000_000
-"""Samples, of all files together, from which on a page takes so long that its progress is shown."""
+"""Number of samples, over all files, from which the progress of a page is shown."""
 
 
 def write_page(
     paths: list[Path], span: tuple[float, float] | None, folder: Path, outputs: Outputs, talk: Talk
 ) -> None:
-    """Write the page of results, or of simulations, over a stretch of time; of studies if there is none.
+    """Write the page of results or simulations over a time span; without a span, the page of studies.
 
     Raises:
-        InputError: nothing can be drawn from these files, they do not belong together, or what a page needs
-            is not installed.
+        InputError: nothing in these files can be drawn, they do not belong together, or a library that pages
+            need is not installed.
         StorageError: the page cannot be written.
     """
     page = staged_page(folder, "-".join(path.stem for path in paths), outputs)
@@ -42,7 +42,7 @@ def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
     """Stage the file of a page, before anything is computed for it.
 
     Raises:
-        InputError: what a page needs is not installed.
+        InputError: a library that pages need is not installed.
         StorageError: as `Outputs.folder` and `Outputs.file`.
     """
     from vsacli.results.pages.document import plotting_library
@@ -53,7 +53,7 @@ def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
 
 
 def page_asked_for(folder: str | None, file_format: str, stem: str, outputs: Outputs) -> Staged | None:
-    """Return the file of the page that `--plot` and `--format` ask for; None if they ask for none.
+    """Return the file of the page that `--plot` and `--format` request; None if they request no page.
 
     Raises:
         InputError, StorageError: as `staged_page`.
@@ -86,7 +86,7 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
 
 
 def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
-    """Return the fix of each file, None where none is needed; show the progress of the search."""
+    """Return the fixes of each file, None where none are needed; show the progress of the search."""
     failed = [each.kind == "result" and each.verdict in MENDABLE for each in files]
     remedies: list[RemedyText | None] = []
     with talk.progress(sum(failed), shown_from=1, label="looking for remedies") as bar:
@@ -97,7 +97,7 @@ def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
 
 
 def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
-    """Return the fixes of `check-feasibility --suggest` for the inputs of a result, or note why not."""
+    """Return the fixes of `check-feasibility --suggest` for a result's inputs, or print why not."""
     from vsacli.base.errors import InputError, StorageError
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.files.repetition import rebuilt
@@ -121,10 +121,10 @@ def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
 
 
 def _check_version(made_by: str, path: Path) -> None:
-    """Another version may read the same inputs as something else than was computed.
+    """Refuse a result of another version, which may have interpreted the same inputs differently.
 
     Raises:
-        InputError: the result is of another one.
+        InputError: the result was computed by another version.
     """
     from vsacli.base.errors import InputError
     from vsacli.base.version import __version__
@@ -136,7 +136,7 @@ def _check_version(made_by: str, path: Path) -> None:
 
 
 def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
-    """Return announcement and command for the next step: write the first fix, or list all again."""
+    """Return announcement and command of the next step: write the first fix, or list all fixes again."""
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.texts import one_line
     from vsacli.documents.reading import written
@@ -158,7 +158,7 @@ def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
 
 
 def _named(path: str) -> str:
-    """Return a path that a command takes for no option; of "-", standard input, it stays as it is."""
+    """Return a path that is not mistaken for an option; "-", standard input, stays as it is."""
     return f"./{path}" if path.startswith("-") and path != "-" else path
 
 

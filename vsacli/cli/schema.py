@@ -1,4 +1,4 @@
-"""`vsacli schema`."""
+"""`vsacli schema`: the JSON Schema of a YAML format."""
 
 from __future__ import annotations
 

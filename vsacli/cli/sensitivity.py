@@ -1,4 +1,4 @@
-"""`vsacli sensitivity`."""
+"""`vsacli sensitivity`: derivatives by robot parameters, tolerances and Monte Carlo runs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from vsacli.studies.sensitivities import Sensitivity, SensitivityRun
 
 SHOWN_FROM = 20_000
-"""Steps from which on a progress bar is shown; each takes some twenty times those of a run."""
+"""Number of samples from which a progress bar is shown; each costs some twenty times that of a run."""
 
 
 @click.command(
@@ -110,7 +110,7 @@ def _analysed(
     file: Staged | None,
     talk: Talk,
 ) -> Sensitivity:
-    """Analyse, and write the derivatives as they come if there is a file for them."""
+    """Run the analysis; write the derivatives block by block if there is a file for them."""
     from vsacli.studies.sensitivities import SensitivityRun, analysed
 
     run = SensitivityRun(*inputs, patterns)
@@ -132,7 +132,7 @@ def _analysed(
 
 
 def unheard(_: object) -> None:
-    """Drop derivatives that are not kept."""
+    """Discard derivatives that are not stored."""
 
 
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
@@ -144,7 +144,7 @@ def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
 
 
 def _draw(found: Sensitivity, robot: Robot, folder: str, stem: str, outputs: Outputs) -> None:
-    """The ranking, and with tolerances the bands of the motor torques."""
+    """Draw the ranking, and the bands of motor torques if tolerances are given."""
     from vsacli.results.charts.optimum import Torque, band_sheet
     from vsacli.results.plots import Bar, FigureFiles, ranking_figure
 

@@ -1,4 +1,4 @@
-"""`vsacli simulate`."""
+"""`vsacli simulate`: integrate the full dynamics under a controller."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def simulate(
     inputs = load_inputs(robot, trajectory, talk, changes)
     simulation = _prepared(inputs, Options(**choices))
     gains: Gains | None = simulation.keywords["gains"]
-    if gains is not None:  # the file of the poles is one of the inputs that the result records
+    if gains is not None:  # the result stores the poles file as one of its inputs
         arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
         inputs = inputs._replace(robot=arm)
     from vsacli.base.outputs import Outputs
@@ -253,7 +253,7 @@ def _sensors(options: Options) -> Sensors | None:
 
 
 def _gains(robot: Robot, options: Options) -> Gains | None:
-    """Return the gains of feedback linearization; None of another controller."""
+    """Return the gains of feedback linearization; None for another controller."""
     from vsacli.control.poles import DEFAULT, gains_from_text, load_gains
 
     poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
@@ -269,7 +269,7 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
 
 
 def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk) -> Simulation:
-    """Simulate, with a bar of the time reached."""
+    """Simulate, with a progress bar over simulated time."""
     first, last = trajectory.times.span
     with talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
 
@@ -280,7 +280,7 @@ def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk
 
 
 def _computed_by(engine: str, compiler: str, **_further: str) -> str:
-    """Return the words for the backend that evaluated the equations of motion."""
+    """Return a clause about the backend that evaluated the equations of motion."""
     return f"C code computed, compiled by {compiler}" if engine == "c" else "NumPy and Python computed"
 
 

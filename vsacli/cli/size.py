@@ -1,4 +1,4 @@
-"""`vsacli size`."""
+"""`vsacli size`: requirements on motors, gears and springs, and motors chosen from a catalog."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def size(
 
 
 def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs, talk: Talk) -> None:
-    """Torque over speed of every motor of which something is known."""
+    """Draw torque over speed for every motor with feasible samples."""
     motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
     if not motors:
         talk.note("nothing is drawn: no step can be done")

@@ -1,4 +1,4 @@
-"""`vsacli study`."""
+"""`vsacli study`: compute the runs of a study, or merge its partial tables."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
 
 
 def _shown(table: StoredStudy, as_json: bool, talk: Talk) -> int:
-    """Print the findings of a written table; return 3 if a run in it failed."""
+    """Print the summary of a written table; return exit code 3 if a run in it failed."""
     from vsacli.studies.sweeps import StudySummary
 
     summary = StudySummary.of(table)

@@ -1,4 +1,4 @@
-"""`vsacli validate`."""
+"""`vsacli validate`: report every problem of files; recompute results."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
 
 
 def _recomputed(path: str, talk: Talk) -> bool:
-    """Compute a result again and say how it compares."""
+    """Recompute a result and print how it compares."""
     from vsacli.files.repetition import repeat
 
     differences, precision = repeat(path, talk.note)

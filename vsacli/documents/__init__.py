@@ -1,1 +1,1 @@
-"""Strict reading of declared YAML documents and CSV tables. Knows files and fields, not robots."""
+"""Strict reading of declared YAML documents and CSV tables. Robots and trajectories are unknown here."""

@@ -1,4 +1,4 @@
-"""A mapping of the columns of a table to names of this package, applied to the header of a file."""
+"""Mappings from columns of a table to names of this package, and their application to a header."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UNIT_WORDS = {
     **{word: word for word in ("rev", "mm", "cm")},
     "ma": "mA",
 }
-"""Words at the end of a name, in small letters, that speak of a unit other than that of SI."""
+"""Lower-case words at the end of a column name that denote a unit other than the SI unit."""
 
 _LAST_WORD = re.compile(r"([A-Za-z]+)[^A-Za-z]*$")
 _CAMEL = re.compile(r"[a-z](Deg|Degrees|Degree)$")
@@ -34,11 +34,11 @@ class MappedColumn:
     """A column of a table, with unit and factor of its numbers.
 
     Attributes:
-        column: its heading in the file, or its number from 1.
-        unit: of its numbers; None: that in brackets in the header, else that of the target.
-        factor: multiplies its numbers.
-        nanoseconds: of times in whole seconds, the column of the nanoseconds beside them.
-        place: file and line where all that is said.
+        column: heading in the file, or number of the column from 1.
+        unit: unit of the numbers; None: the unit in brackets in the header, else that of the target.
+        factor: factor by which the numbers are multiplied.
+        nanoseconds: for times in whole seconds, the column of the nanoseconds that complete them.
+        place: file and line of the declaration.
     """
 
     column: str | int
@@ -51,8 +51,8 @@ class MappedColumn:
         """Return the heading under which the column is read.
 
         Args:
-            target: name of the quantity it holds.
-            own: its heading in the file.
+            target: name of the quantity in the column.
+            own: heading in the file.
         """
         if self.nanoseconds is not None:
             return f"{target} [ns]"
@@ -60,7 +60,7 @@ class MappedColumn:
         return target if unit is None else f"{target} [{unit}]"
 
     def doubt(self, own: str) -> str | None:
-        """Return a unit that the heading in the file speaks of but nobody gave."""
+        """Return a unit that the heading in the file suggests but that is not declared; None without one."""
         if self.unit is not None or self.nanoseconds is not None or split_heading(own)[1] is not None:
             return None
         last, camel = _LAST_WORD.search(own), _CAMEL.search(own)
@@ -69,16 +69,16 @@ class MappedColumn:
 
 
 class ChosenColumns(NamedTuple):
-    """Columns of a file that are to be read.
+    """Columns of a file to be read.
 
     Attributes:
-        places: where they stand, ascending, from 0.
+        places: positions of the columns, ascending, from 0.
         headings: names in this package, each with its unit in brackets if one is known.
-        factors: multiply their numbers.
-        others: names of columns that are not known.
-        ignored: names of those to leave out.
-        time: place of the stamps, if they are read.
-        nanoseconds: place of the nanoseconds beside them, if there are.
+        factors: factors by which their numbers are multiplied.
+        others: names of unknown columns.
+        ignored: names of columns to leave out.
+        time: position of the column of stamps, if it is read.
+        nanoseconds: position of the column of nanoseconds that completes the stamps, if there is one.
     """
 
     places: tuple[int, ...]
@@ -92,12 +92,12 @@ class ChosenColumns(NamedTuple):
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """A mapping of columns as declared.
+    """A declared mapping of columns.
 
     Attributes:
-        columns: by the names that are known here; they are renamed so.
+        columns: columns of the file, by the names under which they are read.
         ignore: `REST`, or columns to leave out.
-        rate: rows per second of a file without times; None if it has some.
+        rate: rows per second of a file without times; None if the file has times.
     """
 
     columns: Mapping[str, MappedColumn] = dataclasses.field(default_factory=dict)
@@ -109,7 +109,7 @@ class ColumnMapping:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The numbers of the columns if all are given so, and no header is needed; else nothing."""
+        """Numbers of the columns if all are declared by number, so that no header is needed; else empty."""
         numbers = tuple(each.column for each in self.columns.values() if isinstance(each.column, int))
         return numbers if len(numbers) == len(self.columns) else ()
 
@@ -117,20 +117,20 @@ class ColumnMapping:
         """Return the columns of a table to read.
 
         Args:
-            header: of the table.
-            known: names that mean something; all if None.
-            file: named in errors.
+            header: header of the table.
+            known: names of columns to read; all if None.
+            file: path for errors.
 
         Raises:
-            InputError: a column is not there, or not the only one of its name, or stands for two things.
+            InputError: a column is missing, ambiguous, or mapped twice.
         """
         return _Choice(self, header, known, file).made()
 
     def joined(self, other: ColumnMapping) -> ColumnMapping:
-        """Both, said of the same file.
+        """Return the combination of two mappings of the same file.
 
         Raises:
-            InputError: they contradict each other.
+            InputError: the mappings contradict each other.
         """
         for name, source in other.columns.items():
             mine = self.columns.get(name, source)
@@ -143,11 +143,11 @@ class ColumnMapping:
 
 
 AS_NAMED = ColumnMapping()
-"""A mapping that takes each column by its own name."""
+"""A mapping that reads each column under its own name."""
 
 
 class _Choice:
-    """The columns chosen from a header, and the problems of the mapping."""
+    """Selection of columns from a header, with the problems of the mapping."""
 
     def __init__(
         self, mapping: ColumnMapping, header: Header, known: Collection[str] | None, file: str
@@ -182,7 +182,7 @@ class _Choice:
         return ChosenColumns(places, headings, factors, tuple(others), tuple(ignored), time, nanoseconds)
 
     def _mapped(self) -> Iterator[tuple[int, tuple[str, float]]]:
-        """Yield place, new heading and factor of each mapped column."""
+        """Yield position, new heading and factor of each mapped column."""
         taken: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
             if self._known is not None and name not in self._known:
@@ -208,7 +208,7 @@ class _Choice:
         return self._place(source.nanoseconds, source)
 
     def _place(self, column: str | int, source: MappedColumn) -> int | None:
-        """Return the place of a column; note a problem and return None if it cannot be found."""
+        """Return the position of a column; note a problem and return None if it is missing or ambiguous."""
         names = self._header.columns
         if isinstance(column, int):
             if column <= len(names):
@@ -236,7 +236,7 @@ class _Choice:
 
     def _note_repeated(self, headings: Iterable[str]) -> None:
         if not self._mapping:
-            return  # the header was refused if names were repeated
+            return  # repeated names in the header were refused before
         for name, count in Counter(split_heading(heading)[0] for heading in headings).items():
             source = self._mapping.columns.get(name)
             if count > 1 and source is not None:

@@ -1,6 +1,6 @@
-"""The keys `columns` and `ignore` of documents, which map columns with other people's headers.
+"""The keys `columns` and `ignore` of documents, which map columns with foreign names.
 
-They stand in trajectory files, and in files for recordings alone, `vsacli-columns/1`.
+The keys are used in trajectory files, and in files for recordings alone, `vsacli-columns/1`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class ColumnName(OwnKind):
     words = "name in the header, or number from 1"
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return a text, or a whole number if it stands without quotes."""
+        """Return a text, or an integer if the node is a whole number without quotes."""
         if isinstance(node, tree.Scalar) and node.plain and node.text.isdecimal():
             return int(node.text)
         return Text().read(node, label, scope)
@@ -78,12 +78,12 @@ class ColumnSource(MappedColumn):
 
 
 class Columns(OwnKind):
-    """A mapping from names that are known here to columns of a table."""
+    """A mapping from names of this package to columns of a table."""
 
     words = "mapping from names of columns here to columns of the file, each a name, a number or a mapping"
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return `ColumnSource` by name."""
+        """Return `ColumnSource` records by name."""
         if not isinstance(node, tree.Mapping) or not node.entries:
             return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
         found = {name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()}
@@ -103,7 +103,7 @@ class Columns(OwnKind):
         return column if column is INVALID else ColumnSource(column=column)
 
     def problems(self, path: Any, _check: Check | None, content: Any) -> Iterator[FieldProblem]:
-        """See `Kind.problems`; each entry has checked itself."""
+        """See `Kind.problems`; each entry has been checked on construction."""
         for name, source in content.items():
             if source.nanoseconds is not None and name != TIME:
                 yield FieldProblem((*path, name), f"only {TIME} has nanoseconds beside it")
@@ -119,12 +119,12 @@ class Columns(OwnKind):
 
 
 class Ignored(OwnKind):
-    """Names of columns to leave out, or the word for all that have no use."""
+    """Names of columns to leave out, or the word for all unknown columns."""
 
     words = f"`{REST}`, or a list of columns"
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the word, or a tuple of names."""
+        """Return the word `REST`, or a tuple of names."""
         if isinstance(node, tree.Sequence):
             return tree.all_valid([ColumnName().read(item, label, scope) for item in node.items])
         if isinstance(node, tree.Scalar) and node.text == REST:
@@ -144,13 +144,13 @@ def columns_field() -> Any:
 
 
 def ignore_field() -> Any:
-    """Declare a field that says which columns are left out."""
+    """Declare a field for columns to leave out."""
     return value(Ignored(), f"columns to leave out; `{REST}`: all that have no use", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnsFile:
-    """The content of such a file: the keys of a trajectory file that concern its recordings."""
+    """The content of a columns file: the keys of a trajectory file that concern its recordings."""
 
     columns: Mapping[str, MappedColumn] | None = columns_field()
     ignore: str | tuple[str | int, ...] | None = ignore_field()
@@ -164,7 +164,7 @@ class ColumnsFile:
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
-    """Return the mapping of a file; without a file, each column is taken by its own name.
+    """Return the mapping of a file; without a file, the mapping that reads each column under its own name.
 
     Raises:
         InputError: with every problem of the file, each with its line.
@@ -176,10 +176,10 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
 
 
 def checked_rate(given: Any) -> float:
-    """Return rows per second, as a number or as a text that a file could hold.
+    """Return rows per second, given as a number or as a text in the form used in files.
 
     Raises:
-        InputError: it is not positive, or no number at all.
+        InputError: the rate is not a positive number.
     """
     try:
         rate = evaluate(given, "1/s") if isinstance(given, str) else float(given)

@@ -1,4 +1,4 @@
-"""A YAML document with a comment on every key that is declared; optional ones stand commented out."""
+"""YAML documents with a comment on every declared key; optional keys are commented out."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from vsacli.documents.field_kinds import REQUIRED, Choice, Field, Interval, Kind
 from vsacli.documents.nested import Items, OneOf, Pair, Record
 
 Values: TypeAlias = Mapping[str, Any]
-"""Values to be written, by key: numbers, texts, lists of them, and such mappings for records."""
+"""Values to write, by key: numbers, texts, lists of these, and nested mappings for records."""
 
 COMMENT_COLUMN = 44
 WIDTH = 110
 
 
 class _Line(NamedTuple):
-    """A line: its text, a comment on it, and whether a reader sees it."""
+    """A line: its text, a comment on it, and whether it is active or commented out."""
 
     text: str
     comment: str = ""
@@ -33,10 +33,10 @@ def commented_document(format_name: str, cls: type, values: Values, head: Iterab
     """Return a document of the record class `cls`.
 
     Args:
-        format_name: value of its key `format`.
-        cls: the record class of the whole document.
-        values: of every required field, and of the optional ones that shall be set.
-        head: lines of comment before it.
+        format_name: value of the key `format`.
+        cls: record class of the whole document.
+        values: values of every required field, and of the optional fields to set.
+        head: lines of the comment at the top.
     """
     lines = [_Line(f"format: {format_name}"), *_record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
@@ -44,7 +44,7 @@ def commented_document(format_name: str, cls: type, values: Values, head: Iterab
 
 
 def _rendered(line: _Line) -> Iterator[str]:
-    """Yield a line and its comment, next to it or, if it is long, before it, on as many lines as needed."""
+    """Yield a line and its wrapped comment, next to it or, if the line is long, before it."""
     text = line.text if line.active else f"# {line.text}"
     comments = [f"# {part}" for part in textwrap.wrap(line.comment, WIDTH - COMMENT_COLUMN - 2)]
     if len(text) < COMMENT_COLUMN and comments:
@@ -57,7 +57,7 @@ def _rendered(line: _Line) -> Iterator[str]:
 
 
 def _record(cls: type, values: Values, variant: str) -> Iterator[_Line]:
-    """Yield all fields of a record; those left out are inactive, with their defaults."""
+    """Yield all fields of a record; fields without a value are inactive and show their defaults."""
     variant = str(values.get(getattr(cls, "unit_variant", ""), variant))
     for name, (field, default) in declared(cls).items():
         comment = _comment(field, variant)
@@ -74,7 +74,7 @@ def _record(cls: type, values: Values, variant: str) -> Iterator[_Line]:
 
 
 def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
-    """Yield a field from a value as in a file; the nested ones farther to the right."""
+    """Yield a field for a value in the form used in files; nested fields are indented."""
     match kind:
         case Pair(item):
             yield from _field(item, name, value, comment, variant)
@@ -95,7 +95,7 @@ def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Ite
 
 
 def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
-    """Yield lists as a line; of records the first with all keys, the others with those set."""
+    """Yield lists as one line each; of records, the first with all keys and the others with the keys set."""
     if not kind.records:
         yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
         return
@@ -108,7 +108,7 @@ def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
 
 
 def _default(default: Any) -> str:
-    """Return a default as it may be written, or nothing."""
+    """Return a default in the form used in files; empty if it has none."""
     numbers = default if isinstance(default, tuple) else (default,)
     if all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
         return on_one_line(default)
@@ -116,7 +116,7 @@ def _default(default: Any) -> str:
 
 
 def _comment(field: Field, variant: str) -> str:
-    """Return the meaning of a field, its unit, and its forms where they cannot be guessed."""
+    """Return unit and meaning of a field, and its forms where they are not obvious."""
     unit = field.quantity.unit(variant) if variant else str(field.quantity)
     match field.kind:
         case Choice(options=options):

@@ -1,8 +1,8 @@
-"""CSV files: the header, and the rows as texts or numbers. Columns are places here, without a meaning.
+"""CSV files: the header, and the rows as texts or numbers. Columns are positions here, without a meaning.
 
-A tab, semicolon or comma in the header separates the cells; where that is no comma, numbers may have decimal
-commas. Cells may be in double quotes, and a comment goes from `#` to the end of a line. Numbers are read by
-NumPy; single lines are parsed only where something is unusual, and to report problems.
+A tab, semicolon or comma in the header separates the cells. With separators other than the comma, numbers may
+have decimal commas. Cells may be in double quotes, and a comment goes from `#` to the end of a line. NumPy
+reads the numbers; single lines are parsed only if they are unusual, and to report problems.
 """
 
 from __future__ import annotations
@@ -29,25 +29,26 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 10_000_000_000
 MAX_HEADER = 100_000
-"""Characters in the header line, or in one before it; binary data often has none or a longer one."""
+"""Maximum length of the header line and of lines before it; binary data often has no line break or longer
+lines."""
 SEPARATORS = ("\t", ";", ",")
-"""Separators in the order in which a header line is searched for them, outside quotes."""
+"""Separators in the order in which the header line is searched for them, outside quotes."""
 COMMENT = "#"
 QUOTE = '"'
 NOT_UTF8 = "\ufffd"
 """Replacement for bytes that are not UTF-8."""
 CHUNK = 1_000_000
-"""Bytes looked at together."""
+"""Bytes per read."""
 MAX_KINDS = 10
-"""Kinds of problems that are told."""
+"""Maximum number of kinds of problems to report."""
 MAX_ALIKE = 1000
-"""Problems of one kind after which reading is given up."""
+"""Number of problems of one kind after which reading stops."""
 NOTHING = ("", "nan")
-"""Cells without a number, where these are admitted."""
+"""Cells without a number, where empty cells are allowed."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _INDEX = re.compile(r"\d+")
-"""Index in brackets, as in `position[2]`, which is no unit."""
+"""Index in brackets, as in `position[2]`, which is not a unit."""
 _QUOTED = re.compile(r'"[^"]*"')
 
 
@@ -55,7 +56,7 @@ class Header(NamedTuple):
     """The header of a table.
 
     Attributes:
-        line: its line, from 1; 0 if the table has none and the first line is a row.
+        line: line number of the header, from 1; 0 if the table has none and the first line is a row.
         separator: character between the cells of a line.
         columns: names of the columns as written, without quotes; empty texts if there is no header.
     """
@@ -66,7 +67,7 @@ class Header(NamedTuple):
 
 
 def split_heading(text: str) -> tuple[str, str | None]:
-    """Return the name of a column, and the unit in brackets that follows it, if one does."""
+    """Return the name of a column, and the unit in brackets after it, or None."""
     match = _HEADING.fullmatch(text)
     if match is None or _INDEX.fullmatch(match["unit"] or ""):
         return text, None
@@ -74,10 +75,10 @@ def split_heading(text: str) -> tuple[str, str | None]:
 
 
 def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> Header:
-    """Return the header of a CSV file, whatever its columns are called; `numbered` as of `header_of`.
+    """Return the header of a CSV file with any column names; see `header_of` for `numbered`.
 
     Raises:
-        InputError: the file cannot be read, or does not begin as a table does.
+        InputError: the file cannot be read, or does not begin like a table.
     """
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
@@ -92,13 +93,14 @@ def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Se
     """Return the header of a table.
 
     Args:
-        content: the file, read from its beginning.
-        name: its path, for messages.
-        strict: whether each column must have a name of its own.
-        numbered: numbers of columns, from 1, that need no name: if all hold numbers, the line is a row.
+        content: file content, read from the beginning.
+        name: path for messages.
+        strict: whether each column must have a unique name.
+        numbered: numbers of columns, from 1, that need no name: if all of them hold numbers, the line is a
+            row.
 
     Raises:
-        InputError: with everything that is wrong with the line.
+        InputError: with every problem of the line.
     """
     file = TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
     number, line, comment = 0, "\n", 0
@@ -158,13 +160,13 @@ def _remedy(comment: int) -> str:
 
 
 class Rows(NamedTuple):
-    """The part of a file to be read.
+    """The part of a file to read.
 
     Attributes:
-        path: the file.
-        header: its header.
-        used: places of the columns to read, ascending, from 0.
-        empty_cells: whether cells of these may be empty, or hold `nan`.
+        path: path of the file.
+        header: header of the file.
+        used: positions of the columns to read, ascending, from 0.
+        empty_cells: whether cells of these columns may be empty, or hold `nan`.
     """
 
     path: str
@@ -185,7 +187,7 @@ class Rows(NamedTuple):
         """Yield line number and cells of each row, without quotes.
 
         Raises:
-            InputError: a row has other cells than the header.
+            InputError: a row does not have as many cells as the header.
         """
         count = len(self.header.columns)
         for number, line in self.lines():
@@ -196,13 +198,13 @@ class Rows(NamedTuple):
             yield number, cells
 
     def lines(self) -> Iterator[tuple[int, str]]:
-        """Yield number and content of each line below the header that has any."""
+        """Yield number and content of each line below the header that is not empty."""
         with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
             yield from filled_lines(file, self.header.line)
 
 
 def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:
-    """Yield number and content of each line below the header that has any."""
+    """Yield number and content of each line below the header that is not empty."""
     for number, line in enumerate(file, 1):
         content = line.rstrip("\n").partition(COMMENT)[0]
         if number > header_line and content:
@@ -210,12 +212,12 @@ def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, s
 
 
 def read_numbers(rows: Rows) -> FloatArray:
-    """Return the numbers of the columns that are used, (rows, columns).
+    """Return the numbers of the columns used, (rows, columns).
 
-    Use NumPy's C reader; only if it fails, or has met anything unusual, parse each line.
+    NumPy's C reader is used; only if it fails, or meets anything unusual, each line is parsed.
 
     Raises:
-        InputError: a cell is no number, or a line is no row of this table; with file and line.
+        InputError: a cell is not a number, or a line is not a row of this table; with file and line.
     """
     values, reason = np.empty((0, 0)), None
     if rows.all_used or _is_regular(rows):
@@ -229,7 +231,7 @@ def read_numbers(rows: Rows) -> FloatArray:
 
 
 def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
-    """Return the same as whole numbers of 64 bits, each with all its digits; None if they are none."""
+    """Return the columns used as 64-bit integers, (rows, columns); None if they are not whole numbers."""
     integers, _ = _loaded(rows, np.int64, _cleaned(rows))
     return integers if integers.size else None
 
@@ -237,17 +239,17 @@ def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
 def _loaded(
     rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
-    """Return the rows, and why there are none; from the file as it is, or from cells that were cleaned."""
+    """Return the rows of the file, or of cleaned lines, and the reason if there are none."""
     header, used = rows.header, None if rows.all_used else rows.used
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # NumPy's way to say that there are no rows, or no whole numbers
+        warnings.simplefilter("error")  # NumPy only warns if there are no rows, or no whole numbers
         try:
             values = np.loadtxt(
                 os.path.abspath(place_of(rows.path)) if cleaned is None else cleaned,
                 dtype=kind,
                 delimiter=header.separator if cleaned is None else "\t",
                 comments=COMMENT,
-                encoding="latin-1",  # comments may be anything; numbers are ASCII
+                encoding="latin-1",  # decodes any comment; numbers are ASCII
                 skiprows=header.line if cleaned is None else 0,
                 usecols=used if cleaned is None else None,
                 ndmin=2,
@@ -258,9 +260,10 @@ def _loaded(
 
 
 def _is_regular(rows: Rows) -> bool:
-    """Return whether each line has as many cells as the header, so that columns can be picked by place.
+    """Return whether each line has as many cells as the header, so that columns can be picked by position.
 
-    NumPy's reader does not count the cells it skips. Lines with quotes or comments are parsed one by one.
+    NumPy's reader does not count the cells that it skips. Lines with quotes or comments are parsed one by
+    one.
     """
     expected, separator = len(rows.header.columns) - 1, ord(rows.header.separator)
     rest = b""
@@ -288,20 +291,20 @@ class _IrregularError(Exception):
 
 
 def _cleaned(rows: Rows) -> Iterator[str]:
-    """Rows of the cells that are used, with points for decimal commas, and `nan` in empty cells."""
+    """Yield rows of the cells used, with points for decimal commas, and `nan` in empty cells."""
     header, decimals = rows.header, _Decimals(rows.header.separator)
     for _, line in rows.lines():
         cells = cells_of(line, header.separator)
         if len(cells) != len(header.columns):
             raise _IrregularError(line)
-        used = [cells[place].strip() for place in rows.used]  # of tabs, too, which separate what is returned
+        used = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
         if rows.empty_cells:
             used = [cell or "nan" for cell in used]
         yield "\t".join(map(decimals.with_points, used))
 
 
 class _Decimals:
-    """The decimal sign of a table, which is the same throughout; a comma only where it separates no cells."""
+    """The decimal sign of a table, the same throughout; a comma only if it is not the separator."""
 
     def __init__(self, separator: str) -> None:
         self._admitted = separator != ","
@@ -319,7 +322,7 @@ class _Decimals:
 
 
 def _row_problems(rows: Rows) -> list[Problem]:
-    """Return the first problem of each kind, saying how many there are like it."""
+    """Return the first problem of each kind, with the number of similar problems."""
     alike: dict[str, list[Problem]] = {}
     empty, decimals = True, _Decimals(rows.header.separator)
     for number, line in rows.lines():
@@ -347,7 +350,7 @@ def _summary(found: list[Problem]) -> Problem:
 
 
 def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> Iterator[tuple[str, str]]:
-    """Yield kind and sentence of each problem of a row."""
+    """Yield kind and message of each problem of a row."""
     separator, count = rows.header.separator, len(rows.header.columns)
     cells = cells_of(line, separator)
     if len(cells) != count:

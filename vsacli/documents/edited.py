@@ -1,4 +1,4 @@
-"""Edits of the text of a YAML file: other values, aliases written out, remarks; the rest stays as it is."""
+"""Edits of the text of a YAML file: new values, expanded aliases and comments; the rest stays as it is."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ _EARLIER_ERRORS = re.compile(r"(?:\s*#|;) \w+ \+- [^\s,;]+(?:, \w+ \+- [^\s,;]+)
 
 
 def edited(text: str, values: Mapping[str, Any]) -> str:
-    """Return the text with other values at some paths, or put in where there is none.
+    """Return the text with new values at some paths, inserted where a path does not exist yet.
 
     Args:
-        text: a YAML document that can be read.
+        text: valid YAML document.
         values: new texts, numbers, or mappings of these by path, e.g. `joints.0.actuator.preload`; entries of
             lists by index.
 
     Raises:
-        InputError: a path leads nowhere, or through an alias, so that its anchor would change as well.
+        InputError: a path does not exist, or leads through an alias, so that its anchor would change as well.
     """
     root = root_of(text)
     edits = (_edit(root, tuple(path.split(".")), value) for path, value in values.items())
@@ -51,7 +51,7 @@ def edited(text: str, values: Mapping[str, Any]) -> str:
 
 
 def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield path and value of every file that a document in a folder names, as seen from another folder."""
+    """Yield path and value of each file named in a document, relative to `folder` instead of `origin`."""
     if os.path.samefile(origin, folder):
         return
     for path, file in texts_at(text, "file"):
@@ -59,14 +59,14 @@ def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, st
 
 
 def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
-    """Return the node at a path; None if it leads nowhere."""
+    """Return the node at a path; None if there is none."""
     words = path.split(".")
     nodes = list(_along(root, words))
     return nodes[-1] if len(nodes) == len(words) else None
 
 
 def _along(node: yaml.Node | None, words: Iterable[str]) -> Iterator[yaml.Node]:
-    """Yield the nodes that a path leads to and through, as far as it goes."""
+    """Yield the nodes along a path, as far as they exist."""
     for word in words:
         node = None if node is None else dict(_entries(node)).get(word)
         if node is None:
@@ -75,12 +75,12 @@ def _along(node: yaml.Node | None, words: Iterable[str]) -> Iterator[yaml.Node]:
 
 
 def texts_at(text: str, key: str) -> Iterator[tuple[str, str]]:
-    """Yield path and value of every text under a key, wherever in a YAML document."""
+    """Yield path and value of every text under a key, anywhere in a YAML document."""
     yield from _texts_at(root_of(text), key, ())
 
 
 def root_of(text: str) -> yaml.Node:
-    """Return the nodes of a document that can be read."""
+    """Return the root node of a valid document."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     assert root is not None, "a document that can be read"
     return root
@@ -94,7 +94,7 @@ def _texts_at(node: yaml.Node, key: str, place: _Words) -> Iterator[tuple[str, s
 
 
 def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
-    """Yield the words of a path that lead on from a node, and where to."""
+    """Yield the entries of a node, each with the path word that leads to it."""
     if isinstance(node, yaml.MappingNode):
         yield from ((key.value, entry) for key, entry in node.value)
     elif isinstance(node, yaml.SequenceNode):
@@ -102,7 +102,7 @@ def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
 
 
 def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
-    """Return start and end of a piece of the text, and its replacement."""
+    """Return start and end of a span of the text, and its replacement."""
     *way, key = words
     node = root
     for word in way:
@@ -121,7 +121,7 @@ def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
 
 
 def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, int, str]:
-    """Return a text in place of an entry of a node; behind the key if that is a block of lines."""
+    """Return the edit that replaces an entry of a node; a block value is replaced from its key on."""
     block = isinstance(here, yaml.CollectionNode) and not here.flow_style
     if block and isinstance(node, yaml.MappingNode):
         key = next(key for key, entry in node.value if entry is here)
@@ -130,7 +130,7 @@ def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, i
 
 
 def _end(node: yaml.Node) -> int:
-    """Return where the text of a node ends; for a block, where its last entry does."""
+    """Return where the text of a node ends; a block ends with its last entry."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _end(last[1] if isinstance(last, tuple) else last)
@@ -138,14 +138,14 @@ def _end(node: yaml.Node) -> int:
 
 
 def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
-    """Return a further entry before the first one of a mapping."""
+    """Return the edit that inserts an entry before the first one of a mapping."""
     first = node.value[0][0].start_mark
     start = first.index
     return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
 
 
 def _written(value: Any) -> str:
-    """Return a value on one line: words plain, other texts in quotes."""
+    """Return a value on one line: identifiers plain, other texts in quotes."""
     match value:
         case Mapping():
             return "{" + ", ".join(f"{key}: {_written(each)}" for key, each in value.items()) + "}"
@@ -157,11 +157,11 @@ def _written(value: Any) -> str:
 
 
 def unaliased(text: str, paths: Iterable[str]) -> str:
-    """Return the text with aliases written out, of all that some paths lead through.
+    """Return the text with the aliases along some paths expanded.
 
     Args:
-        text: a YAML document that can be read.
-        paths: words joined by dots, entries of lists by index; those that lead nowhere do not count.
+        text: valid YAML document.
+        paths: words joined by dots, entries of lists by index; paths that do not exist are ignored.
     """
     ways = [tuple(path.split(".")) for path in paths]
     while True:
@@ -173,7 +173,7 @@ def unaliased(text: str, paths: Iterable[str]) -> str:
 
 
 def _shared(text: str, ways: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
-    """Return aliases, from where to where, of nodes that some path leads to or through, and those nodes."""
+    """Return start, end and node of each alias whose node lies on one of the paths."""
     root = root_of(text)
     nodes = {node.start_mark.index: node for way in ways for node in _along(root, way)}
     anchors: dict[str, yaml.Node] = {}
@@ -188,14 +188,14 @@ def _shared(text: str, ways: Iterable[tuple[str, ...]]) -> list[tuple[int, int, 
 
 
 def _place(event: yaml.Event) -> tuple[int, int]:
-    """Return start and end in the text."""
+    """Return start and end of an event in the text."""
     assert event.start_mark is not None, "as of every event of a text"
     assert event.end_mark is not None, "likewise"
     return event.start_mark.index, event.end_mark.index
 
 
 def _flow(text: str, node: yaml.Node) -> str:
-    """Return a node on one line, its scalars as they stand."""
+    """Return a node on one line, with its scalars as written."""
     if isinstance(node, yaml.MappingNode):
         return "{" + ", ".join(f"{key.value}: {_flow(text, value)}" for key, value in node.value) + "}"
     if isinstance(node, yaml.SequenceNode):
@@ -205,11 +205,11 @@ def _flow(text: str, node: yaml.Node) -> str:
 
 
 def with_errors(text: str, errors: Mapping[str, str]) -> str:
-    """Return the text with remarks such as `k +- 0.4` on the lines of the numbers at some paths.
+    """Return the text with comments such as `k +- 0.4` on the lines of the numbers at some paths.
 
     Args:
-        text: a YAML document that can be read.
-        errors: by path, entries of lists by index; those of numbers that do not stand there do not count.
+        text: valid YAML document.
+        errors: errors by path, entries of lists by index; paths that do not exist are ignored.
     """
     root = root_of(text)
     by_line: dict[int, list[str]] = {}
@@ -228,7 +228,7 @@ def with_errors(text: str, errors: Mapping[str, str]) -> str:
 
 
 def _content_ends(text: str) -> dict[int, int]:
-    """Return the column in which the last token of each line ends, behind which a comment may stand."""
+    """Return the column in which the last token of each line ends, after which a comment may follow."""
     ends: dict[int, int] = {}
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
         ends[token.end_mark.line] = max(ends.get(token.end_mark.line, 0), token.end_mark.column)

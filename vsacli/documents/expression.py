@@ -1,8 +1,8 @@
 """Expressions in documents: one grammar for formulas, for numbers such as `90 deg`, and for units.
 
-Whoever reads a document says which words there are. A text is never given to Python, and neither its length
-nor its nesting can exhaust anything. A number is a decimal, an expression with `pi`, or an angle in degrees.
-Units stand in headers of tables, e.g. `deg/s^2` or `N m/(rad s)`.
+The reader of a document defines the vocabulary. Texts are never evaluated by Python, and length and nesting
+are limited, so that malicious input cannot exhaust memory or stack. A number is a decimal, an expression with
+`pi`, or an angle in degrees. Units occur in headers of tables, e.g. `deg/s^2` or `N m/(rad s)`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import ANY_SI_UNIT
 
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-"""A decimal number without sign."""
+"""Regular expression of a decimal number without sign."""
 
 MAX_NESTING = 200
-"""Parentheses, signs and powers inside each other; each takes two calls of Python, which stops at 1000."""
+"""Maximum depth of parentheses, signs and powers; a level needs two Python calls, which are limited to
+1000."""
 
 _TOKEN = re.compile(
     rf"(?P<space>[ \t]+)|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<symbol>\*\*|[-+*/^()])", re.ASCII
@@ -44,12 +45,12 @@ _OPERATORS: dict[str, Callable[..., Any]] = {
 
 
 class ExpressionError(ValueError):
-    """A text is no expression.
+    """A text that is not a valid expression.
 
     Attributes:
-        reason: the problem.
-        place: number of the character, from 1; 0 if the whole text is meant.
-        remedy: a clause with advice, beginning with `;`, or nothing.
+        reason: problem in words.
+        place: position of the character, from 1; 0 for the whole text.
+        remedy: clause with advice, beginning with `;`, or empty.
     """
 
     def __init__(self, reason: str, place: int = 0, remedy: str = "") -> None:
@@ -63,11 +64,11 @@ class Grammar(NamedTuple):
 
     Attributes:
         names: words that stand for a value.
-        functions: words that take one argument in parentheses.
-        powers: whether `^`, which may be written `**`, is there.
-        max_length: of the text.
+        functions: words followed by one argument in parentheses.
+        powers: whether `^`, also written `**`, is allowed.
+        max_length: maximum length of the text.
         of_units: whether words are units: a blank multiplies, numbers are exponents from 1 to 4, with or
-            without `^`, and a product behind a division is ambiguous.
+            without `^`, and a product after a division is ambiguous.
     """
 
     names: Collection[str]
@@ -78,11 +79,12 @@ class Grammar(NamedTuple):
 
 
 class Step(NamedTuple):
-    """One operation.
+    """An operation.
 
     Attributes:
-        operation: an operator, `negative`, a function, `name` or `number`.
-        operands: numbers of the steps whose results it takes; of the last two the word, or the number.
+        operation: operator, `negative`, function, `name` or `number`.
+        operands: indices of the steps that give the operands; the word or the number itself for `name` and
+            `number`.
     """
 
     operation: str
@@ -90,16 +92,16 @@ class Step(NamedTuple):
 
 
 class Expression(NamedTuple):
-    """An expression as steps, each after those that it needs; the last one gives the value.
+    """An expression as steps in order of evaluation; the last one gives the value.
 
-    Equal parts of the text are one step.
+    Equal parts of the text share one step.
     """
 
     steps: tuple[Step, ...]
 
     @property
     def names(self) -> set[str]:
-        """The words that stand for a value."""
+        """Words that stand for a value."""
         return {step.operands[0] for step in self.steps if step.operation == "name"}
 
     def value(
@@ -108,12 +110,12 @@ class Expression(NamedTuple):
         functions: Mapping[str, Callable[[Any], Any]],
         number: Callable[[float], Any] = float,
     ) -> Any:
-        """Return the value for anything that has the operators.
+        """Return the value, of any type that has the operators.
 
         Args:
-            names: their values.
-            functions: by their words.
-            number: makes such a thing of a number that stands in the text.
+            names: values of the names.
+            functions: functions by name.
+            number: conversion of numbers in the text to the type of the values.
         """
         results: list[Any] = []
         for operation, operands in self.steps:
@@ -131,7 +133,7 @@ def parse(text: str, grammar: Grammar) -> Expression:
     """Return the steps of an expression.
 
     Raises:
-        ExpressionError: it is none, with the reason and the place.
+        ExpressionError: the text is not an expression; with reason and place.
     """
     if len(text) > grammar.max_length:
         raise ExpressionError(f"longer than {grammar.max_length} characters")
@@ -160,7 +162,7 @@ def _tokens(text: str, token: re.Pattern[str]) -> list[_Token]:
 
 
 class _Parser:
-    """Operator precedence, one token after the other (V. R. Pratt, Top down operator precedence, 1973)."""
+    """A parser by operator precedence (V. R. Pratt, Top down operator precedence, 1973)."""
 
     def __init__(self, tokens: list[_Token], grammar: Grammar) -> None:
         self._tokens = iter(tokens)
@@ -170,7 +172,7 @@ class _Parser:
         self._steps: dict[Hashable, int] = {}
 
     def parsed(self) -> Expression:
-        """Return all of it."""
+        """Return the expression of all tokens."""
         self._expression(binding=1)
         if self._next.kind != "end":
             self._refuse("an operator")
@@ -194,7 +196,7 @@ class _Parser:
         return left
 
     def _operator(self) -> str:
-        """Return the operator that comes next; between units it may be left out."""
+        """Return the next operator; between units it may be omitted."""
         juxtaposed = self._grammar.of_units and (self._next.kind == "name" or self._next.text == "(")
         return "*" if juxtaposed else self._next.text
 
@@ -245,7 +247,7 @@ class _Parser:
         return inner
 
     def _step(self, operation: str, *operands: Any) -> int:
-        """Return the number of a step, which is there once."""
+        """Return the index of a step; equal steps are stored once."""
         return self._steps.setdefault(Step(operation, operands), len(self._steps))
 
     def _take(self) -> _Token:
@@ -259,10 +261,10 @@ class _Parser:
 
 MAX_LENGTH = 200
 ANGLES = ("rad", "rad/s", str(ANY_SI_UNIT))
-"""Units in which `90 deg` may be written."""
+"""Units in which numbers such as `90 deg` are allowed."""
 
 BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
-"""Words that YAML 1.1 takes for booleans, in lower case."""
+"""Words that are booleans in YAML 1.1, in lower case."""
 
 _NUMBERS = Grammar(names=("pi",), functions=(), powers=False, max_length=MAX_LENGTH)
 _DECIMAL = re.compile(rf"[+-]?(?!0\d){NUMBER}", re.ASCII)
@@ -276,18 +278,18 @@ _REFUSED_FORMS = {
     r"[+-]?\d+,\d+": "write a decimal point, not a comma",
     r".*°": "unexpected character '°'; degrees are written as in `90 deg`",
 }
-"""Advice on forms that are no expressions."""
+"""Advice on number formats that are not expressions."""
 
 
 def evaluate(text: str, unit: str) -> float:
-    """Return the number a text stands for.
+    """Return the value of a text.
 
     Args:
-        text: e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.
-        unit: of the number; degrees, converted to radians, are admitted for ANGLES only.
+        text: number or expression, e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.
+        unit: unit of the value; degrees, converted to radians, are allowed for ANGLES only.
 
     Raises:
-        ExpressionError: anything else, or a value that is not finite.
+        ExpressionError: the text is not an expression, or its value is not finite.
     """
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"longer than {MAX_LENGTH} characters")
@@ -361,7 +363,8 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
     "ohm": (1.0, {"V": 1, "A": -1}),
     "mohm": (1e-3, {"V": 1, "A": -1}),
 }
-"""Size in SI and dimensions of each symbol; an angle counts as a dimension, so that N m is not N m/rad."""
+"""Size in SI units and dimensions of each symbol; an angle counts as a dimension, so that N m is not N
+m/rad."""
 
 _SPELLINGS = str.maketrans(
     {
@@ -381,7 +384,7 @@ _UNITS = Grammar(BASES, (), powers=False, max_length=40, of_units=True)
 
 
 class _Unit:
-    """A unit: its size in SI, and its dimensions without zero exponents."""
+    """A unit: its size in SI units, and its dimensions without zero exponents."""
 
     def __init__(self, size: float, dimensions: Mapping[str, int]) -> None:
         self.size = size
@@ -405,14 +408,14 @@ class _Unit:
 
 
 def conversion_factor(text: str, expected: str) -> float:
-    """Return the factor that converts a number from one unit into another.
+    """Return the factor that converts a number from one unit to another.
 
     Args:
-        text: the unit found: symbols of `BASES` with `^`, `*`, `/` and parentheses, a blank for a product.
-        expected: the unit wanted, as above.
+        text: given unit: symbols of `BASES` with `^`, `*`, `/` and parentheses, a blank for a product.
+        expected: unit to convert to, in the same form.
 
     Raises:
-        InputError: the unit is not understood, or is one of something else.
+        InputError: the unit is not understood, or has other dimensions.
     """
     wanted = _parsed(expected)
     try:

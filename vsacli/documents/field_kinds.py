@@ -1,13 +1,13 @@
 """Kinds of declared values: numbers with units, texts, words, files, and several numbers.
 
-A kind is the data of a declared value (unit, length, options) and the way a node of a document is read into
-it. Each further job is one function for all kinds: JSON Schema in `json_schema`, lines of a template in
-`commented`, arrays, JSON values and numbers in `record_values`. Lists and records are in `nested`.
+A kind holds the data of a declared value (unit, length, options) and reads it from a node of a document. Each
+further task is one function for all kinds: JSON Schema in `json_schema`, lines of a template in `commented`,
+arrays, JSON values and numbers in `record_values`. Lists and records are in `nested`.
 
 A record class is a frozen, keyword-only dataclass whose attributes are made by the functions of `fields`. It
-may have these class attributes: `not_yet` names keys that belong to the format but that this version does not
-act on; `unit_variant` names the choice on which the units in the record, and in records inside it, depend;
-`unit_variant_with` is a key and the choice that counts for them if the key is there.
+may have these class attributes: `not_yet` names keys of the format that this version does not support;
+`unit_variant` names the choice that determines the units in the record and in nested records;
+`unit_variant_with` is a key and the choice that applies if the key is present.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ from vsacli.documents.tree import INVALID, Node, Scalar, Scope, all_valid, quote
 
 REQUIRED = dataclasses.MISSING
 LARGEST = 1e30
-"""Size of a finite number, in SI units, beyond which it is refused: products of a few still are numbers."""
+"""Largest magnitude of a finite number, in SI units: products of a few such numbers do not overflow."""
 
 SMALLEST = 1e-30
-"""Size below which a number is refused if it cannot be zero: one may divide by it."""
+"""Smallest magnitude of a number that cannot be zero, since it may be a divisor."""
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 TRUTHS = ("true", "false")
 
 PER_CENT = re.compile(r"(?P<number>.*\S)\s*%")
-"""A share in per cent."""
+"""Regular expression of a share in percent."""
 
 FieldPath: TypeAlias = tuple[str | int, ...]
 Schema: TypeAlias = dict[str, Any]
 Refer: TypeAlias = Callable[[type, str | None], Schema]
-"""Gives the JSON Schema that refers to a record class, as the variant of a word if it is one."""
+"""Function that returns a JSON Schema reference to a record class, or to the variant of a word."""
 
 
 class Check(NamedTuple):
-    """A condition on a single number and the words for it, as in "must be positive".
+    """A condition on a single number, and its requirement in words, as in "must be positive".
 
-    `keywords` say it in JSON Schema, as far as that can.
+    `keywords` express it in JSON Schema as far as possible.
     """
 
     holds: Callable[[float], bool]
@@ -59,7 +59,7 @@ class Check(NamedTuple):
     keywords: Mapping[str, Any] = MappingProxyType({})
 
     def problem(self, number: float) -> str | None:
-        """Return why a number is refused, by the condition or for its size; None if it is not."""
+        """Return why a number is refused, by the condition or for its magnitude; None if it is valid."""
         if not self.holds(number):
             return f"must be {self.requirement}, not {number:g}"
         if LARGEST < abs(number) < math.inf:
@@ -76,11 +76,11 @@ class Kind(ABC):
     """The kind of a declared value.
 
     Attributes:
-        unit: quantity of its numbers; None if it has none, or each has a unit of its own.
-        item: the kind of the entries, if a value has several.
+        unit: quantity of the numbers; None if there are none, or each has its own unit.
+        item: kind of the entries, if a value has several.
         records: classes of the records in a value, by the word that selects each, "" for the only one.
         per_joint: whether the last index of the path to a problem is that of a joint.
-        dims: dimensions of a value as one array; None if it has no such form.
+        dims: dimensions of a value as one array; None if a value has no array form.
     """
 
     unit: Quantity | None = None
@@ -91,14 +91,14 @@ class Kind(ABC):
 
     @abstractmethod
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the value of a node, which messages call `label`; INVALID if its problem was noted."""
+        """Return the value of a node, named `label` in messages; INVALID after noting a problem."""
 
     def fault(self, _content: Any) -> str | None:
-        """Return the problem of a value as a whole, apart from the condition on its numbers."""
+        """Return the problem of a value as a whole, apart from the condition on its numbers, or None."""
         return None
 
     def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
-        """Yield the problems of a value at a path, whose numbers must meet a condition."""
+        """Yield the problems of a value at a path; its numbers must meet the condition."""
         fault = self.fault(content)
         if fault is not None:
             yield FieldProblem(path, fault)
@@ -112,16 +112,16 @@ class Kind(ABC):
 
 
 class OwnKind(Kind):
-    """A kind that one module declares for itself; `words` are for the documentation."""
+    """A kind declared by a single module; `words` describe it in the documentation."""
 
     words: str
 
     @abstractmethod
     def schema(self, refer: Refer) -> Schema:
-        """Return the JSON Schema of values."""
+        """Return the JSON Schema of the values."""
 
     def json_value(self, content: Any, _of_record: Callable[[Any], Any]) -> Any:
-        """Return a value as JSON could hold it."""
+        """Return a value in a form that JSON can hold."""
         return content
 
 
@@ -142,7 +142,7 @@ def on_one_line(value: Any) -> str:
 
 
 class Field(NamedTuple):
-    """A declared field: the kind of its value, one sentence about it, and the condition on each number."""
+    """A declared field: the kind of its value, a sentence about it, and the condition on each number."""
 
     kind: Kind
     doc: str
@@ -150,11 +150,11 @@ class Field(NamedTuple):
 
     @property
     def quantity(self) -> Quantity:
-        """Return the quantity of its numbers."""
+        """Quantity of the numbers; dimensionless if there are none."""
         return self.kind.unit or DIMENSIONLESS
 
     def problems(self, name: str, content: Any) -> Iterator[FieldProblem]:
-        """Yield the problems of the content of the field of this name."""
+        """Yield the problems of the content of a field, by its name."""
         return self.kind.problems((name,), self.check, content)
 
 
@@ -171,11 +171,11 @@ def check_fields(record: Any, *further: FieldProblem) -> None:
     """Check every declared field of a record; for `__post_init__`.
 
     Args:
-        record: an instance of a record class.
-        further: problems the record found on its own, reported together with these.
+        record: instance of a record class.
+        further: problems found by the record itself, to be reported together.
 
     Raises:
-        InvalidRecordError: naming each field whose value it cannot have.
+        InvalidRecordError: with each invalid field.
     """
     problems = [
         problem
@@ -202,7 +202,7 @@ class Number(Kind):
 
 
 def read_number(node: Node, unit: str, label: str, scope: Scope) -> Any:
-    """Return the number of a node with a unit; see `Kind.read`."""
+    """Return the number of a node in a unit; see `Kind.read`."""
     expected = "a number" if unit == str(DIMENSIONLESS) else f"a number in {unit}"
     if not isinstance(node, Scalar) or node.is_null:
         return scope.unexpected(node, expected, label)
@@ -219,7 +219,7 @@ class Share(Number):
         super().__init__(DIMENSIONLESS)
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the share as a number."""
+        """Return the share as a fraction."""
         share = PER_CENT.fullmatch(node.text) if isinstance(node, Scalar) else None
         if share is None:
             return super().read(node, label, scope)
@@ -239,7 +239,7 @@ class Integer(Kind):
 
 
 class Boolean(Kind):
-    """True or false, by these words alone."""
+    """True or false, written as one of these words."""
 
     dims = ()
 
@@ -263,7 +263,7 @@ class Text(Kind):
         self.identifier = identifier
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the text as written, unless YAML takes it for something else."""
+        """Return the text as written, unless YAML reads it as another type."""
         if not isinstance(node, Scalar) or node.is_null:
             return scope.unexpected(node, "a text", label)
         if node.plain and node.text.lower() in BOOLEANS:
@@ -279,7 +279,7 @@ class Text(Kind):
 
 
 class Name(Text):
-    """A name, which stands in titles, messages and comments of code: one line that can be printed."""
+    """A name for titles, messages and comments in code: one printable line."""
 
     def fault(self, content: Any) -> str | None:
         """See `Kind.fault`."""
@@ -289,7 +289,7 @@ class Name(Text):
 
 
 def _unprintable(content: str, allowed: str = "") -> str | None:
-    """Return that a text has control characters, or those that turn the direction of writing."""
+    """Return the problem of a text with control characters or writing-direction marks; None without one."""
     for letter in content:
         if not (letter.isprintable() or letter in allowed):
             what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
@@ -298,9 +298,9 @@ def _unprintable(content: str, allowed: str = "") -> str | None:
 
 
 class Choice(Kind):
-    """One of a few words, for the documentation called `words` if they are many.
+    """One of a few words; `words` describes them in the documentation if there are many.
 
-    `not_yet` are words of the format that this version does not act on.
+    `not_yet` are words of the format that this version does not support.
     """
 
     dims = ()
@@ -309,7 +309,7 @@ class Choice(Kind):
         self.options, self.not_yet, self.words = options, not_yet, words
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the word, which may still be none of the options."""
+        """Return the word; `fault` checks whether it is an option."""
         if isinstance(node, Scalar) and not node.is_null:
             return node.text
         return scope.unexpected(node, f"one of {', '.join(self.options)}", label)
@@ -320,14 +320,14 @@ class Choice(Kind):
 
 
 def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
-    """Return why a word is not among the options."""
+    """Return the problem of a word that is not among the options."""
     if word in not_yet:
         return f"{word!r} is not supported yet"
     return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
 
 
 class TableFile(Kind):
-    """Path of a CSV file relative to the document, read as a `Table` of these columns."""
+    """Path of a CSV file, relative to the document, read as a `Table` with these columns."""
 
     dims = ()
 
@@ -335,7 +335,7 @@ class TableFile(Kind):
         self.columns = columns
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the table in the file; its problems are noted under its own name."""
+        """Return the table in the file; its problems are noted under the name of that file."""
         name = Text().read(node, label, scope)
         if name is INVALID:
             return INVALID
@@ -363,7 +363,7 @@ class Vector(Kind):
         self.item: Number = Number(unit)
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the numbers, which may still be too many or too few."""
+        """Return the numbers; `fault` checks how many there are."""
         if not isinstance(node, tree.Sequence):
             return scope.unexpected(node, f"a list of {self.length} numbers", label)
         return all_valid(self.item.read(item, label, scope) for item in node.items)
@@ -375,7 +375,7 @@ class Vector(Kind):
 
 
 class Interval(Kind):
-    """`[lower, upper]`, read as a pair; a scalar x means [-x, x], or [lowest, x] with a `lowest`."""
+    """An interval `[lower, upper]`, read as a pair; a scalar x means [-x, x], or [`lowest`, x] if given."""
 
     dims = ("bound",)
 
@@ -400,10 +400,10 @@ class Interval(Kind):
 
 
 class NamedNumbers(Kind):
-    """A mapping from names of one's own to numbers in SI units, read as pairs; angles may be in degrees."""
+    """A mapping from user-defined names to numbers in SI units, read as pairs; angles may be in degrees."""
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return pairs of a name and a number."""
+        """Return pairs of name and number."""
         if not isinstance(node, tree.Mapping):
             return scope.unexpected(node, "a mapping from names to numbers", label)
         numbers = all_valid(

@@ -1,7 +1,7 @@
-"""Declaration of the fields of a record, once for file reader, constructor checks and documentation.
+"""Declaration of the fields of a record, shared by file reader, constructor checks and documentation.
 
-Record classes take all they need from here: the functions that make attributes, the kinds of nested values,
-and conditions; `field_kinds` lists further attributes of record classes.
+Record classes import everything they need from here: the functions that create attributes, the kinds of
+nested values, and conditions. `field_kinds` lists further attributes of record classes.
 """
 
 from __future__ import annotations
@@ -95,42 +95,42 @@ def _declare(field: Field, default: Any, **options: Any) -> Any:
 def number(
     unit: Quantity, doc: str, *, check: Check = FINITE, default: Any = REQUIRED, compare: bool = True
 ) -> Any:
-    """Return a number; `compare=False` keeps it out of the equality of two records."""
+    """Declare a number; `compare=False` excludes it from the equality of records."""
     return _declare(Field(Number(unit), doc, check), default, compare=compare)
 
 
 def integer(doc: str, *, check: Check, default: Any = REQUIRED) -> Any:
-    """Return a whole number."""
+    """Declare a whole number."""
     return _declare(Field(Integer(), doc, check), default)
 
 
 def boolean(doc: str, *, default: Any = REQUIRED) -> Any:
-    """True or false."""
+    """Declare a truth value."""
     return _declare(Field(Boolean(), doc), default)
 
 
 def text(doc: str, *, identifier: bool = False, default: Any = REQUIRED) -> Any:
-    """Return a text."""
+    """Declare a text."""
     return _declare(Field(Text(identifier), doc), default)
 
 
 def choice(
     options: tuple[str, ...], doc: str, *, default: Any = REQUIRED, not_yet: tuple[str, ...] = ()
 ) -> Any:
-    """One of a few words."""
+    """Declare a choice from a few words."""
     return _declare(Field(Choice(options, not_yet), doc), default)
 
 
 def vector(length: int, unit: Quantity, doc: str, *, default: Any = REQUIRED) -> Any:
-    """Return a list of finite numbers."""
+    """Declare a list of finite numbers."""
     return _declare(Field(Vector(length, unit), doc, FINITE), default)
 
 
 def interval(unit: Quantity, doc: str, *, lowest: float | None = None, default: Any = REQUIRED) -> Any:
-    """Return a lower and an upper bound; one number x means [-x, x], or [lowest, x] with `lowest`."""
+    """Declare an interval; one number x means [-x, x], or [lowest, x] with `lowest`."""
     return _declare(Field(Interval(unit, lowest), doc), default)
 
 
 def value(kind: Kind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:
-    """Return a nested value: Record, OneOf, Items, Pair or PerJoint; `check` is for the numbers in it."""
+    """Declare a nested value: Record, OneOf, Items, Pair or PerJoint; `check` applies to its numbers."""
     return _declare(Field(kind, doc, check), default)

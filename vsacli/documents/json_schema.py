@@ -1,7 +1,7 @@
 """JSON Schema (draft 2020-12) of a declared document, with which editors complete and check YAML.
 
-A schema accepts whatever the reader accepts. It cannot know the value of an
-expression, conditions between fields, the joints of a robot.
+A schema accepts everything that the reader accepts. It cannot express values of expressions, conditions
+between fields, or the joints of a robot.
 """
 
 from __future__ import annotations
@@ -41,27 +41,27 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 EXPRESSION = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*$"
 ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
-"""Regular expression of expressions."""
+"""Regular expressions of expressions without and with degrees."""
 
 PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
-"""Regular expression of names."""
+"""Regular expression of a name."""
 
 
 def json_schema(cls: type, format_name: str, title: str) -> Schema:
-    """Return the schema of documents read into the record class `cls`; they begin with `format: ...`."""
+    """Return the schema of documents read into the record class `cls`, which begin with `format: ...`."""
     builder = _Builder()
     document = builder.record(cls, {"format": {"const": format_name}}, ("format",))
     return {"$schema": DIALECT, "title": title, **document, "$defs": builder.definitions}
 
 
 class _Builder:
-    """Schemas of records, which gather in `definitions` and are referred to."""
+    """A builder of record schemas, which are collected in `definitions` and referenced."""
 
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
 
     def record(self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
-        """Return the schema of a mapping with the fields of a record class, and keys `beside` them."""
+        """Return the schema of a mapping with a record class's fields and the further keys `beside`."""
         fields = declared(cls)
         return {
             "type": "object",
@@ -80,7 +80,7 @@ class _Builder:
         return {"description": described, **schema, **({} if shown is None else {"default": shown})}
 
     def _value(self, kind: Kind, check: Check | None) -> Schema:
-        """Return the schema of values of a kind whose numbers meet a condition."""
+        """Return the schema of values of a kind; their numbers must meet the condition."""
         match kind:
             case OwnKind():
                 return kind.schema(self._reference)
@@ -110,10 +110,10 @@ class _Builder:
         }
 
     def _reference(self, cls: type, word: str | None = None) -> Schema:
-        """Return a reference to the definition of a record, of the variant `word` if it is one of several."""
+        """Return a reference to the definition of a record, or of its variant `word`."""
         name = cls.__name__ if word is None else f"{cls.__name__}.{word}"
         if name not in self.definitions:
-            self.definitions[name] = {}  # so that a record may hold records of its own class
+            self.definitions[name] = {}  # ends the recursion of a record that holds its own class
             beside = {} if word is None else {"type": {"const": word}}
             summary = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
             self.definitions[name] = {"description": summary, **self.record(cls, beside)}
@@ -121,14 +121,14 @@ class _Builder:
 
 
 def _list(item: Schema, length: int | None = None) -> Schema:
-    """Return the schema of lists of a length, or of any but zero."""
+    """Return the schema of a list with the given length, or of any list that is not empty."""
     if length is None:
         return {"type": "array", "minItems": 1, "items": item}
     return {"type": "array", "items": item, "minItems": length, "maxItems": length}
 
 
 def _single(kind: Kind, check: Check | None) -> Schema:
-    """Return the schema of a single value; nothing if the kind has several numbers."""
+    """Return the schema of a single value; empty if the kind has several numbers."""
     match kind:
         case Share():
             per_cent = {"type": "string", "pattern": EXPRESSION[:-1] + "%$"}
@@ -146,14 +146,14 @@ def _single(kind: Kind, check: Check | None) -> Schema:
         case Text(identifier=True):
             return {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
         case Text():
-            return {"type": ["string", "number"]}  # YAML may take a text for a number
+            return {"type": ["string", "number"]}  # YAML may read a text as a number
         case Choice():
             return {"enum": list(kind.options)}
     return {}
 
 
 def _of_numbers(kind: Kind, check: Check | None) -> Schema:
-    """Return the schema of several numbers, or of the path of a file that has them."""
+    """Return the schema of several numbers, or of the path of a file with numbers."""
     match kind:
         case Vector():
             return _list(_number(kind.item.unit, check), kind.length)
@@ -172,7 +172,7 @@ def _of_numbers(kind: Kind, check: Check | None) -> Schema:
 
 
 def _number(unit: Quantity, check: Check | None) -> Schema:
-    """Return the schema of a number within the bounds, or of an expression."""
+    """Return the schema of a number within bounds, or of an expression."""
     keywords = {"minimum": -LARGEST, "maximum": LARGEST, **({} if check is None else check.keywords)}
     pattern = ANGLE if {unit.revolute, unit.prismatic} & set(ANGLES) else EXPRESSION
     return {"anyOf": [{"type": "number", **keywords}, _expression(pattern)]}
@@ -183,7 +183,7 @@ def _expression(pattern: str) -> Schema:
 
 
 def _json_value(default: Any) -> Any:
-    """Return a default that a document could hold, or None."""
+    """Return a default in a form that a document can hold, or None."""
     match default:
         case bool() | str() if default != "":
             return default

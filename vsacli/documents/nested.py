@@ -1,6 +1,6 @@
-"""Kinds of nested values: lists, pairs of sides, values by joint, and records, with the reading of a record.
+"""Kinds of nested values (lists, pairs of sides, values by joint, and records), and the reading of records.
 
-A record is read field by field. Problems are noted with their lines, and reading goes on, so that all
+A record is read field by field. Problems are noted with their lines and reading continues, so that all
 problems of a file are reported together.
 """
 
@@ -29,7 +29,7 @@ from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
 
 
 class Items(Kind):
-    """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
+    """A list of one or more values of a kind, read as a tuple; the text field `unique` must differ in all."""
 
     item: Kind
 
@@ -55,7 +55,7 @@ class Items(Kind):
         return bool(found)
 
     def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
-        """See `Kind.problems`; entries that must differ are records, which checked themselves."""
+        """See `Kind.problems`; entries with a unique field are records, checked on construction."""
         if self.unique is None:
             yield from super().problems(path, check, tuple(content))
         else:
@@ -64,7 +64,7 @@ class Items(Kind):
 
 
 def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
-    """Yield index of, and message about, each word that stood before; None never counts."""
+    """Yield index and message of each word that occurred before; None is not counted."""
     seen: set[str] = set()
     for index, word in enumerate(words):
         if word is not None and word in seen:
@@ -90,9 +90,9 @@ class OneOrMore(Items):
 
 
 class Pair(Kind):
-    """One value for both of two, the sides of a joint say, or a list of two, read as a pair.
+    """One value for both members of a pair, such as the sides of a joint, or a list of two; read as a pair.
 
-    `dim` is the dimension along which arrays hold both.
+    `dim` is the dimension of arrays along which both are stored.
     """
 
     __match_args__ = ("item", "dim")
@@ -103,7 +103,7 @@ class Pair(Kind):
         self.records, self.unit = item.records, item.unit
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return both values, which are one if one was written."""
+        """Return both values; they are the same object if one was written."""
         if isinstance(node, tree.Mapping) and self._names_sides(node):
             keys = ", ".join(map(quoted, node.entries))
             expected = "one mapping for both sides or a list of two"
@@ -121,7 +121,7 @@ class Pair(Kind):
         return super().problems(path, check, tuple(content))
 
     def _names_sides(self, node: tree.Mapping) -> bool:
-        """Return whether mappings stand under keys of their own, as in `{flexor: {...}, extensor: {...}}`."""
+        """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
         if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
             return False
         known = {"type", *(name for cls in self.records.values() for name in declared(cls))}
@@ -131,7 +131,7 @@ class Pair(Kind):
 class PerJoint(Kind):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 
-    Joints that are exempt from `purpose` are named in no mapping and null in a list; their entry is None.
+    Joints exempt from `purpose` are omitted in mappings and null in lists; their entry is None.
     """
 
     unit: Quantity
@@ -141,7 +141,7 @@ class PerJoint(Kind):
         self.unit, self.purpose, self.item = unit, purpose, Number(unit)
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return a number for each joint in its own unit, None if it is exempt; or extend a survey."""
+        """Return a number for each joint in its unit, None if exempt; or add the node to a survey."""
         if scope.survey is not None:
             scope.survey.append((self.unit, node))
             return INVALID
@@ -158,14 +158,14 @@ class PerJoint(Kind):
 
 
 def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
-    """Return None, for a joint that must not have a number."""
+    """Return None for an exempt joint; note a problem if it has a value."""
     if node is None or (isinstance(node, tree.Scalar) and node.is_null):
         return None
     return scope.unexpected(node, f"no value for {name}", label, f": {reason}")
 
 
 def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -> Mapping[str, Node] | None:
-    """Return the node for each joint, a scalar for all but exempt ones; None if joints are wrong."""
+    """Return the node for each joint (a scalar for all except exempt ones); None if joints are wrong."""
     names = scope.members
     match node:
         case tree.Scalar():
@@ -180,7 +180,7 @@ def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -
 
 
 def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
-    """Note names that are no joint's, and joints without a value."""
+    """Note names of unknown joints, and joints without a value."""
     names = scope.members
     unknown = [name for name in node.entries if name not in names]
     for name in unknown:
@@ -208,7 +208,7 @@ class Record(Kind):
 
 
 class OneOf(Kind):
-    """A mapping whose key `type` selects the record class; `not_yet` as for Choice."""
+    """A mapping whose key `type` selects the record class; see `Choice` for `not_yet`."""
 
     __match_args__ = ("records",)
 
@@ -237,7 +237,7 @@ class OneOf(Kind):
 
 
 def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside: tuple[str, ...] = ()) -> Any:
-    """Read a mapping into a record class; the keys `beside` those of the class are the caller's."""
+    """Read a mapping into a record class; the additional keys `beside` are left to the caller."""
     prefix = f"{label}: " if label else ""
     scope = scope_inside(scope, cls, node)
     fields = declared(cls)
@@ -276,7 +276,7 @@ def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
 
 
 def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:
-    """Note unknown keys; returns the known ones that were probably meant, which are then not missing."""
+    """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
     meant: set[str] = set()
     for key, line in node.key_lines.items():
         if key in getattr(cls, "not_yet", ()):
@@ -303,7 +303,7 @@ def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope:
 
 
 def line_of(path: FieldPath, node: Node, scope: Scope) -> int:
-    """Return the line of the deepest node along a path; a scalar stands for all entries of its value."""
+    """Return the line of the deepest node along a path; a scalar counts for all entries of its value."""
     for step in path:
         if isinstance(node, tree.Mapping):
             key = list(scope.members)[step] if isinstance(step, int) else step

@@ -1,7 +1,7 @@
-"""Paths into files, such as `joints.elbow.actuator.spring.k`, to find values and to replace them.
+"""Paths into files, such as `joints.elbow.actuator.spring.k`, to find and to replace values.
 
-The words of a path are keys of mappings. An entry of a list goes by its index, from 0, or by the name that it
-has, and `*` stands for all entries.
+The words of a path are keys of mappings. An entry of a list is given by its index, from 0, or by its name;
+`*` stands for all entries.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ _Record = TypeVar("_Record")
 
 
 def find(content: Any, path: str) -> Any:
-    """Return the value at a path in plain data; a list of values where `*` is a word of the path.
+    """Return the value at a path in plain data; a list of values if `*` is a word of the path.
 
     Args:
-        content: mappings, lists, numbers and texts, as of JSON.
-        path: e.g. `joints.0.link.mass`, `joints.elbow.link.mass` or `joints.*.link.mass`.
+        content: mappings, lists, numbers and texts, as in JSON.
+        path: path to a value, e.g. `joints.0.link.mass`, `joints.elbow.link.mass` or `joints.*.link.mass`.
 
     Raises:
-        InputError: naming the first word that leads nowhere, and the nearest one that does.
+        InputError: with the first word that is not found, and the nearest valid one.
     """
     return _found(content, path.split("."), ())
 
@@ -61,14 +61,14 @@ def _entries(content: Any) -> dict[str, Any]:
 
 
 def _indices(names: Iterable[str]) -> dict[str, int]:
-    """Index of each entry of a list by the words for it: its name, if that is not empty, and the index."""
+    """Return the index of each entry of a list, by its name, if not empty, and by the index as text."""
     numbered = list(enumerate(names))
     named = {name: index for index, name in numbered if name}
     return named | {str(index): index for index, _ in numbered}
 
 
 def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
-    """Return the error of a word that is none of those there are at a place."""
+    """Return the error for a word that is not among the valid words at a place."""
     words = list(there)
     where = f"{_joined(place)} has" if place else "there is"
     hint = did_you_mean(word, words) if words else "; it is a single value"
@@ -87,23 +87,23 @@ def replace(
     exempt: Mapping[str, Mapping[str, str]] | None = None,
     file: str = "",
 ) -> _Record:
-    """Return a record of declared fields with another value at a path; the given record stays as it is.
+    """Return a record of declared fields with a new value at a path; the given record is not changed.
 
-    `replace(robot, "joints.elbow.actuator.spring.k", 500)`, for example, which `Robot.replace` offers. Of a
-    pair of sides that are the same, a path without side changes both; if they differ, it needs 0, 1 or `*`.
-    Every record on the way is built anew, and so checks itself.
+    `Robot.replace` offers it, as in `replace(robot, "joints.elbow.actuator.spring.k", 500)`. For a pair of
+    equal sides, a path without side changes both; if the sides differ, it needs 0, 1 or `*`. Every record
+    along the path is constructed anew, and so checked.
 
     Args:
-        record: a robot, for example; its undeclared fields, such as the sources of a robot, are kept.
-        path: to a declared field, or to an entry of its list.
-        value: what a file could hold there: a number, a text such as `90 deg`, a list or a mapping of those.
-        members: name and unit variant of every joint, where the document has PerJoint values.
-        exempt: for a purpose of these the joints that have none, each with the reason.
-        file: path of the document, to which those of other files in the value are relative.
+        record: record such as a robot; its undeclared fields, such as the sources of a robot, are kept.
+        path: path to a declared field, or to an entry of its list.
+        value: value in a form that a file can hold: number, text such as `90 deg`, list or mapping of those.
+        members: name and unit variant of every joint, if the document has PerJoint values.
+        exempt: for purposes of PerJoint values, the joints without a value, each with the reason.
+        file: path of the document, to which paths of other files in the value are relative.
 
     Raises:
-        InputError: the path leads nowhere, saying what there is instead; or the value cannot stand there,
-            with every problem and the path to it.
+        InputError: the path does not exist, with the valid words; or the value is invalid, with every problem
+            and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
     found: _Record = _Replacement(_node(value), scope).in_record(record, path.split("."), ())
@@ -126,17 +126,17 @@ def _node(value: Any) -> tree.Node:
 
 
 class _Replacement(NamedTuple):
-    """A replacement for a value in a record, with all that its meaning depends on there.
+    """A replacement for a value in a record, with the context of its meaning.
 
-    Methods return their argument with the replacement in it. The words are the rest of the path, the place is
-    its beginning, for messages.
+    Methods return a copy of their argument that contains the replacement. The words are the rest of the path;
+    the place is its beginning, for messages.
     """
 
     node: tree.Node
     scope: Scope
 
     def in_record(self, record: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Return a record with the value in it."""
+        """Return a record with the replacement in it."""
         word, *rest = words
         fields = declared(type(record))
         if word not in fields:
@@ -151,7 +151,7 @@ class _Replacement(NamedTuple):
             raise InputError(Problem("", 0, message) for message in problems) from None
 
     def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Return a value of a kind with this in it, or this in its place."""
+        """Return a value with the replacement in it, or the replacement itself at the end of the path."""
         if not words:
             return self._read(kind, place)
         if content is None:
@@ -178,7 +178,7 @@ class _Replacement(NamedTuple):
         return content
 
     def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Both sides of a joint; where they are the same they stay one."""
+        """Return both sides of a joint; equal sides stay one object."""
         word, *rest = words
         if _same(*content):
             both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
@@ -189,7 +189,7 @@ class _Replacement(NamedTuple):
         return self._in_list(kind, kind.item, content, words, place)
 
     def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Return the entry of a list that a word names, or all of them."""
+        """Return a list with the replacement in the entry that a word names, or in all entries."""
         word, *rest = words
         names = entry_names(kind, content, self.scope.members)
         indices = _indices(names)
@@ -209,14 +209,14 @@ class _Replacement(NamedTuple):
 
 
 def _written(record: Any) -> tree.Mapping:
-    """Return the fields of a record that are texts or numbers as a file would have them."""
+    """Return the text and number fields of a record as a mapping of a file."""
     contents = {name: getattr(record, name) for name in declared(type(record))}
     simple = {name: _node(entry) for name, entry in contents.items() if isinstance(entry, str | int | float)}
     return tree.Mapping(0, simple, dict.fromkeys(simple, 0))
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Return whether two records agree in every declared field, also those without part in equality."""
+    """Return whether two records agree in every declared field, including fields excluded from equality."""
     if type(one) is not type(other):
         return False
     return one is other or all(getattr(one, name) == getattr(other, name) for name in declared(type(one)))

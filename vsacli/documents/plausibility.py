@@ -1,8 +1,8 @@
-"""Warnings of values that can be computed with but are hardly meant: a row of a table is a rule.
+"""Warnings about valid but implausible values; each rule is a row of a table.
 
-A rule compares a size, which is made of one value of a file, with bounds that whatever is built keeps by far.
-A value outside is a warning with its line, its size, and the unit in which it would be a common one.
-The rows are in `robot.plausibility` and `trajectory.plausibility`.
+A rule compares a size, derived from one value of a file, with bounds far outside the range of real robots. A
+value outside the bounds is reported with its line, its size, and the unit in which it would be plausible. The
+rows are in `robot.plausibility` and `trajectory.plausibility`.
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ class OtherUnit(NamedTuple):
     """Another unit in which a number may have been written.
 
     Attributes:
-        unit: the unit, e.g. `mm`.
-        factor: its size in the unit that was expected.
-        power: of the factor by which the size of the rule changes.
-        instead_of: the unit that was expected, if the rule is about numbers of several.
-        field: path, beside the number that was measured, to the field it is about; that number if empty.
+        unit: name of the unit, e.g. `mm`.
+        factor: size of the unit in the expected unit.
+        power: exponent of the factor in the size of the rule.
+        instead_of: expected unit, if the rule is about numbers of several units.
+        field: path of the field to report instead, relative to the parent of the measured number; empty for
+            the number itself.
     """
 
     unit: str
@@ -49,11 +50,11 @@ class Measured(NamedTuple):
     """A measurement of one number by a rule.
 
     Attributes:
-        path: to the number.
-        value: of it; NaN if the path leads to several.
-        unit: of it.
-        size: compared with the bounds; NaN if the rule does not apply or there is nothing to compare with.
-        beside: values that the words of the rule name, by name.
+        path: path to the number.
+        value: value of the number; NaN if the path leads to several.
+        unit: unit of the number.
+        size: size to compare with the bounds; NaN if the rule does not apply or has no reference.
+        beside: further values for the words of the rule, by name.
     """
 
     path: NumberPath
@@ -67,19 +68,19 @@ class Rule(NamedTuple, Generic[_Subject]):
     """A row of the table.
 
     Attributes:
-        name: a few words.
+        name: short name.
         fields: keys of the file, for the documentation.
-        measure: yields values of a robot or trajectory with their sizes.
-        size: the size in words, for the documentation.
-        reason: why sizes outside the bounds are hardly meant, a sentence.
-        finding: words about the value: a verb, `{size}`, and words from `Measured.beside` in braces.
-        low: least size that passes.
-        high: sizes from here on do not pass.
-        usual: a common size, towards which another unit is looked for.
-        units: other units that the value may be in.
-        advice: what to look at if none of them fits.
-        in_angles: whether a value written with `deg` or `pi` passes, as its writer knew the unit.
-        explained_by: names of rules; if one of them finds something, this one is not asked.
+        measure: function that yields measurements of a robot or trajectory.
+        size: description of the size, for the documentation.
+        reason: sentence on why sizes outside the bounds are implausible.
+        finding: predicate about the value: a verb, `{size}`, and names of `Measured.beside` in braces.
+        low: smallest plausible size.
+        high: smallest size that is too large.
+        usual: typical size, by which the most likely other unit is chosen.
+        units: other units in which the value may have been written.
+        advice: advice if none of these units is plausible.
+        in_angles: whether values written with `deg` or `pi` pass, since their unit is certain.
+        explained_by: names of rules whose findings suppress this rule.
     """
 
     name: str
@@ -97,11 +98,11 @@ class Rule(NamedTuple, Generic[_Subject]):
     explained_by: tuple[str, ...] = ()
 
     def admits(self, size: float) -> bool:
-        """Return whether a size is as usual, or nothing is known of it."""
+        """Return whether a size is plausible or unknown."""
         return math.isnan(size) or self.low <= size < self.high
 
     def other_unit(self, measured: Measured) -> OtherUnit | None:
-        """Return the unit in which the number would be nearest to a common one; None without such a unit."""
+        """Return the unit in which the number would be closest to a typical size, or None."""
         sizes = {
             other: measured.size * other.factor**other.power
             for other in self.units
@@ -135,14 +136,14 @@ def _of_unit(path: NumberPath, other: OtherUnit | None) -> NumberPath:
 
 
 Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
-"""Gives the path in a file, from its root and the path in the record made of it."""
+"""Function that returns the path in a file for its root and the path in the record made of it."""
 
 
 class Written:
-    """Values and lines of a YAML file by the path to a number."""
+    """Values and lines of a YAML file, by the path to a number."""
 
     def __init__(self, source: Source, moved: Moved | None = None) -> None:
-        """Take the file, and the paths that differ between it and the record made of it."""
+        """Store the file, and the function that translates paths of the record into paths of the file."""
         self.path = source.path
         self._text = source.text or ""
         self._moved = moved
@@ -151,11 +152,11 @@ class Written:
     def _root(self) -> tree.Node:
         try:
             return parse_yaml(self._text, Problems(self.path))
-        except InputError:  # no YAML file
+        except InputError:  # not a YAML file
             return tree.Mapping(0, {}, {})
 
     def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
-        """Return the deepest node on the way along a path, and the steps that do not lead into it."""
+        """Return the deepest node along a path, and the remaining steps."""
         steps = path if self._moved is None else self._moved(self._root, path)
         node = self._root
         for taken, step in enumerate(steps):
@@ -166,11 +167,11 @@ class Written:
         return node, ()
 
     def line(self, path: NumberPath) -> int:
-        """Return the line of the file on which a path ends."""
+        """Return the line of the deepest node along a path."""
         return self.at(path)[0].line
 
     def said(self, measured: Measured) -> Measured | None:
-        """Return the number as written, once if equal for all joints or both ends; None if it differs."""
+        """Return the number with the path to its scalar, which all joints may share; None if it differs."""
         node, left = self.at(measured.path)
         if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
             return measured
@@ -183,7 +184,7 @@ class Written:
         return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
 
     def in_angles(self, measured: Measured) -> bool:
-        """Return whether it says this number with `deg` or `pi`."""
+        """Return whether the file has this number as an expression with `deg` or `pi`."""
         node, _ = self.at(measured.path)
         if not isinstance(node, tree.Scalar) or self.said(measured) is None:
             return False
@@ -205,16 +206,16 @@ def strange(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
-    """Return the numbers found by rules, by name of the rule; rules without findings have no entry.
+    """Return the implausible numbers by rule name; rules without findings have no entry.
 
     Args:
-        rules: a rule comes after those that explain its findings.
-        subject: the robot or trajectory.
-        written: the file it is from, if there is one.
-        known: names of rules that found something elsewhere.
+        rules: rules in an order in which each follows the rules that explain its findings.
+        subject: robot or trajectory.
+        written: file of the subject, if any.
+        known: names of rules with findings elsewhere.
     """
     found: dict[str, list[Measured]] = {}
-    with np.errstate(all="ignore"):  # a number may be so strange that a size is infinite
+    with np.errstate(all="ignore"):  # extreme values may have an infinite size
         for rule in rules:
             if {*found, *known}.isdisjoint(rule.explained_by):
                 outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
@@ -230,7 +231,7 @@ def findings(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> tuple[Problem, ...]:
-    """Return the warnings for strange values, with file and line where the file still has the value."""
+    """Return the warnings about implausible values, with file and line if the file has the same value."""
     named = {rule.name: rule for rule in rules}
     found = strange(rules, subject, written, known)
     problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)

@@ -1,4 +1,4 @@
-"""Documents read into declared record classes, and changes to them, as of `--set PATH=VALUE`."""
+"""Reading of documents into declared record classes, and changes to them, as of `--set PATH=VALUE`."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from vsacli.documents.tree import Scope, parse_yaml
 _Document = TypeVar("_Document")
 
 Changes: TypeAlias = Mapping[str, Any]
-"""Replacements by path into a file, made in turn: values as in the file, as lists, mappings and texts."""
+"""Replacements by path into a file, applied in order: values in the form used in files."""
 
 KEPT = ("format", "name", "description")
-"""Keys of a document that no change reaches: they identify the file."""
+"""Keys that changes must not touch, since they identify the file."""
 
 _NUMBER = re.compile(r'"([-+]?\.?\d[-+.\w ]*)"')
 
@@ -37,11 +37,11 @@ def read_document(
     """Read a YAML file into a record.
 
     Args:
-        path: the file.
-        cls: the record class of the whole document.
-        format_name: value required of its key `format`.
-        members: name and unit variant of every joint, where the document has PerJoint values.
-        exempt: for a purpose of PerJoint values the joints that have none, each with a clause about it.
+        path: path of the file.
+        cls: record class of the whole document.
+        format_name: required value of the key `format`.
+        members: name and unit variant of every joint, if the document has PerJoint values.
+        exempt: for purposes of PerJoint values, the joints without a value, each with a reason.
 
     Raises:
         InputError: with every problem of the file, each with its line.
@@ -62,14 +62,14 @@ def read_document(
 def survey_document(
     path: str | os.PathLike[str], cls: type
 ) -> tuple[tree.Mapping, list[tuple[Quantity, tree.Node]]]:
-    """Return the root of a YAML file, and its PerJoint values as written, whatever joints they are for.
+    """Return the root of a YAML file, and its PerJoint values as written, for any joints.
 
     Args:
-        path: the file.
-        cls: the record class of the whole document; its problems are not reported.
+        path: path of the file.
+        cls: record class of the whole document; its problems are not reported.
 
     Raises:
-        InputError: the file is no YAML mapping.
+        InputError: the file is not a YAML mapping.
     """
     source, text = read_source(path)
     problems = Problems(source.path)
@@ -77,7 +77,7 @@ def survey_document(
     if not isinstance(root, tree.Mapping):
         problems.fail(root.line, f"expected a mapping, found {root}")
     survey: list[tuple[Quantity, tree.Node]] = []
-    with suppress(InputError):  # too many problems, which reading will report
+    with suppress(InputError):  # too many problems; reading the document reports them
         read_record(cls, root, "", Scope(problems, {}, {}, survey=survey), beside=("format",))
     return root, survey
 
@@ -91,14 +91,14 @@ def _check_format(root: tree.Mapping, expected: str, problems: Problems) -> None
 
 
 class ChangeError(InputError):
-    """A change that cannot be made, rather than a fault of the file."""
+    """A change that cannot be applied, as opposed to a fault of the file."""
 
 
 def read_changes(texts: Iterable[str]) -> dict[str, Any]:
-    """Return changes from texts such as `joints.elbow.link.mass=2.5`; the last one of a path counts.
+    """Return changes from texts such as `joints.elbow.link.mass=2.5`; the last change of a path wins.
 
     Raises:
-        ChangeError: a text has no `=`, a path is one of those that are kept, or a value is no YAML.
+        ChangeError: a text has no `=`, or a value is not YAML.
     """
     changes: dict[str, Any] = {}
     for text in texts:
@@ -111,12 +111,12 @@ def read_changes(texts: Iterable[str]) -> dict[str, Any]:
 
 
 def written(changes: Changes) -> list[str]:
-    """Return changes as texts from which `read_changes` has them."""
+    """Return changes as texts that `read_changes` accepts."""
     return [f"{path}={_text(value)}" for path, value in changes.items()]
 
 
 def _text(value: Any) -> str:
-    """Return a value as YAML: as JSON, of whose texts those that begin with a digit need no quotes."""
+    """Return a value as YAML: JSON, without the quotes of texts that begin with a digit."""
     return value if isinstance(value, str) else _NUMBER.sub(r"\1", json.dumps(value))
 
 
@@ -131,10 +131,10 @@ def _value(path: str, text: str) -> Any:
 
 
 def check_path_of_change(path: str) -> None:
-    """Refuse a path into keys that no change reaches.
+    """Refuse a path to a key that changes must not touch.
 
     Raises:
-        ChangeError: it is one.
+        ChangeError: the path leads to such a key.
     """
     if path.partition(".")[0] in KEPT:
         raise ChangeError.one(f"{path} says what the file is and stays; change the file itself")
@@ -147,17 +147,17 @@ def changed(
     members: Mapping[str, str] | None = None,
     exempt: Mapping[str, Mapping[str, str]] | None = None,
 ) -> tuple[_Document, Source]:
-    """Return a document with changes, and its file, which remembers them.
+    """Return a document with changes applied, and its source, which stores them.
 
     Args:
-        document: a record of declared fields.
-        source: the file that it was read from.
-        changes: the changes.
-        members: as of `read_document`.
-        exempt: as above.
+        document: record of declared fields.
+        source: file that the document was read from.
+        changes: replacements to apply.
+        members: as for `read_document`.
+        exempt: as for `read_document`.
 
     Raises:
-        ChangeError: the first that cannot be made.
+        ChangeError: the first change that cannot be applied.
     """
     from vsacli.documents.paths import replace
 

@@ -1,4 +1,4 @@
-"""Records from the rows of a CSV table: a column for each declared field, texts among them."""
+"""Records from the rows of a CSV table with one column for each declared field, texts included."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vsacli.documents.source import Problems, Source, read_source
 from vsacli.documents.tree import INVALID, Scope
 
 MAX_BYTES = 50_000_000
-"""Largest file, B: rows become objects, and a hundred thousand rows have some ten million bytes."""
+"""Largest file in bytes; rows become objects, and a hundred thousand rows have some ten million bytes."""
 
 _Record = TypeVar("_Record")
 
@@ -28,10 +28,10 @@ class RecordTable(NamedTuple, Generic[_Record]):
     """A table read as records.
 
     Attributes:
-        records: a record for each row.
-        lines: of the file, in which they stand.
-        others: names of the columns that no field is called after, which were left out.
-        source: the file.
+        records: one record a row.
+        lines: line numbers of the rows in the file.
+        others: names of columns without a field, which were not read.
+        source: file that was read.
     """
 
     records: tuple[_Record, ...]
@@ -44,10 +44,10 @@ class _Columns(NamedTuple):
     """The columns of a table, assigned to fields.
 
     Attributes:
-        width: how many there are.
+        width: number of columns.
         places: index of the column of each field that has one.
-        factors: convert numbers of a field to SI units.
-        others: names of the columns that belong to no field.
+        factors: factors that convert the numbers of a field to SI units.
+        others: names of columns without a field.
     """
 
     width: int
@@ -59,17 +59,17 @@ class _Columns(NamedTuple):
 def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) -> RecordTable[_Record]:
     """Read a CSV file into records.
 
-    The first line names the columns: names of fields in any order, a unit in brackets behind those of numbers
-    that are not in SI units. A tab, semicolon or comma in it is the separator. Cells may be in double quotes;
-    one that is empty leaves a field to its default. From `#` to the end of a line is a comment.
+    The first line names the columns: fields in any order, numbers in other than SI units with their unit in
+    brackets. A tab, semicolon or comma in it is the separator. Cells may be in double quotes; an empty cell
+    leaves a field at its default. Comments go from `#` to the end of a line.
 
     Args:
-        path: the file, UTF-8.
-        cls: the record class.
-        unique: name of the field that tells records apart.
+        path: path of the file, UTF-8.
+        cls: record class.
+        unique: name of the field that must differ in all records.
 
     Raises:
-        InputError: with file and line of everything that is wrong.
+        InputError: with file and line of every problem.
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
@@ -95,7 +95,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
 
 
 def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
-    """Return the columns of a header by field; refuse a name without a field if it nearly is one."""
+    """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
     fields = declared(cls)
     columns = _Columns(len(header.columns), {}, {}, [])
     meant = set()
@@ -157,7 +157,7 @@ def _record(
 
 
 def _in_si(cell: str, factor: float) -> str:
-    """Return the text of a number, converted; any other text stays, and its reader reports it."""
+    """Return the text of a number, converted; other texts stay as they are, for their reader to report."""
     if factor == 1:
         return cell
     try:

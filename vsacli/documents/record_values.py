@@ -1,4 +1,4 @@
-"""Values of records for other forms: arrays of a result, JSON values, and single numbers with their paths."""
+"""Values of records in other forms: arrays of a result, JSON values, and single numbers with their paths."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class ResolvedField(NamedTuple):
     """The values of one declared field.
 
     Attributes:
-        path: keys that lead to it in a file, e.g. ("joints", "link", "mass").
-        dims: one name an axis of `values`: joint, motor, axis, bound or direction.
+        path: keys that lead to the field in a file, e.g. ("joints", "link", "mass").
+        dims: names of the axes of `values`: joint, motor, axis, bound or direction.
         quantity: unit at revolute and prismatic joints, None for text.
-        doc: the declared sentence.
-        values: float64 or str objects; NaN or "" at entries that do not have the field.
+        doc: declared description.
+        values: float64 or str objects; NaN or "" at entries without the field.
     """
 
     path: tuple[str, ...]
@@ -44,10 +44,10 @@ class ResolvedField(NamedTuple):
 def arrays(
     kind: Kind, content: Any, of_record: Callable[[Any], Iterable[ResolvedField]]
 ) -> Iterator[ResolvedField]:
-    """Yield a value of a kind as arrays; `of_record` gives those of a record in it.
+    """Yield a value of a kind as arrays; `of_record` yields the arrays of a nested record.
 
     Raises:
-        TypeError: there are none of this kind.
+        TypeError: the kind has no array form.
     """
     match kind:
         case Record():
@@ -67,10 +67,10 @@ def arrays(
 
 
 def _single(kind: Kind, content: Any) -> ResolvedField:
-    """Return one text, one number, or numbers along dimensions; path and sentence are still to come."""
+    """Return one text, one number, or numbers along dimensions; the caller sets path and description."""
     if kind.dims is None:
         raise TypeError(f"a field of the kind {type(kind).__name__} has no array form")
-    if kind.unit is None:  # some readers of HDF5 know no boolean
+    if kind.unit is None:  # booleans too, which some HDF5 readers lack
         text = content.source.path if isinstance(kind, TableFile) else on_one_line(content)
         return ResolvedField((), kind.dims, None, "", np.array(text, dtype=object))
     return ResolvedField((), kind.dims, kind.unit, "", np.array(content, dtype=np.float64))
@@ -79,7 +79,8 @@ def _single(kind: Kind, content: Any) -> ResolvedField:
 def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
     """Join the fields of all joints, or of both sides of a joint, along a new first axis.
 
-    Of each field the one with most dimensions is decisive: a joint may have one motor or spring, or two.
+    The variant of a field with most dimensions determines the shape: joints may have one or two motors or
+    springs.
     """
     parts = [list(member) for member in members]
     tables = [{part.path: part.values for part in member} for member in parts]
@@ -94,7 +95,7 @@ def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[R
 
 
 def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return the values in the shape of those of two sides; if they are of one, as of the first."""
+    """Return the values in the shape of two sides; values of one side become the first."""
     if values.shape == absent.shape:
         return values
     fitted = absent.copy()
@@ -103,7 +104,7 @@ def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.nd
 
 
 def json_fields(record: Any) -> dict[str, Any]:
-    """Return the declared fields of a record as JSON could hold them, but for numbers that are not finite."""
+    """Return the declared fields of a record as JSON values, except that numbers may be non-finite."""
     return {
         name: None if (content := getattr(record, name)) is None else json_value(field.kind, content)
         for name, (field, _) in declared(type(record)).items()
@@ -111,7 +112,7 @@ def json_fields(record: Any) -> dict[str, Any]:
 
 
 def json_value(kind: Kind, content: Any, of_record: Callable[[Any], Any] = json_fields) -> Any:
-    """Return a value of a kind as JSON could hold it, but for numbers that are not finite."""
+    """Return a value of a kind as JSON value, except that numbers may be non-finite."""
     match kind:
         case OwnKind():
             return kind.json_value(content, of_record)
@@ -129,7 +130,7 @@ def json_value(kind: Kind, content: Any, of_record: Callable[[Any], Any] = json_
 
 
 class Entry(NamedTuple):
-    """A step into a list, or into values by joint: number from 0, and the name if it has one."""
+    """An element of a path into a list or values by joint: index from 0, and the name if it has one."""
 
     number: int
     name: str = ""
@@ -139,17 +140,17 @@ class Entry(NamedTuple):
 
 
 NumberPath: TypeAlias = tuple[str | Entry, ...]
-"""Leads to a number of a file; joined by dots as users write it."""
+"""Path to a number of a file; users write it joined by dots."""
 
 
 class Number(NamedTuple):
     """A number of a record.
 
     Attributes:
-        path: to it.
-        quantity: its quantity.
-        value: in SI units.
-        requirement: words such as "must be positive"; "" if it may be any number.
+        path: path to the number.
+        quantity: physical quantity.
+        value: value in SI units.
+        requirement: words that complete "must be", such as "positive"; "" if any number is valid.
     """
 
     path: NumberPath
@@ -161,12 +162,12 @@ class Number(NamedTuple):
 def numbers(
     record: Any, members: Mapping[str, str] = MappingProxyType({}), path: NumberPath = ()
 ) -> Iterator[Number]:
-    """Yield every finite number in the declared fields of a record, and in the records in it.
+    """Yield every finite number in the declared fields of a record, nested records included.
 
     Args:
-        record: whose fields are declared.
-        members: name and unit variant of every joint, where the record has values by joint.
-        path: to the record.
+        record: record with declared fields.
+        members: name and unit variant of every joint, if the record has values by joint.
+        path: path to the record.
     """
     for name, (field, _) in declared(type(record)).items():
         requirement = "" if field.check is None else field.check.requirement
@@ -191,7 +192,7 @@ def _numbers(
 
 
 def entry_names(kind: Kind, content: Any, members: Mapping[str, str]) -> list[str]:
-    """Return names of the entries of a value, "" where one has none; `members` are the joints, if known."""
+    """Return the names of a value's entries, "" if an entry has none; `members` are the joints, if known."""
     if isinstance(kind, PerJoint) and members:
         return list(members)
     return [getattr(entry, "name", "") if isinstance(kind, Items) else "" for entry in content]

@@ -1,6 +1,6 @@
-"""Input files: as they were read, for the provenance of a result, and everything that is wrong with them.
+"""Input files: their content, for the provenance of a result, and their problems.
 
-A file of another program where one of ours is expected is named, with the command that leads on from it.
+A file of another program is recognized, and the error names the command that converts it.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.storage import STANDARD, place_of
 
 MAX_DOCUMENT_BYTES = 1_000_000
-"""Size up to which a text document is read, and up to which the text of any input is kept."""
+"""Maximum size (bytes) of text documents, and of input files whose text is kept in results."""
 
 
 MAX_PROBLEMS = 50
-"""A document with more problems is given up on: the reader would drown, and so would the user."""
+"""Number of problems after which reading stops; more would not help the user."""
 
 IN_PACKAGE = "package://"
-"""Beginning of names of files in ROS packages, which only ROS can find."""
+"""Prefix of file names in ROS packages, which only ROS can resolve."""
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file, the format of results."""
 
 
 class Source(NamedTuple):
-    """A file that was read.
+    """An input file that was read.
 
     Attributes:
-        path: as given.
-        sha256: of its content, in hex.
-        text: its text; None if it is too large to keep.
-        changes: changes after reading: JSON of values by path, empty without any.
+        path: path as given.
+        sha256: digest of the content, hexadecimal.
+        text: text of the file; None if it is too large to keep.
+        changes: changes applied after reading, as JSON of values by path; empty without changes.
     """
 
     path: str
@@ -51,23 +51,23 @@ class Source(NamedTuple):
 
 
 def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTES) -> tuple[Source, str]:
-    """Read a text document whole.
+    """Read a complete text document.
 
     Args:
-        path: the file, named in errors exactly as it is given here.
-        max_bytes: size beyond which the file is refused without being read.
+        path: path of the file, repeated in errors as given.
+        max_bytes: size above which the file is refused without being read.
 
     Returns:
-        The record of the file, and its text without a byte order mark.
+        The source, and its text without a byte order mark.
 
     Raises:
-        InputError: a file that is missing, no regular file, unreadable, empty, too large or not UTF-8.
+        InputError: the file is missing, not regular, unreadable, empty, too large or not UTF-8.
     """
     name = os.fspath(path)
     check_input_file(name, max_bytes)
     with _refusing(name), open(place_of(name), "rb") as file:
         content = file.read(max_bytes + 1)
-    if len(content) > max_bytes:  # grew since its size was looked up
+    if len(content) > max_bytes:  # the file grew after its size was checked
         raise _too_large(name, len(content), max_bytes)
     if not content.strip():
         raise InputError.one("the file is empty", name)
@@ -76,7 +76,7 @@ def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTE
 
 
 def is_table(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is a CSV table, no document: by its name, or by how standard input begins.
+    """Return whether a file is a CSV table, by its name; standard input, by its first line.
 
     Raises:
         InputError: standard input cannot be read.
@@ -160,7 +160,7 @@ def _too_large(name: str, size: int, max_bytes: int) -> InputError:
 class Problems:
     """The problems of one file.
 
-    Every problem of a document is added here while reading goes on; `check` raises them all.
+    Every problem of a document is added here while reading continues; `check` raises them together.
     """
 
     def __init__(self, file: str) -> None:
@@ -171,7 +171,7 @@ class Problems:
         """Note a problem.
 
         Raises:
-            InputError: there are now more than MAX_PROBLEMS.
+            InputError: there are more than MAX_PROBLEMS.
         """
         if len(self._found) == MAX_PROBLEMS:
             self._found.append(
@@ -181,18 +181,18 @@ class Problems:
         self._found.append(Problem(self.file, line, message))
 
     def include(self, error: InputError) -> None:
-        """Note the problems of another file that this one names."""
+        """Note the problems of another file that this file refers to."""
         self._found.extend(error.problems)
 
     def fail(self, line: int, message: str) -> NoReturn:
-        """Raise everything found so far and this problem, behind which nothing can be read."""
+        """Raise this problem, after which nothing can be read, with all problems found so far."""
         raise InputError(self._in_order(Problem(self.file, line, message)))
 
     def check(self) -> None:
-        """Raise the problems found.
+        """Raise the problems found, if any.
 
         Raises:
-            InputError: with every problem once, in the order of the lines.
+            InputError: with every problem once, ordered by line.
         """
         if self._found:
             raise InputError(self._in_order())
@@ -204,7 +204,7 @@ class Problems:
 
 
 BEGINNING_BYTES = 4096
-"""Enough to find the first tag behind a declaration and a licence."""
+"""Bytes to read to find the first tag after an XML declaration and a license."""
 
 _ROOT_TAG = re.compile(r"<\s*([A-Za-z][\w.-]*)")
 _COMMENT = re.compile(r"<!--.*?(-->|\Z)", re.DOTALL)
@@ -217,10 +217,10 @@ SIGNATURES = {
     b"PAR1": "parquet",
     b"\x93NUMPY": "npy",
 }
-"""First bytes of files, with the ending that their names should have."""
+"""First bytes of file formats, with the file name ending of each."""
 
 ENDINGS = {"xls": "xlsx", "ods": "xlsx", "npz": "npy", "mjb": "mujoco"}
-"""Endings that mean the same as others here."""
+"""File name endings that are treated like others."""
 
 SENTENCES = {
     "urdf": "is a URDF; make a robot file of it: {convert}",
@@ -237,17 +237,17 @@ SENTENCES = {
     "npy": "is an array of NumPy; make a CSV file of it, as numpy.savetxt does, then see {look}",
     "xlsx": "is a spreadsheet; save it as CSV, then see {look}",
 }
-"""Description of each kind of file, with advice."""
+"""Description of each foreign format, with advice."""
 
 SENTENCES["db3"] = SENTENCES["mcap"]
 
 
 @contextmanager
 def recognising_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Look, when a file cannot be read within this context, whether it is one of another program.
+    """Replace an InputError within this context if the file is one of another program.
 
     Raises:
-        InputError: kind of the file, and the command for it, in place of its problems.
+        InputError: with the format of the file, and the command for it.
     """
     try:
         yield
@@ -257,10 +257,10 @@ def recognising_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def refuse_other_formats(path: str | os.PathLike[str]) -> None:
-    """Refuse a file if it is known to be one of another program.
+    """Refuse a file in a known format of another program.
 
     Raises:
-        InputError: kind of the file, and the command for it.
+        InputError: with the format of the file, and the command for it.
     """
     name = os.fspath(path)
     sentence = SENTENCES.get(_format(name))
@@ -280,16 +280,16 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
 
 
 def _format(name: str) -> str:
-    """Return the format by the content, or else by the ending; empty if that says nothing."""
+    """Return the format by the content, or else by the ending; empty if unknown."""
     ending = PurePath(name).suffix.lower().removeprefix(".")
     try:
         place = place_of(name)
-        if not os.path.isfile(place):  # opening a pipe would wait
+        if not os.path.isfile(place):  # opening a pipe would block
             return ""
         with open(place, "rb") as file:
             beginning = file.read(BEGINNING_BYTES)
     except (OSError, ValueError):
-        return ""  # which was said already
+        return ""  # reported before
     for signature, known in SIGNATURES.items():
         if beginning.startswith(signature):
             return known

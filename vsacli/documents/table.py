@@ -1,4 +1,4 @@
-"""Strict reading of CSV tables: a header line, then numbers. Knows columns, not robots."""
+"""Strict reading of CSV tables: a header line, then numbers. Robots and trajectories are unknown here."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as it was read.
+    """A table read from a file.
 
     Attributes:
-        columns: names of the columns that were read, each with its unit in brackets if one is known.
-        values: (rows, columns), all finite, at least one row if there is a column; NaN in empty cells, if
-            these are admitted.
-        source: the file.
-        header_line: line of the header in the file, from 1; 0 if there is none.
-        others: names of columns that were not read, since nothing here knows them.
-        ignored: names of those that were not read because the mapping says so.
-        first_stamp: of times that were too large for floating point, or written as a clock shows them, the
-            first, which was taken off.
-        kept: (rows,), which rows of the file these are; None if all.
-        rated: whether the file has no times, and these follow from the rate that the mapping says.
+        columns: names of the columns read, each with its unit in brackets if one is known.
+        values: finite values, (rows, columns), with at least one row if there is a column; NaN in empty
+            cells, if these are allowed.
+        source: file that was read.
+        header_line: line number of the header in the file, from 1; 0 if there is none.
+        others: names of columns that were not read because they are unknown.
+        ignored: names of columns that the mapping leaves out.
+        first_stamp: first time, which was subtracted, if times were too large for floating point or clock
+            texts.
+        kept: indices (rows,) of the rows in the file; None if all rows are kept.
+        rated: whether the file has no times, and they were computed from the rate of the mapping.
     """
 
     columns: tuple[str, ...]
@@ -66,15 +66,15 @@ class Table:
 
     @cached_property
     def lines(self) -> Lines:
-        """The lines of the file in which the rows stand."""
+        """Line numbers of the rows in the file."""
         return Lines(self.source.path, self.header_line, self.kept)
 
     def line_of(self, row: int) -> int:
-        """Line in the file of a row counted from 0; 0 if the file has gone."""
+        """Return the line number of a row counted from 0; 0 if the file no longer exists."""
         return self.lines.of(row)
 
     def without_empty_rows(self) -> Table:
-        """Return the rows with a number in any column but the time; others are of another topic of a log."""
+        """Return the rows with a number in any column but the time; others are of other topics of a log."""
         signals = [index for index, name in enumerate(self.columns) if split_heading(name)[0] != TIME]
         there = ~np.isnan(self.values[:, signals]).all(axis=1)
         if there.all() or not there.any():
@@ -84,12 +84,12 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """The lines of a file in which the rows of its table stand, found by reading it once more.
+    """Line numbers of the rows of a table, found by reading the file once more.
 
     Attributes:
-        path: of the file.
-        header_line: line of the header, from 1.
-        kept: (rows,), which rows of the file are meant; None if all.
+        path: path of the file.
+        header_line: line number of the header, from 1.
+        kept: indices (rows,) of the rows in the file; None if all rows are kept.
     """
 
     path: str
@@ -97,7 +97,7 @@ class Lines:
     kept: IndexArray | None = None
 
     def of(self, row: int) -> int:
-        """Line of a row counted from 0; 0 if the file has gone."""
+        """Return the line number of a row counted from 0; 0 if the file no longer exists."""
         place = row if self.kept is None else int(self.kept[row])
         return int(self._numbers[place]) if place < len(self._numbers) else 0
 
@@ -118,20 +118,20 @@ def read_table(
     *,
     empty_cells: bool = False,
 ) -> Table:
-    """Read a CSV file, in about the time and memory that `numpy.loadtxt` takes.
+    """Read a CSV file, at about the cost in time and memory of `numpy.loadtxt`.
 
-    The first line names the columns, in quotes or not; a tab, semicolon or comma in it is the separator.
-    Where that is no comma, numbers may have decimal commas. From `#` to the end of a line is a comment. Lines
-    without anything else are passed over, before the header too.
+    The first line names the columns, quoted or not; a tab, semicolon or comma in it is the separator. With
+    separators other than the comma, numbers may have decimal commas. Comments go from `#` to the end of a
+    line. Lines without other content are skipped, also before the header.
 
     Args:
-        path: the file; UTF-8, a byte order mark is accepted.
-        mapping: what columns with other names stand for, and which are left out.
-        known: names of columns that are read, if they are there; all if None.
+        path: path of the file; UTF-8, with or without a byte order mark.
+        mapping: names of foreign columns, and columns to leave out.
+        known: names of columns to read, if present; all if None.
         empty_cells: whether cells may be empty, or hold `nan`, where a column has no sample.
 
     Raises:
-        InputError: with file and line of what is no such table.
+        InputError: with file and line of every problem.
     """
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
@@ -164,7 +164,7 @@ def read_table(
 
 
 def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
-    """SHA-256 of a file whose lines have a reasonable length, and its content if that is to be kept."""
+    """Return the SHA-256 of a file, and its content if kept; refuse NUL characters and very long lines."""
     content.seek(0)
     digest, line, text = hashlib.sha256(), 1, b""
     while chunk := content.read(CHUNK):
@@ -184,7 +184,7 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
 def _values(
     name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
 ) -> tuple[tuple[str, ...], FloatArray, int | str | None]:
-    """Return headings and numbers of the columns, and the first stamp if that was taken off the times."""
+    """Return headings and numbers of the columns, and the first stamp if it was subtracted from the times."""
     if not chosen.places:
         return chosen.headings, np.empty((0, 0)), None
     rows = Rows(name, header, chosen.places, empty_cells)

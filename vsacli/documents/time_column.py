@@ -1,8 +1,8 @@
-"""The meaning of a column of times: its names and units, clock formats, counters and absolute stamps.
+"""Columns of times: their names and units, clock formats, counters and absolute stamps.
 
-A clock text is a time of day, as `22:30:01.720429` or `22:30:01:720429`, or a date with one, as ISO 8601
-writes it. Stamps are read in whole nanoseconds where floating-point numbers would lose digits, as since 1970.
-A further format is a case here; readers and descriptions of tables follow.
+A clock text is a time of day, such as `22:30:01.720429` or `22:30:01:720429`, or a date with one in the form
+of ISO 8601. Stamps are read as whole nanoseconds where floating-point numbers would lose digits, e.g. since
+1970. To support a further format, add a case here; readers and descriptions of tables follow.
 """
 
 from __future__ import annotations
@@ -25,33 +25,34 @@ TIME = "time"
 """Name of the column of stamps after reading."""
 
 UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units that stamps without one may be in, and their size in seconds."""
+"""Units of stamps other than the second, with their size in seconds."""
 
 USUAL_STEPS = (1e-5, 0.2)
-"""Steps, s, that a recording has: 5 Hz to 100 kHz. The first unit with which steps are such is proposed."""
+"""Usual sampling intervals of recordings, s: 100 kHz to 5 Hz. The first unit that gives such an interval is
+proposed."""
 
 UNIT_WORDS_OF_TIMES = {
     **dict.fromkeys(("ms", "msec", "millis"), "ms"),
     **dict.fromkeys(("us", "usec", "micros"), "us"),
     **dict.fromkeys(("ns", "nsec", "nanosec", "nanoseconds"), "ns"),
 }
-"""Units by words at the end of a name, in small letters."""
+"""Units by lower-case words at the end of a column name."""
 
 NAMES = (
     *("time", "__time", "field.header.stamp", "header.stamp", "%time", "rosbagtimestamp"),
     *("timestamp", "stamp", "t", "seconds", "zeit", "clock", "datetime"),
 )
-"""Names of columns of stamps, the best first: stamps of sensors before stamps of loggers."""
+"""Names of columns of stamps, best first: stamps of sensors before stamps of loggers."""
 
 SECONDS = ("sec", "secs")
 REST = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
-"""Endings of the second column of stamps that fill two, as in ROS messages."""
+"""Endings of the second column of stamps that occupy two columns, as in ROS messages."""
 
 UNITS_IN_NAMES = ("s", "sec", "secs", "ms", "msec", "us", "usec", "ns", "nsec", "nanosec")
-"""Units at the end of a name."""
+"""Units that may end a column name."""
 
 SINCE_1970 = {1e8: "s", 1e11: "ms", 1e14: "us", 1e17: "ns"}
-"""Smallest stamps that count from 1970, by unit; the first is in 1973."""
+"""Unit of stamps that count from 1970, by the smallest such stamp (in 1973)."""
 
 NANOSECONDS = 10**9
 """Nanoseconds in a second."""
@@ -59,28 +60,28 @@ NANOSECONDS = 10**9
 HOUR, DAY = 3600 * NANOSECONDS, 86400 * NANOSECONDS
 
 DIGITS = 9
-"""Digits of a fraction of a second in nanoseconds; further ones are cut off."""
+"""Digits of a fraction of a second in nanoseconds; further digits are truncated."""
 
 EXPECTED = "a number, a time of day such as 22:30:01.72, or a date and time such as 2024-05-01T22:30:01.72Z"
-"""Expected content of a cell in a column of times, for messages."""
+"""Description of the valid cells of a time column, for messages."""
 
 LARGEST_EXACT = 2.0**53
-"""Whole numbers beyond are not told apart in floating point; ns since 1970 are 200 times as large."""
+"""Largest magnitude up to which floats represent all integers; ns since 1970 are 200 times larger."""
 
 _CLOCK = re.compile(
     r"((?P<year>\d{4})[-/](?P<month>\d\d?)[-/](?P<day>\d\d?)[T ] *)?"
     r"(?P<hours>\d\d?):(?P<minutes>[0-5]\d):(?P<seconds>[0-5]\d)"
-    r"([.,](?P<fraction>\d+)|:(?P<after_colon>\d{3}|\d{6}|\d{9}))?"  # after a colon only whole groups are one
+    r"([.,](?P<fraction>\d+)|:(?P<after_colon>\d{3}|\d{6}|\d{9}))?"  # after colons, 3, 6 or 9 digits
     r" *(?P<half>[AP]M)?(?P<zone>Z|[+-]\d\d:?\d\d)?",
     re.ASCII | re.IGNORECASE,
 )
 
 
 class Clock(NamedTuple):
-    """A time that a text tells.
+    """A time read from a clock text.
 
     Attributes:
-        nanoseconds: since midnight, or since 1970.
+        nanoseconds: nanoseconds since midnight, or since 1970.
         dated: whether the text has a date.
     """
 
@@ -89,7 +90,7 @@ class Clock(NamedTuple):
 
 
 def read_clock(text: str) -> Clock | None:
-    """Return the time that a text tells; None if it tells none in a form that is known here."""
+    """Return the time of a clock text; None if the text has no supported form."""
     found = _CLOCK.fullmatch(text.strip())
     if found is None:
         return None
@@ -118,9 +119,9 @@ def _offset(zone: str | None) -> int:
 
 
 def elapsed(clocks: Sequence[Clock]) -> npt.NDArray[np.int64]:
-    """Return by how much each time is later than the first one, ns.
+    """Return the time from the first clock to each one, ns.
 
-    A time of day that falls by more than twelve hours is one of the next day.
+    A time of day that is more than twelve hours earlier than the one before it belongs to the next day.
     """
     since = np.array([each.nanoseconds for each in clocks], dtype=np.int64)
     if not clocks[0].dated:
@@ -129,13 +130,13 @@ def elapsed(clocks: Sequence[Clock]) -> npt.NDArray[np.int64]:
 
 
 def unit_of_steps(step: float) -> str | None:
-    """Return the first unit other than the second in which a step would be a usual one."""
+    """Return the first unit other than the second in which a sampling interval is a usual one."""
     low, high = USUAL_STEPS
     return next((unit for unit, size in UNITS.items() if low <= step * size <= high), None)
 
 
 def guessed_unit(stamps: Sequence[float]) -> tuple[str | None, str]:
-    """Return the unit of stamps that have none in the header, None for seconds; and why, a clause."""
+    """Return the likely unit of stamps without a declared one (None: seconds), and the reason, a clause."""
     since = [unit for least, unit in SINCE_1970.items() if stamps[0] >= least]
     if since:
         return (None if since[-1] == "s" else since[-1]), f"counts {since[-1]} since 1970"
@@ -145,7 +146,7 @@ def guessed_unit(stamps: Sequence[float]) -> tuple[str | None, str]:
 
 
 def are_seconds_and_nanoseconds(seconds: Sequence[float], rest: Sequence[float], least: float) -> bool:
-    """Return whether these are whole seconds from `least` on, and nanoseconds that start again in each."""
+    """Return whether two columns are whole seconds, `least` or more, and nanoseconds within a second."""
     return (
         len(seconds) == len(rest) > 0
         and all(second == int(second) and least <= second < 1e11 for second in seconds)
@@ -155,10 +156,10 @@ def are_seconds_and_nanoseconds(seconds: Sequence[float], rest: Sequence[float],
 
 
 def shows_a_clock(times: Rows) -> bool:
-    """Return whether the column of times, the only one of these rows, begins with a clock text.
+    """Return whether the only column of these rows, the times, begins with a clock text.
 
     Raises:
-        InputError: it begins with a text that is neither that nor a number.
+        InputError: the column begins with a text that is neither a clock text nor a number.
     """
     line, cell = next(_cells(times), (0, ""))
     if is_number(cell.replace(",", ".")) or cell.lower() in NOTHING:
@@ -170,10 +171,10 @@ def shows_a_clock(times: Rows) -> bool:
 
 
 def read_clocks(times: Rows) -> tuple[str, FloatArray]:
-    """Return the first clock text of the only column of these rows, and by how many ns each is later.
+    """Return the first clock text of the only column of these rows, and the time since then in each row, ns.
 
     Raises:
-        InputError: a cell is no clock text, or one with a date below others without.
+        InputError: a cell is not a clock text, or not all cells have a date, or none.
     """
     cells, clocks = list(_cells(times)), list[Clock]()
     for line, cell in cells:
@@ -192,18 +193,18 @@ def _cells(times: Rows) -> Iterator[tuple[int, str]]:
 def read_stamps(
     times: Rows, time: int, nanoseconds: int | None, stamps: FloatArray
 ) -> tuple[int | None, FloatArray]:
-    """Return times from the first on without a digit lost, and the first; None and the stamps if small.
+    """Return the first stamp and the exact times since then; None and the stamps if they are small.
 
     Args:
-        times: the table.
-        time: place of the column of times.
-        nanoseconds: place of that of the nanoseconds next to whole seconds, if there is one.
-        stamps: the times as floating-point numbers.
+        times: rows of the table.
+        time: position of the column of times.
+        nanoseconds: position of the column of nanoseconds that completes whole seconds, if any.
+        stamps: times as floating-point numbers.
 
     Raises:
-        InputError: there are nanoseconds, but both columns are not whole numbers.
+        InputError: there are nanoseconds, but not both columns are whole numbers.
     """
-    if nanoseconds is None and not np.abs(stamps).max() > LARGEST_EXACT:  # NaN if cells are empty
+    if nanoseconds is None and not np.abs(stamps).max() > LARGEST_EXACT:  # NaN max if cells are empty
         return None, stamps
     places = sorted({time, time if nanoseconds is None else nanoseconds})
     whole = read_integers(times._replace(used=places, empty_cells=False))

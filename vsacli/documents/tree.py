@@ -1,8 +1,8 @@
 """The tree of a YAML document: texts, lists and mappings with their lines, and the context of their meaning.
 
-This is the only place that knows how YAML is read, and it is read without YAML's surprises. The tree is built
-from parser events without recursion, and every scalar stays a text, so nothing is resolved by the rules of
-YAML 1.1 (`on`, `1:30`, `010`) and nothing is constructed. Plain anchors and aliases work.
+YAML is parsed only here, without the implicit types of YAML 1.1. The tree is built from parser events without
+recursion, and every scalar stays a text: nothing is resolved (`on`, `1:30`, `010`) and no object is
+constructed. Plain anchors and aliases are supported.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MAX_SHOWN = 40
 MAX_LEVELS = 20
 TOO_DEEP = f"nested more than {MAX_LEVELS} levels deep"
 MAX_NODES = 100_000
-"""Keys and values after each alias was replaced by its content."""
+"""Maximum number of keys and values after expansion of aliases."""
 
 _LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PLAIN = re.compile("[\t\n\r -~]*")
@@ -30,7 +30,7 @@ _CORE_TAG = "tag:yaml.org,2002:"
 
 
 def quoted(text: str) -> str:
-    """Return a text from a document in quotes, for messages; cut short if it is long."""
+    """Return a text from a document in quotes, for messages; long texts are truncated."""
     return repr(text) if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]!r}..."
 
 
@@ -46,7 +46,7 @@ class Scalar(NamedTuple):
 
     @property
     def is_null(self) -> bool:
-        """Whether the value is absent: nothing, `~` or `null` without quotes."""
+        """Whether the value is absent: empty, `~` or `null` without quotes."""
         return self.plain and self.text.lower() in ("", "~", "null")
 
 
@@ -61,7 +61,7 @@ class Sequence(NamedTuple):
 
 
 class Mapping(NamedTuple):
-    """Keys, each with its line, and their values, in the order of the file."""
+    """Keys with their lines and values, in the order of the file."""
 
     line: int
     entries: AbstractMapping[str, Node]
@@ -72,11 +72,11 @@ class Mapping(NamedTuple):
 
 
 Node: TypeAlias = Scalar | Sequence | Mapping
-"""A node of a document; prints as "found ..." in messages. Aliases share one node."""
+"""A node of a document; its string completes "found ..." in messages. Aliases share one node."""
 
 
 def plain(node: Node) -> Any:
-    """Return a node as plain data: texts as written, but null, true and false without quotes as these."""
+    """Return a node as plain data: texts as written; unquoted null, true and false as Python values."""
     match node:
         case Mapping(entries=entries):
             return {key: plain(entry) for key, entry in entries.items()}
@@ -88,19 +88,19 @@ def plain(node: Node) -> Any:
 
 
 INVALID: Final = object()
-"""Stands for a value that cannot be used, whose problem is noted already."""
+"""Placeholder of an invalid value whose problem has been noted."""
 
 
 class Scope(NamedTuple):
     """The context on which the meaning of a value depends.
 
     Attributes:
-        problems: receives everything that is wrong.
+        problems: collector of problems.
         members: name and unit variant of every joint, for PerJoint values.
-        exempt: for a purpose of PerJoint values the joints that have none, each with the reason.
-        variant: the choice on which units depend here, None while it is unknown.
-        survey: collects the quantity and the node of each PerJoint value, which is then not read; None to
-            read them.
+        exempt: for purposes of PerJoint values, the joints without a value, each with the reason.
+        variant: choice that determines the units here, None while it is unknown.
+        survey: list that collects quantity and node of each PerJoint value instead of reading it; None to
+            read.
     """
 
     problems: Problems
@@ -110,21 +110,21 @@ class Scope(NamedTuple):
     survey: list[tuple[Quantity, Node]] | None = None
 
     def unit(self, quantity: Quantity) -> str:
-        """Return the unit of a quantity here; an unknown variant is one problem, and makes no others."""
+        """Return the unit of a quantity here; an unknown variant, itself a problem, counts as revolute."""
         return quantity.unit(self.variant or "revolute")
 
     def of_member(self, name: str) -> Scope:
-        """Return the scope of the value of one joint; the same if none is called so."""
+        """Return the scope of the value of one joint; the same scope if the name is unknown."""
         return self._replace(variant=self.members.get(name, self.variant))
 
     def unexpected(self, node: Node, expected: str, label: str, reason: str = "") -> Any:
-        """Note that something else was found, and return INVALID."""
+        """Note that something else than expected was found, and return INVALID."""
         self.problems.add(node.line, f"{label}: expected {expected}, found {node}{reason}")
         return INVALID
 
 
 def all_valid(values: Iterable[Any]) -> Any:
-    """Return the values as a tuple, or INVALID if one is; each is read, so each problem is noted."""
+    """Return the values as a tuple, or INVALID if one is; all are read, so that each problem is noted."""
     everything = tuple(values)
     return INVALID if INVALID in everything else everything
 
@@ -134,7 +134,8 @@ def parse_yaml(text: str, problems: Problems) -> Node:
 
     Args:
         text: the YAML text.
-        problems: receives problems that reading survives: tags, merge keys, duplicate keys, unknown aliases.
+        problems: collector of problems after which reading continues: tags, merge keys, duplicate keys,
+            unknown aliases.
 
     Raises:
         InputError: reading ended (broken syntax, beyond the limits, no document); with all problems found
@@ -161,7 +162,7 @@ def _fail_with_syntax(error: yaml.MarkedYAMLError, text: str, problems: Problems
     mark, start = error.problem_mark, error.context_mark
     lines = text.rstrip().splitlines() or [""]
     index = min(mark.line if mark else 0, len(lines) - 1)
-    # libyaml has a limit of its own, which its scanner may meet before the events are here
+    # libyaml has its own limit, which its scanner may hit before our check of the events
     if "nesting depth" in str(error.problem):
         problems.fail(index + 1, TOO_DEEP)
     column = f" at column {mark.column + 1}" if mark and mark.line == index else ""
@@ -175,7 +176,7 @@ def _fail_with_syntax(error: yaml.MarkedYAMLError, text: str, problems: Problems
 
 
 class _OpenSequence:
-    """A list whose end has not come yet."""
+    """A list whose end has not been parsed yet."""
 
     def __init__(self, line: int, first_node: int, anchor: str | None) -> None:
         self.line, self.first_node, self.anchor = line, first_node, anchor
@@ -193,7 +194,7 @@ class _OpenSequence:
 
 
 class _OpenMapping:
-    """A mapping whose end has not come yet: keys and values arrive in turn."""
+    """A mapping whose end has not been parsed yet; keys and values arrive alternately."""
 
     def __init__(self, line: int, first_node: int, anchor: str | None, problems: Problems) -> None:
         self.line, self.first_node, self.anchor = line, first_node, anchor
@@ -204,7 +205,7 @@ class _OpenMapping:
         self._key_lines: dict[str, int] = {}
 
     def child_line(self, line: int) -> int:
-        """Return the line of a node; that of a list or mapping behind a key is the key's."""
+        """Return the line of a node; a list or mapping after a key has the line of the key."""
         return self._key.line if self._key else line
 
     def add(self, node: Node) -> None:
@@ -242,7 +243,7 @@ class _Anchored(NamedTuple):
 
 
 class _Builder:
-    """Takes events one by one and leaves the document in `root`."""
+    """A builder that receives events one by one and stores the document in `root`."""
 
     def __init__(self, problems: Problems) -> None:
         self.root: Node | None = None

@@ -1,1 +1,1 @@
-"""Recognition, description and checks of files, and templates to begin with."""
+"""Recognition, description and validation of files, and templates for new ones."""

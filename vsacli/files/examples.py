@@ -1,4 +1,4 @@
-"""The robots and trajectories that come with the package, wherever it is installed."""
+"""Bundled robots and trajectories, found wherever the package is installed."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class ExampleTrajectory:
     """A bundled trajectory.
 
     Attributes:
-        path: its file.
-        robots: names of the robots it is made for.
-        description: of the motion, a clause.
+        path: path of the file.
+        robots: names of the robots that it is made for.
+        description: description of the motion, a clause.
     """
 
     path: Path
@@ -34,39 +34,39 @@ class ExampleTrajectory:
 
     @property
     def name(self) -> str:
-        """The stem of its file."""
+        """Stem of the file name."""
         return self.path.stem
 
 
 @dataclass(frozen=True)
 class Example:
-    """A robot that is shipped, with the trajectories made for it."""
+    """A bundled robot, with the trajectories made for it."""
 
     path: Path
     trajectories: tuple[ExampleTrajectory, ...]
 
     @property
     def name(self) -> str:
-        """The stem of its file."""
+        """Stem of the file name."""
         return self.path.stem
 
     @cached_property
     def robot(self) -> Robot:
-        """The robot itself."""
+        """Robot read from the file."""
         return load_robot(self.path)
 
     def files(self) -> Iterator[Path]:
-        """Yield every file it takes, tables of its springs and trajectories included."""
+        """Yield every file of the example, including tables of its springs and trajectories."""
         yield from (Path(source.path) for source in self.robot.sources)
         for trajectory in self.trajectories:
             yield from (Path(source.path) for source in load_trajectory(trajectory.path, self.robot).sources)
 
 
 def examples(names: Iterable[str] = ()) -> list[Example]:
-    """Return the robots of these names, by default all, in alphabetical order.
+    """Return the robots with these names, by default all, in alphabetical order.
 
     Raises:
-        InputError: for each name that is no robot's, the nearest one that is.
+        InputError: for each unknown name, with the nearest valid one.
     """
     trajectories = [_trajectory(path) for path in sorted((examples_root() / "trajectories").rglob("*.yaml"))]
     found = {
@@ -85,13 +85,13 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
     """Copy examples into `robots` and `trajectories` of a folder.
 
     Args:
-        names: of the robots, copied with their trajectories and the tables these need; if there are none,
-            all bundled files are copied, also those to import.
-        folder: where to; it is made if it does not exist.
+        names: names of robots to copy with their trajectories and tables; without names, all bundled files
+            are copied, including URDFs to import.
+        folder: destination; it is created if it does not exist.
         outputs: stages the copies.
 
     Returns:
-        The copies.
+        Paths of the copies.
 
     Raises:
         InputError: as `examples`.
@@ -108,7 +108,7 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
 
 
 def example_tables() -> list[Path]:
-    """Return the tables that robots name, as springs measured and profiles of cams."""
+    """Return the tables of bundled robots, such as measured springs and profiles of cams."""
     return sorted((examples_root() / "robots").rglob("*.csv"))
 
 
@@ -130,9 +130,9 @@ def examples_root() -> Path:
 
 
 def _trajectory(path: Path) -> ExampleTrajectory:
-    """Read the comment with which a trajectory begins, as in "For robots/a.yaml: the arm rises. More words".
+    """Read the opening comment of a trajectory, e.g. "For robots/a.yaml: the arm rises. More words".
 
-    It names all the robots before the first colon.
+    The comment names all robots before the first colon.
     """
     made_for, _, text = opening_comment(path).partition(": ")
     robots = tuple(re.findall(r"robots/(?:\w+/)*(\w+)\.yaml", made_for))

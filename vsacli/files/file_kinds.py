@@ -1,6 +1,6 @@
-"""The kinds of files: how each is recognised, and the JSON Schema of those in YAML.
+"""Kinds of files: their recognition, and the JSON Schema of YAML files.
 
-The content decides, and the ending of the name where that says nothing.
+A file is recognized by its content, or by the ending of its name if the content is not conclusive.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vsacli.trajectory import file as trajectory_file
 
 
 class FileKind(enum.StrEnum):
-    """The kinds of files that the program reads."""
+    """Kinds of files that the program reads."""
 
     ROBOT = "robot"
     TRAJECTORY = "trajectory"
@@ -51,9 +51,9 @@ class Document:
     """A kind of YAML file.
 
     Attributes:
-        format: value of its key `format`.
-        record: the record class of the whole document.
-        title: a few words.
+        format: value of the key `format`.
+        record: record class of the whole document.
+        title: short description.
     """
 
     format: str
@@ -72,7 +72,7 @@ DOCUMENTS = {
     "study": Document(study_file.FORMAT, study_file.StudyFile, "study of vsacli"),
     "columns": Document(columns_file.FORMAT, columns_file.ColumnsFile, "columns of recordings for vsacli"),
 }
-"""Kinds of documents by name."""
+"""Kinds of documents, by name."""
 
 
 _DOCUMENT_KINDS = {document.format: FileKind(word) for word, document in DOCUMENTS.items()}
@@ -83,7 +83,7 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
     """Return the kind of a file.
 
     Raises:
-        InputError: it cannot be read, or is none of the kinds.
+        InputError: the file cannot be read, or is of no known kind.
         StorageError: the operating system refuses to read a result file.
     """
     check_input_file(path)
@@ -140,6 +140,6 @@ def _document_kind(path: str | os.PathLike[str]) -> FileKind:
 
 
 def _hint(word: str) -> str:
-    """Return the nearest format, if one is near."""
+    """Return a clause with the nearest format; empty if none is close."""
     near = nearest(word, _DOCUMENT_KINDS)
     return f"; did you mean {near!r}?" if near else ""

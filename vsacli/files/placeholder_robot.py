@@ -1,4 +1,4 @@
-"""A robot that stands in for the one of a trajectory, made from the joints of the trajectory."""
+"""A robot in place of the unknown one of a trajectory, built from the joints in the trajectory."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000
 NUMBERED = (1,)
-"""Columns that need no header: a first line that begins with a number is no header."""
+"""Columns that need no name: a first line that begins with a number is not a header."""
 
 _POSITION_SUFFIX, _STIFFNESS_SUFFIX, _DAMPING_SUFFIX = ".q", ".stiffness", ".damping"
 
@@ -37,8 +37,8 @@ class PlaceholderRobot(NamedTuple):
     """A robot in place of an unknown one.
 
     Attributes:
-        robot: it has the joints that the trajectory speaks of.
-        ordered: whether they are surely in the order of the lists in the trajectory.
+        robot: robot with the joints found in the trajectory.
+        ordered: whether the joints are certain to be in the order of the lists in the trajectory.
     """
 
     robot: Robot
@@ -46,11 +46,11 @@ class PlaceholderRobot(NamedTuple):
 
 
 def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
-    """Return a robot of revolute joints that a trajectory would fit if it fits any.
+    """Return a robot of revolute joints that a valid trajectory fits.
 
-    Names and number of the joints are those that the file speaks of; one joint if it says nothing. Joints
-    without stiffness are elastic, all rigid if there is neither stiffness nor damping. Those with a damping
-    have a damper.
+    Names and number of joints are taken from the file; one joint if it has no information. Joints without
+    stiffness are elastic, or rigid if the file has neither stiffness nor damping. Joints with a damping have
+    a damper.
 
     Raises:
         InputError: the file, or a CSV file that it names, cannot be read.
@@ -85,7 +85,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
 
 
 def _tables(root: tree.Mapping) -> dict[str, list[str]]:
-    """Return the CSV files of a document, each with the names that columns are given in it."""
+    """Return the CSV files of a document, each with the column names mapped in the document."""
     files: dict[str, list[str]] = {}
     for key in ("position", *COMMANDED):
         match root.entries.get(key):
@@ -99,7 +99,7 @@ def _tables(root: tree.Mapping) -> dict[str, list[str]]:
 
 
 def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
-    """Names of joints from the columns of their positions, `<joint>.q` or `q1`, with or without a unit."""
+    """Return joint names by the columns of positions, `<joint>.q` or `q1`, with or without a unit."""
     bare = [column.partition("[")[0].strip() for column in columns]
     named = _names(
         column.removesuffix(_POSITION_SUFFIX) for column in bare if column.endswith(_POSITION_SUFFIX)
@@ -114,9 +114,9 @@ def _of_suffix(columns: Iterable[str], suffix: str, names: Sequence[str]) -> tup
 
 
 def _of_nodes(positions: Sequence[tree.Node], further: Sequence[tree.Node]) -> tuple[str, ...]:
-    """Names of joints from values per joint: keys of mappings, and as many as the longest list has.
+    """Return joint names by values per joint: keys of mappings, and as many as the longest list has entries.
 
-    Further signals need not name, but in lists have a place for, all joints.
+    Further signals need not name all joints, but their lists have an entry for each joint.
     """
     named = _keys(positions)
     if named:
@@ -134,7 +134,7 @@ def _keys(nodes: Sequence[tree.Node]) -> tuple[str, ...]:
 
 
 def _names(words: Iterable[str]) -> tuple[str, ...]:
-    """Words that may be names of joints, each once."""
+    """Return the words that are valid joint names, each once."""
     return tuple(dict.fromkeys(word for word in words if IDENTIFIER.fullmatch(word)))[:MOST_JOINTS]
 
 
@@ -145,7 +145,7 @@ def _numbered(count: int) -> tuple[str, ...]:
 def _taking(
     nodes: Sequence[tree.Node], columns: Iterable[str], suffix: str, names: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return the joints to which values per joint give a signal, or to which columns of this suffix do."""
+    """Return the joints that have a signal, by values per joint, or else by columns with this suffix."""
     if not nodes:
         return _of_suffix(columns, suffix, names) or tuple(names)
     for node in nodes:

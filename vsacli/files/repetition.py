@@ -1,4 +1,4 @@
-"""Repetition of a result from its own inputs, to compare it or to export it at another rate."""
+"""Recomputation of a result from its own inputs, to compare it or to export it at another rate."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference of a variable of a result from its repetition.
+    """The difference of a variable between a result and its recomputation.
 
     Attributes:
-        variable: its name.
-        values: how many differ.
-        largest: largest difference over the variable's peak; NaN if one of two values is missing.
+        variable: name of the variable.
+        values: number of values that differ.
+        largest: largest difference relative to the variable's peak; NaN if one of two values is missing.
     """
 
     variable: str
@@ -50,11 +50,11 @@ class Difference:
 
 
 class Repetition(NamedTuple):
-    """A result compared with its repetition.
+    """A result compared with its recomputation.
 
     Attributes:
-        differences: the variables that are not equal bit for bit, once rounded to the precision of the file.
-        precision: of the file, "double" or "single".
+        differences: variables that are not equal bit for bit, after rounding to the precision of the file.
+        precision: precision of the file, "double" or "single".
     """
 
     differences: list[Difference]
@@ -62,14 +62,15 @@ class Repetition(NamedTuple):
 
 
 def repeat(path: str | Path, tell: Tell = unheard) -> Repetition:
-    """Compute a result again, with its own inputs and options, and compare all its variables.
+    """Recompute a result with its own inputs and options, and compare all its variables.
 
     Args:
-        path: the result.
-        tell: as of `Run`.
+        path: path of the result.
+        tell: as for `Run`.
 
     Raises:
-        InputError: the result does not hold its inputs, they cannot be used, or its engine is not to be had.
+        InputError: the result does not contain its inputs, they cannot be used, or its engine is not
+            available.
     """
     with StoredResult.open(path) as result:
         robot, trajectory = rebuilt(result)
@@ -85,11 +86,11 @@ def repeat(path: str | Path, tell: Tell = unheard) -> Repetition:
 
 
 def rebuilt(result: StoredResult) -> tuple[Robot, Trajectory]:
-    """Robot and trajectory that an open result was computed from, as its inputs say that it holds.
+    """Return the robot and trajectory from which an open result was computed, from its stored inputs.
 
     Raises:
-        InputError: the result does not hold its inputs, or they cannot be used.
-        StorageError: there is no room for them beside it while they are read.
+        InputError: the result does not contain its inputs, or they cannot be used.
+        StorageError: the disk for temporary files has no room for them.
     """
     with _reading(result.inputs(), result.path) as (of_robot, of_trajectory):
         robot = load_robot(of_robot.path, of_robot.changes)
@@ -98,7 +99,7 @@ def rebuilt(result: StoredResult) -> tuple[Robot, Trajectory]:
 
 @contextmanager
 def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[StoredInput, StoredInput]]:
-    """Read files as they were then; those of robot and trajectory."""
+    """Make stored files readable under their original paths; yield those of robot and trajectory."""
     roles = {each.role: each for each in inputs}
     if not {"robot", "trajectory"} <= roles.keys():
         raise InputError.one("does not say from which files it was computed, so it cannot be repeated", path)
@@ -125,7 +126,7 @@ class _Comparison:
         self.values = 0
 
     def add(self, block: Block) -> None:
-        """Compare the next steps."""
+        """Compare the next samples."""
         computed = self._result.rounded(self._variable, getattr(block, self._variable))
         stored = self._result.read(self._variable, self._at, self._at + len(computed))
         self._at += len(computed)
@@ -140,16 +141,16 @@ class _Comparison:
 
     @property
     def difference(self) -> Difference:
-        """Return the difference found."""
+        """Difference found so far."""
         return Difference(self._variable, self.values, self._largest / (self._peak or 1.0))
 
 
 class Extracted(NamedTuple):
-    """The inputs of a result.
+    """Input files of a result.
 
     Attributes:
         files: contents as they were read, by path relative to their common folder.
-        changes: made after reading, values by path.
+        changes: changes applied after reading, values by path.
     """
 
     files: dict[Path, bytes]
@@ -175,7 +176,7 @@ def extract(path: str | Path) -> Extracted:
 
 
 def _places(paths: Sequence[str]) -> list[Path]:
-    """Files as they stand to each other, wherever the run was; none is above the folder they go to."""
+    """Return paths that preserve the relative locations of the files, none above their common folder."""
     named = ["stdin" if path == "-" else path for path in paths]
     deep = "/" + "d/" * sum(path.count("..") for path in named)
     whole = [os.path.normpath(os.path.join(deep, path)) for path in named]
@@ -184,20 +185,20 @@ def _places(paths: Sequence[str]) -> list[Path]:
 
 
 ROUNDING = 1e-9
-"""Share of a period by which the last one may be too short."""
+"""Fraction of a period by which the last one may be too short."""
 
 
 @contextmanager
 def at_rate(result: StoredResult, rate: float) -> Iterator[StoredResult]:
-    """The result itself if every n-th of its steps makes the rate, or nothing does; else computed again.
+    """Yield the result if decimation gives the rate or it cannot be recomputed; else a recomputed one.
 
     Args:
-        result: an open result of `vsacli invdyn`.
+        result: open result of `vsacli invdyn`.
         rate: samples per second, Hz.
 
     Raises:
         InputError: the rate is not positive or gives too many samples, the stored times are damaged, or the
-            inputs that the result holds cannot be used.
+            stored inputs cannot be used.
     """
     check_rate(rate)
     samples = float(result.time[-1] - result.time[0]) * rate
@@ -230,18 +231,18 @@ def _takes_every_nth(result: StoredResult, rate: float) -> bool:
 
 
 def _function_of_time(result: StoredResult) -> tuple[Robot, Trajectory] | None:
-    """Robot and trajectory of a result, if its steps are not all that is known of the motion."""
+    """Return robot and trajectory of a result if the motion is also known between samples; else None."""
     if result.kind != StoredResult.kind:
         return None
     try:
         robot, trajectory = rebuilt(result)
     except InputError:
-        return None  # the export says what is wrong with the rate
+        return None  # the export reports the problem of the rate
     return (robot, trajectory) if trajectory.known_between and not trajectory.estimates else None
 
 
 def _sampled(trajectory: Trajectory, rate: float) -> Trajectory:
-    """Return the trajectory at whole periods of a rate; if its end is none, up to the last one before."""
+    """Return the trajectory sampled at whole periods of a rate, up to the last one before its end."""
     periods = int(trajectory.duration * rate + ROUNDING)
     time = trajectory.start + np.arange(periods + 1) / rate
     return trajectory.sampled(RecordedTimes(np.minimum(time, trajectory.times.span[1])))

@@ -1,4 +1,4 @@
-"""The report that a result file or a simulation holds, as text."""
+"""The stored report of a result file or a simulation, as text."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from vsacli.base.tables import ReportText
 
 
 def stored_report(kind: str, content: Mapping[str, Any]) -> ReportText:
-    """Return the report that the command printed when it made the file.
+    """Return the report as printed by the command that made the file.
 
     Args:
-        kind: of the file, "result" or "simulation".
-        content: the report as JSON, of any version.
+        kind: kind of the file, "result" or "simulation".
+        content: report as JSON, of any version.
     """
     from vsacli.control.simulation.simulation_report import SimulationReport
 

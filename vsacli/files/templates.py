@@ -1,4 +1,4 @@
-"""Commented files to begin with: a robot of plausible values, a trajectory that its robot can execute."""
+"""Commented starter files: a robot with plausible values, and a trajectory that its robot can execute."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str]:
-    """Return the duration of a trajectory file that the robot can execute, and a remark if it is longer.
+    """Return a duration with which the robot can execute a trajectory file, and a remark if it is longer.
 
     Args:
-        robot: the robot.
-        text: of the file, with the usual duration.
-        usual: duration, s.
+        robot: robot that executes the trajectory.
+        text: text of the file, with the usual duration.
+        usual: usual duration, s.
 
     Raises:
-        StorageError: there is no room for a temporary file.
+        StorageError: the disk has no room for a temporary file.
     """
     acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
     if not acceptance.refused_joints(trajectory).any():
@@ -74,11 +74,11 @@ ROBOT_HEAD = (
 )
 
 DURATION = 4.0
-"""s"""
+"""Duration of the starter trajectory, s."""
 
 POSITION_DEGREE = 9
 STIFFNESS_DEGREE = 5
-"""Degree of stiffness profiles: motor accelerations, and so torque steps, vanish at both ends."""
+"""Degree of stiffness profiles: motor accelerations, and thus torque discontinuities, vanish at both ends."""
 
 TRAJECTORY_HEAD = (
     "A trajectory to begin with. Degrees 9 and 5 are the smallest with which motors behind springs start",
@@ -87,16 +87,16 @@ TRAJECTORY_HEAD = (
 
 ANGLE_OF_MOTION = math.radians(30)
 STROKE_OF_MOTION = 0.1
-"""Stroke of a joint where no limit is nearer, rad and m."""
+"""Stroke of a joint unless limits are tighter, rad and m."""
 
 PEAK_TO_MEAN_VELOCITY = 2.5
 """Peak velocity of the motion, relative to its mean, rounded up."""
 
 USED_SHARE = 0.5
-"""Share of a range or limit that the motion uses."""
+"""Fraction of a range or limit that the motion uses."""
 
 START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
-"""Stiffness at both ends relative to the lowest that can be reached, where nothing bounds it from above."""
+"""Stiffness at both ends relative to the minimum attainable one, if there is no maximum."""
 
 
 def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-robot") -> str:
@@ -104,11 +104,11 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
 
     Args:
         joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
-        actuator: of every joint, a kind, or a mechanism of serial ones.
-        name: of the robot.
+        actuator: kind of actuator of every joint, or mechanism of serial ones.
+        name: name of the robot.
 
     Raises:
-        InputError: other letters, none, or too many; or the mechanism drives no such joint.
+        InputError: there are other letters, none, or too many; or the mechanism does not suit such joints.
     """
     kinds = [TYPES.get(letter, "") for letter in joints.upper()]
     if not all(kinds) or not 0 < len(kinds) <= MOST_JOINTS:
@@ -124,7 +124,7 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
 
 
 def _joint(number: int, joint_type: str, actuator: str) -> Values:
-    """Return a joint whose axis is vertical if it is the first, otherwise horizontal."""
+    """Return a joint; the axis of the first joint is vertical, those of all others are horizontal."""
     alpha: Any = "pi/2" if number == 1 else 0
     link = {"mass": 2.0, "inertia": {"xx": 0.002, "yy": 0.015, "zz": 0.015}}
     geometry = _by_type(
@@ -149,10 +149,10 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     """Return the text of a trajectory file.
 
     Args:
-        robot: the robot that is to execute it, whose limits and springs decide on the numbers; without one
-            they are those of `robot_template` with revolute joints. If it cannot do it in the usual time, the
-            motion is slower, and a comment says why.
-        name: of the trajectory.
+        robot: robot whose limits and springs determine the values; by default those of `robot_template` with
+            revolute joints. If it cannot execute the motion in the usual time, the motion is slower, and a
+            comment gives the reason.
+        name: name of the trajectory.
     """
     if robot is None:
         position: Values = {"start": 0, "end": "30 deg"}
@@ -192,7 +192,7 @@ def _position(robot: Robot) -> Values:
 
 
 def _written(joint: Joint, position: float) -> str:
-    """Return the position in a few digits; in all, if fewer would round it beyond a limit."""
+    """Return the position in a few digits, or in all digits if rounding would exceed a limit."""
     low, high = joint.limits.position
     shown, unit = (math.degrees(position), " deg") if joint.is_revolute else (position, "")
     short = f"{shown:.3g}"
@@ -231,12 +231,12 @@ def _stiffness(robot: Robot) -> Values:
 
 
 def first_stiffnesses(robot: Robot) -> dict[str, float]:
-    """Return for each joint with commanded stiffness one that it can have under its load."""
+    """Return an attainable stiffness under load for each joint with commanded stiffness."""
     return dict(_stiffness(robot).get("start", {}))
 
 
 def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
-    """Two that are reachable while the joint carries its load at q; if none is, while it carries nothing."""
+    """Return two stiffnesses attainable under the load at q, or without load if none is."""
     ranges = stiffness_ranges(joint, load, q)
     lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
     lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])

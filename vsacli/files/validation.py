@@ -1,4 +1,4 @@
-"""Everything that is wrong with files of any kind, each checked as the command that reads it would."""
+"""All problems of files of any kind; each file is checked as by the command that reads it."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Message:
     """A message about a file.
 
     Attributes:
-        severity: ERROR if the file cannot be used, WARNING if a value is hardly meant, NOTE otherwise.
+        severity: ERROR if the file cannot be used, WARNING if a value is implausible, NOTE otherwise.
         file: path as given.
-        line: line number from 1, or 0 if the whole file is concerned.
-        text: a clause.
+        line: line number from 1, or 0 for the whole file.
+        text: message, a clause.
     """
 
     severity: str
@@ -54,7 +54,7 @@ class Message:
         return str(Problem(self.file, self.line, text))
 
     def as_json(self) -> dict[str, Any]:
-        """JSON values under the published keys; a line of None concerns the whole file."""
+        """Return JSON values under the published keys; a line of None concerns the whole file."""
         return {
             "file": self.file,
             "line": self.line or None,
@@ -68,9 +68,9 @@ class Checked:
     """A file that was checked.
 
     Attributes:
-        path: as given.
-        summary: its kind in a few words; empty if it cannot be used.
-        messages: all there is to say.
+        path: path as given.
+        summary: short description; empty if the file cannot be used.
+        messages: errors, warnings and notes.
     """
 
     path: str
@@ -79,7 +79,7 @@ class Checked:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing keeps it from being used."""
+        """Whether the file can be used."""
         return all(message.severity != ERROR for message in self.messages)
 
 
@@ -97,7 +97,7 @@ def check_files(paths: Sequence[str]) -> list[Checked]:
     """Check files; trajectories and poles must fit one of the robots among them.
 
     Raises:
-        StorageError: a result file cannot be read for a reason that is not its own.
+        StorageError: a result file cannot be read for a reason outside of it.
     """
     kinds = {path: _kind(path) for path in paths}
     robots: dict[str, Robot] = {}
@@ -115,7 +115,7 @@ def _kind(path: str) -> FileKind | Checked:
 
 
 def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
-    """Check a file; a robot that can be used joins the others."""
+    """Check a file; add a valid robot to the others."""
     try:
         if kind is FileKind.ROBOT:
             robots[path] = load_robot(path)
@@ -153,7 +153,7 @@ def _poles(path: str, robots: Robots) -> Checked:
 
 
 def _gains(path: str, robot: Robot) -> Any:
-    """Gains with or without integral action, which takes one more pole."""
+    """Return gains with or without integral action, which requires one more pole."""
     try:
         return load_gains(path, robot, integral=False)
     except InputError:
@@ -164,7 +164,7 @@ def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[l
     """Return the content for each robot that it fits, and a note on these robots.
 
     Raises:
-        InputError: it fits none; the problems are those with the robot that it fits best.
+        InputError: the file fits no robot; with the problems for the robot that it fits best.
     """
     fitting: dict[str, Any] = {}
     errors: dict[str, InputError] = {}
@@ -210,13 +210,13 @@ def _stored(path: str, _: Robots) -> Checked:
 
 
 def _study(path: str, _: Robots) -> Checked:
-    """Return a study with the files it names, which no other can stand for."""
+    """Check a study with the files that it names, whatever robots are among the files."""
     study = load_study(path)
     return _usable(path, f"study {study.file.name}, {_count(study.runs, 'run')} of {study.robot.name}")
 
 
 def _columns(path: str, _: Robots) -> Checked:
-    """Columns, of which only a recording shows whether they are there."""
+    """Check a columns file; whether its columns exist depends on the recording."""
     mapping = load_columns(path)
     return _usable(path, f"columns of recordings, {_count(len(mapping.columns), 'name')}")
 

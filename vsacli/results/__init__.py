@@ -1,1 +1,1 @@
-"""Files that come out, and figures of them."""
+"""Result files, and their figures, pages and exports."""

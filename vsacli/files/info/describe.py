@@ -33,7 +33,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def describe_cache(folder: str) -> dict[str, Any]:
-    """Return the cache of compiled code, and unfinished files in a folder and in that for temporary files.
+    """Describe the cache of compiled code, and unfinished files in a folder and in that for temporary files.
 
     Raises:
         StorageError: the cache cannot be used.
@@ -72,7 +72,7 @@ def _opened() -> Iterator[Cache]:
 
 
 def _places(*folders: Path) -> list[Path]:
-    """These folders, and that for temporary files if there is one, each once."""
+    """Return these folders and the folder for temporary files, if there is one, each once."""
     places = dict.fromkeys(folders)
     with suppress(OSError):
         places[Path(tempfile.gettempdir())] = None
@@ -83,7 +83,7 @@ KIND = "table of a study"
 
 
 def describe_study(path: str) -> dict[str, Any]:
-    """Return a table as JSON values: findings, parameters that vary, provenance, inputs with their SHA-256.
+    """Describe a study table as JSON values: findings, varying parameters, provenance, inputs with SHA-256.
 
     Raises:
         InputError: the file is damaged.
@@ -101,7 +101,7 @@ def describe_study(path: str) -> dict[str, Any]:
 
 
 def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
-    """Return the values of a parameter if they are few, else their range."""
+    """Describe the values of a parameter: all texts, or range and count of distinct numbers."""
     if table.parameter_is_text(path):
         return {"path": path, "values": sorted(set(table.texts(path)))}
     values = table.read(path)
@@ -111,7 +111,7 @@ def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
 
 
 def study_lines(table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the description as text."""
+    """Yield the description of a study table as lines of text."""
     yield str(StudySummary.from_json(table))
     provenance = table["provenance"]
     yield f"created {provenance['created']} with NumPy {provenance['numpy']}, engine {provenance['engine']}"
@@ -135,16 +135,17 @@ BLOCK_SAMPLES = 8192
 def describe_file(
     path: str, robot_path: str | None = None, progress: Progress = unseen, rate: float | None = None
 ) -> dict[str, Any]:
-    """Return the content of a robot, trajectory, recording, result or simulation file, JSON values in SI.
+    """Describe a robot, trajectory, recording, result or simulation file as JSON values in SI units.
 
     Args:
-        path: the file.
-        robot_path: the robot that a trajectory is for, or a recording of, whose names its joints shall have.
-        progress: opens a bar over the bytes of a recording that are looked at.
+        path: path of the file.
+        robot_path: robot of a trajectory or a recording, for the names of its joints.
+        progress: opens a progress bar over the bytes of a recording.
         rate: rows per second of a recording without times.
 
     Raises:
-        InputError: the file is of another kind, or cannot be used; or it is no table, and has no such rate.
+        InputError: the file is of another kind, or cannot be used; or a rate is given for a file that is not
+            a recording without times.
     """
     kind = recognise(path)
     if rate is not None and kind is not FileKind.TABLE:
@@ -171,7 +172,7 @@ def described_value(description: dict[str, Any], field: str) -> Any:
     """Return the value at a path into a description, as plain JSON values.
 
     Raises:
-        InputError: nothing is there; with the keys that exist, and the nearest name.
+        InputError: the path does not exist; with the valid keys, and the nearest one.
     """
     return find(json_value(description), field)
 
@@ -179,7 +180,7 @@ def described_value(description: dict[str, Any], field: str) -> Any:
 def _described_table(
     path: str, robot_path: str | None, progress: Progress, rate: float | None
 ) -> dict[str, Any]:
-    """Return a CSV file: a trajectory if its columns have the names for it, else a recording."""
+    """Describe a CSV file: as a trajectory if it has the columns of one, else as a recording."""
     from vsacli.files.recordings import describe_recording, is_trajectory
 
     robot = None if robot_path is None else load_robot(robot_path)
@@ -202,10 +203,10 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
 
 
 def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> dict[str, Any]:
-    """Return a trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
+    """Describe a trajectory as JSON values: times, and range and peak of each quantity at each joint.
 
-    `min`, `max` and `peak`, the largest absolute value, are those at the steps. Values that a joint does not
-    have, such as the stiffness of a rigid one, are NaN.
+    `min`, `max` and `peak`, the largest absolute value, are taken over the samples. Values that a joint does
+    not have, such as the stiffness of a rigid one, are NaN.
     """
     ranges = _Ranges()
     for start in range(0, trajectory.samples, BLOCK_SAMPLES):
@@ -235,7 +236,7 @@ def _axis(ranges: _Ranges, index: int) -> dict[str, Any]:
 
 
 class _Ranges:
-    """Smallest and largest value of quantities, (columns,), over the blocks taken so far."""
+    """Smallest and largest value of quantities, (columns,), over the blocks so far."""
 
     def __init__(self) -> None:
         self._low: dict[str, FloatArray] = {}
@@ -257,7 +258,7 @@ class _Ranges:
 
 
 def describe_result(result: StoredResult) -> dict[str, Any]:
-    """Return a result or simulation as JSON values: provenance, inputs with their SHA-256, variables, report.
+    """Describe a result or simulation as JSON values: provenance, inputs with SHA-256, variables, report.
 
     Raises:
         InputError: the file is damaged.

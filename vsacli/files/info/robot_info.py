@@ -1,4 +1,8 @@
-"""A robot: its parameters as understood, how far it reaches, the torques that its weight requires."""
+"""Description of a robot: its parameters, its reach, the torques of its weight, and its attainable stiffness.
+
+Reach and static load are maxima over configurations, found by coordinate ascent from random configurations.
+As a function of a single revolute joint, each objective is a + b cos q + c sin q, so that a step is exact.
+"""
 
 from __future__ import annotations
 
@@ -17,35 +21,35 @@ from vsacli.robot.kinematics import base_gravity, frames, tip_position
 from vsacli.robot.model import Robot
 
 MOST_STARTS = 16
-"""Random configurations to start from, for each goal; fewer in long chains."""
+"""Number of random start configurations for each goal; fewer in long chains."""
 
 MOST_SWEEPS = 50
 SETTLED_GAIN = 1e-11
 """Relative gain of a sweep over all joints below which the search ends."""
 
 MOST_EVALUATIONS = 1e7
-"""Samples times joints that a search may evaluate; beyond, the random configurations have to do."""
+"""Limit on samples times joints evaluated by a search; beyond it, random configurations are not improved."""
 
 SAMPLES_AT_NO_COST = 300
-"""Fewer samples at once cost as much as this many."""
+"""Number of samples up to which an evaluation takes the same time."""
 
 SEED = 0
 TURN = 2 * math.pi
 _ANGLES = np.array([0, TURN / 3, 2 * TURN / 3])
 
 Objective = Callable[[FloatArray], FloatArray]
-"""Configurations (samples, joints) to values of the goals (samples, goals)."""
+"""Function of configurations (samples, joints) that returns values of the goals (samples, goals)."""
 
 
 class Extremes(NamedTuple):
-    """Largest size of each goal, (goals,), and a configuration that has it, (goals, joints)."""
+    """Largest magnitude of each goal, (goals,), and a configuration that attains it, (goals, joints)."""
 
     values: FloatArray
     configurations: FloatArray
 
 
 def free_range(joint: Joint) -> tuple[float, float]:
-    """Positions to look at: those within the limits; without any a whole turn, of a prismatic joint zero."""
+    """Return the positions to search: within limits; without limits one turn, or zero if prismatic."""
     low, high = joint.limits.position
     if math.isfinite(low) and math.isfinite(high):
         return low, high
@@ -57,12 +61,12 @@ def free_range(joint: Joint) -> tuple[float, float]:
 
 
 def unlimited(joint: Joint) -> bool:
-    """Return whether the joint is prismatic and may move without end, so that it is held at zero."""
+    """Return whether the joint is prismatic and lacks a position limit, so that it is held at zero."""
     return not joint.is_revolute and not all(map(math.isfinite, joint.limits.position))
 
 
 def largest_sizes(objective: Objective, goals: int, robot: Robot) -> Extremes:
-    """Maximise the size of each of several goals on its own; NaN if its numbers overflow."""
+    """Maximize the magnitude of each goal separately; NaN if values overflow."""
     with np.errstate(all="ignore"):
         q = _searched(objective, _random(goals, robot), robot)
         sizes = np.abs(_own_values(objective, q))
@@ -71,7 +75,7 @@ def largest_sizes(objective: Objective, goals: int, robot: Robot) -> Extremes:
 
 
 def _random(goals: int, robot: Robot) -> FloatArray:
-    """Configurations to start from, (goals, starts, joints)."""
+    """Return start configurations, (goals, starts, joints)."""
     count = len(robot.joints)
     starts = min(MOST_STARTS, max(2, 200 // count))
     low, high = np.array([free_range(joint) for joint in robot.joints]).T
@@ -79,7 +83,7 @@ def _random(goals: int, robot: Robot) -> FloatArray:
 
 
 def _searched(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
-    """Return the configurations after sweeps over all joints, until nothing is gained."""
+    """Return the configurations after sweeps over all joints, repeated until the gain is negligible."""
     count = len(robot.joints)
     work = max(q[..., 0].size * len(_ANGLES), SAMPLES_AT_NO_COST) * count * count
     before = np.zeros(len(q))
@@ -102,7 +106,7 @@ def _own_values(objective: Objective, q: FloatArray) -> FloatArray:
 
 
 def _at(objective: Objective, q: FloatArray, index: int, positions: FloatArray) -> FloatArray:
-    """Values with one joint moved to each of a few positions, (positions, goals, starts)."""
+    """Return values with one joint moved to each of several positions, (positions, goals, starts)."""
     moved = np.repeat(q[None], len(positions), axis=0)
     moved[..., index] = positions[:, None, None]
     return _own_values(objective, moved)
@@ -115,7 +119,7 @@ def _best_end(objective: Objective, q: FloatArray, index: int, ends: FloatArray)
 
 
 def _best_angle(objective: Objective, q: FloatArray, index: int, ends: FloatArray) -> FloatArray:
-    """Return where |a + b cos q + c sin q| is largest between the ends, from three values of it."""
+    """Return the maximum of |a + b cos q + c sin q| between the ends, from its values at three angles."""
     thirds = _at(objective, q, index, _ANGLES)
     a = thirds.mean(axis=0)
     b, c = (np.tensordot(wave(_ANGLES), thirds, 1) * 2 / len(_ANGLES) for wave in (np.cos, np.sin))
@@ -130,18 +134,18 @@ def _best_angle(objective: Objective, q: FloatArray, index: int, ends: FloatArra
 
 
 LOAD_ROUNDING = 1e-12
-"""Torques below this share of the largest are the rounding of a zero."""
+"""Fraction of the largest torque below which torques are rounding errors and count as zero."""
 
 
 def describe_robot(robot: Robot) -> dict[str, Any]:
-    """Return a robot as JSON values in SI units: its fields, reach, static load and attainable stiffness.
+    """Describe a robot as JSON values in SI units: fields, reach, static load and attainable stiffness.
 
     `reach` and `static_load` are the largest values found over the configurations within the position limits;
     a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.
-    `stiffness_range` of a joint whose stiffness is commanded is reachable while it carries no torque,
-    `loaded` while it carries the static load in either direction; an end that nothing bounds is infinite,
-    both are NaN if the springs cannot carry the load. Of an elastic joint it is the stiffness that its spring
-    then has.
+    `stiffness_range` of a joint with commanded stiffness is the attainable range `unloaded`, without torque,
+    and `loaded`, with the static load in either direction; an unbounded end is infinite, and both ends are
+    NaN if the springs cannot carry the load. For an elastic joint it is the stiffness of its spring at these
+    torques.
     """
     furthest = reach(robot)
     return {
@@ -178,12 +182,12 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
 def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[float]]:
     """Return the stiffness attainable `unloaded` and `loaded` (a torque either way) at q, N m/rad (N/m).
 
-    Of a joint whose stiffness is not commanded, that which it has then; empty if it has no springs.
+    For a joint without commanded stiffness, its stiffness at these torques; empty if it has no springs.
     """
     if not joint.actuator.sprung:
         return {}
     tau_e = np.array([0.0, load, -load])
-    with np.errstate(all="ignore"):  # a load may be beyond all numbers
+    with np.errstate(all="ignore"):  # a load may be infinite or NaN
         if "stiffness" not in joint.actuator.commanded:
             at_rest = Command.at_rest(tau_e, np.full(3, q))
             held = joint.actuator.transmit(at_rest, NEAR_SINGULAR_MARGIN, None)["stiffness"]
@@ -199,7 +203,7 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
 
 
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:
-    """Torques that hold the links still, (samples, joints), N m (N), at q of (samples, joints).
+    """Return the torques that hold the links at rest at q, (samples, joints), N m (N).
 
     Moment of the weight of all links beyond a joint about its axis, or weight along it.
     """
@@ -227,9 +231,9 @@ def reach(robot: Robot) -> Extremes:
 
 
 def reach_bound(robot: Robot) -> float:
-    """No configuration takes the end effector's frame farther than this from the origin of DH frame 0, m.
+    """Return an upper bound on the distance of the end effector from the origin of DH frame 0, m.
 
-    The sum of the lengths of all links, of prismatic joints at the end of their range that is farther.
+    The bound is the sum of the lengths of all links, with prismatic joints at the farther end of their range.
     """
     return sum(map(_length, robot.joints)) + math.hypot(*robot.tool.xyz)
 
@@ -240,10 +244,10 @@ def _length(joint: Joint) -> float:
 
 
 def static_load(robot: Robot) -> Extremes:
-    """Return the largest |torque| that gravity alone demands of each joint, N m (N), as far as was found."""
+    """Return the largest |torque| of each joint found for gravity alone, N m (N)."""
     return largest_sizes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
 
 
 def held_at_zero(robot: Robot) -> list[str]:
-    """Prismatic joints without both position limits, which reach and load take to stand at zero."""
+    """Return the prismatic joints without both position limits, held at zero for reach and load."""
     return [joint.name for joint in robot.joints if unlimited(joint)]

@@ -24,7 +24,7 @@ Values = Mapping[str, Any]
 
 
 def device_lines(joints: Sequence[Values]) -> Iterator[str]:
-    """Joints that are driven alike in a line, and below them each part of their actuator."""
+    """Yield a line for all joints with equal actuators, and below it a line for each part of the actuator."""
     alike: dict[tuple[str, ...], list[int]] = {}
     for number, joint in enumerate(joints):
         kind = ACTUATORS[joint["actuator"]["type"]]
@@ -39,7 +39,7 @@ def device_lines(joints: Sequence[Values]) -> Iterator[str]:
 
 
 def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
-    """Yield a line for each record in an actuator, and one for the numbers beside them."""
+    """Yield a line for each record in an actuator, and one line for its own parameters."""
     own = []
     for name, field, value in _given(cls, values):
         if not field.kind.records:
@@ -56,7 +56,7 @@ def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
 
 
 def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
-    """Yield the fields that say something: none that is absent, infinite or as it is by default."""
+    """Yield the fields with a value that is neither absent, infinite nor the default."""
     for name, (field, default) in declared(cls).items():
         value = values.get(name)
         if value is not None and value != default and value != math.inf:
@@ -64,7 +64,7 @@ def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
 
 
 def _record(field: Field, values: Values, joint_type: str) -> str:
-    """Return a record of a field: the word that chose it, and its numbers."""
+    """Return a record of a field in words: its type and its parameters."""
     word = values.get("type", "")
     cls = field.kind.records[word]
     key, other_type = getattr(cls, "unit_variant_with", ("", joint_type))
@@ -167,7 +167,7 @@ def _dampers(joints: Sequence[Description]) -> Iterator[str]:
 
 
 def _springs(actuator: Description) -> str:
-    """Return the types of mechanism, springs and coupling, as far as there are any."""
+    """Return the types of mechanism, springs and coupling, as far as present."""
     mechanism = actuator.get("mechanism")
     written = (mechanism or actuator).get("spring") or []
     springs = written if isinstance(written, list) else [written]
@@ -249,7 +249,7 @@ def _megabytes(size: int) -> str:
 
 
 def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield a table with all its columns to the left."""
+    """Yield a table with all columns aligned left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

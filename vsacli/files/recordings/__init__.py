@@ -1,4 +1,4 @@
-"""Recordings of other programs: content of a CSV file, its health, and possible meanings of columns."""
+"""Recordings in foreign CSV files: their content, faults of their signals, and likely meanings of columns."""
 
 from vsacli.files.recordings.recording_info import describe_recording, is_trajectory
 from vsacli.files.recordings.recording_text import KIND, recording_lines

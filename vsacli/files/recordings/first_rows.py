@@ -1,6 +1,6 @@
 """The first rows of a table as texts, and the kinds of its columns.
 
-The column of stamps is the first to be found, with its unit.
+The column of stamps is identified first, with its unit.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vsacli.documents.time_column import (
 from vsacli.files.recordings.names import QUANTITY_WORDS, WORDS, words_of
 
 FIRST_ROWS = 500
-"""Enough to tell numbers from texts, and stamps from counters."""
+"""Number of rows read, enough to distinguish numbers from texts, and stamps from counters."""
 
 INDICES = (
     "index",
@@ -51,13 +51,13 @@ INDICES = (
 """Names of columns that count rows."""
 
 RISING_SHARE = 0.9
-"""Share of steps between stamps that must be positive: in a log with faults some are not."""
+"""Smallest share of positive differences between stamps; in a faulty log some are not positive."""
 
 GUESSED = "guessed"
-"""Beginning of the reason for which a column without a telling name is taken for times."""
+"""Beginning of the reason if a column is taken for times although its name does not indicate it."""
 
 EVEN = 0.5
-"""Largest deviation of nearly all steps from the median, as a share of it, in columns guessed as times."""
+"""Largest relative deviation from the median of nearly all intervals, for columns guessed to be times."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class FirstRows:
     """The first rows of a table.
 
     Attributes:
-        path: the file.
-        header: its header.
-        cells: (rows, columns), with decimal points.
+        path: path of the file.
+        header: header of the file.
+        cells: texts, (rows, columns), with decimal points.
     """
 
     path: str
@@ -80,43 +80,43 @@ class FirstRows:
         return self.header.columns
 
     def filled(self, place: int) -> list[str]:
-        """Return the cells of a column that hold something."""
+        """Return the cells of a column that are not empty."""
         return [row[place] for row in self.cells if row[place].strip().lower() not in NOTHING]
 
     def numbers(self, place: int) -> list[float]:
-        """Return the numbers of a column; nothing if it holds anything else."""
+        """Return the numbers of a column; an empty list if it holds anything else."""
         cells = self.filled(place)
         return [float(cell) for cell in cells] if all(map(is_number, cells)) else []
 
     def clocks(self, place: int) -> list[Clock]:
-        """Return the times of a column in clock notation; an empty list if it holds anything else."""
+        """Return the times of a column of clock texts; an empty list if it holds anything else."""
         clocks = [clock for cell in self.filled(place) if (clock := read_clock(cell)) is not None]
         return clocks if len(clocks) == len(self.filled(place)) else []
 
     def is_index(self, place: int) -> bool:
-        """Return whether a column counts the rows: without a telling name, and increasing by one."""
+        """Return whether a column counts the rows: named as an index or not at all, and increasing by one."""
         name = split_heading(self.columns[place])[0].lower()
         named_so = (not name and self.header.line > 0) or name in INDICES
         return named_so and self.counts_rows(place)
 
     def counts_rows(self, place: int) -> bool:
-        """Return whether the whole numbers of a column are larger by one from row to row."""
+        """Return whether the numbers of a column increase by one from row to row."""
         values = self.numbers(place)
         return len(values) > 1 and all(after - before == 1 for before, after in pairwise(values))
 
     def text(self, place: int) -> str:
-        """Return the text that every row has in a column; "" for numbers, or for several texts."""
+        """Return the text common to all rows of a column; "" for numbers, or for several texts."""
         texts = set(self.filled(place))
         return texts.pop() if len(texts) == 1 and not self.numbers(place) else ""
 
     def called(self, place: int) -> str | int:
-        """Return a column as mappings name it: its number where there is no name, or it is repeated."""
+        """Return the key of a column in mappings: its name, or its number if that is empty or repeated."""
         name = self.columns[place]
         return name if name and self.columns.count(name) == 1 else place + 1
 
     @property
     def of_numbers(self) -> list[int]:
-        """Places of the columns that hold numbers."""
+        """Positions of the columns that hold numbers."""
         return [place for place in range(len(self.columns)) if self.numbers(place)]
 
     def rises(self, place: int) -> bool:
@@ -126,7 +126,7 @@ class FirstRows:
         if clocks:
             return len(clocks) > 1 and bool(np.mean(np.diff(elapsed(clocks)) > 0) > RISING_SHARE)
         try:
-            values: Sequence[float] = [int(cell) for cell in cells]  # floats tell no nanoseconds apart
+            values: Sequence[float] = [int(cell) for cell in cells]  # floats merge nanoseconds since 1970
         except ValueError:
             values = self.numbers(place) or [math.nan]
         steps = [after > before for before, after in pairwise(values)]
@@ -134,10 +134,10 @@ class FirstRows:
 
 
 def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
-    """Return the first rows of a CSV file, whatever its columns are called.
+    """Return the first rows of a CSV file with any column names.
 
     Raises:
-        InputError: it begins as no table does, or rows have other cells than the header.
+        InputError: the file does not begin like a table, or a row does not fit the header.
     """
     name = os.fspath(path)
     header = read_header(name, numbered=(1,))
@@ -150,14 +150,14 @@ def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
 
 
 class TimeColumn(NamedTuple):
-    """The stamps of a recording.
+    """The column of stamps of a recording.
 
     Attributes:
-        place: of the column, from 0.
-        source: its entry in a mapping.
-        reason: why it is taken for that, a clause.
-        nanoseconds: place of its column of nanoseconds, if there is one.
-        clock: whether it is written as a clock shows times.
+        place: position of the column, from 0.
+        source: entry of the column in a mapping.
+        reason: reason for the choice, a clause.
+        nanoseconds: position of its column of nanoseconds, if there is one.
+        clock: whether the stamps are clock texts.
     """
 
     place: int
@@ -168,12 +168,12 @@ class TimeColumn(NamedTuple):
 
     @property
     def guessed(self) -> bool:
-        """Whether nothing calls it a time."""
+        """Whether the column was chosen although its name does not indicate times."""
         return self.reason.startswith(GUESSED)
 
 
 def time_column(rows: FirstRows) -> TimeColumn | None:
-    """Return the column that holds the stamps, if one does: called so, of clock texts, or of even steps."""
+    """Return the column of stamps, if there is one: by its name, clock texts, or even intervals."""
     pair = _seconds_and_nanoseconds(rows)
     if pair is not None:
         seconds, rest = map(rows.called, pair)
@@ -189,7 +189,7 @@ def time_column(rows: FirstRows) -> TimeColumn | None:
 
 
 def unread_times(rows: FirstRows) -> Iterator[str]:
-    """Yield the problems of columns named as times if none of them can be one."""
+    """Yield the problems of columns named as times if none of them can be read as such."""
     if time_column(rows) is not None:
         return
     for place in _called(rows):
@@ -198,7 +198,7 @@ def unread_times(rows: FirstRows) -> Iterator[str]:
             yield f"column {name!r} is called a time, but does not increase from row to row"
         elif filled:
             unread = (cell for cell in filled if not is_number(cell) and read_clock(cell) is None)
-            text = next(unread, filled[0])  # numbers and clocks by turns
+            text = next(unread, filled[0])  # numbers and clock texts mixed
             yield f"column {name!r} is called a time, but holds {text[:40]!r}; expected {EXPECTED}"
 
 
@@ -212,7 +212,7 @@ def _described(rows: FirstRows, place: int, reason: str) -> TimeColumn:
 
 
 def _called(rows: FirstRows) -> list[int]:
-    """Columns whose names say that they are times, the best first: the whole name before its last word."""
+    """Return columns named as times, best first: matches of the whole name before those of its last word."""
     whole, last = {}, {}
     for place, column in enumerate(rows.columns):
         name = split_heading(column)[0].strip().lower()
@@ -227,7 +227,7 @@ def _called(rows: FirstRows) -> list[int]:
 
 
 def _like_stamps(rows: FirstRows, place: int) -> bool:
-    """Return whether a column that nothing calls a time rises in nearly even steps, and counts no rows."""
+    """Return whether a column, not named as a quantity, rises nearly evenly and does not count rows."""
     words = words_of(split_heading(rows.columns[place])[0])
     if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place) or not rows.rises(place):
         return False
@@ -237,7 +237,7 @@ def _like_stamps(rows: FirstRows, place: int) -> bool:
 
 
 def _seconds_and_nanoseconds(rows: FirstRows) -> tuple[int, int] | None:
-    """Two columns: whole seconds, and nanoseconds that start again; called so, or seconds since 1970."""
+    """Return columns of whole seconds and of nanoseconds that restart, by name or as seconds since 1970."""
     words = [words_of(split_heading(column)[0]) for column in rows.columns]
     for place in rows.of_numbers:
         *before, last = words[place] or ("",)

@@ -1,7 +1,7 @@
-"""Recorded signals of a trajectory next to their splines, for figures that show how noise was judged.
+"""Recorded signals of a trajectory with their splines, for figures that show how noise was estimated.
 
-All statements on a fit come from its summary, as in reports. Spectra are
-computed here, from the samples and the spline alone.
+All statements on a fit are taken from its summary, as in reports. Spectra are computed here, from the samples
+and the spline alone.
 """
 
 from __future__ import annotations
@@ -30,38 +30,38 @@ from vsacli.trajectory.recorded.recording import read_recording
 from vsacli.trajectory.recorded.samples import SampledProfile
 
 FEWEST_POINTS = 1000
-"""Points that a spline is drawn with at least: lines between fewer samples would look like corners."""
+"""Minimum number of points of a drawn spline: lines between fewer samples would look like corners."""
 
 WINDOW_POWER = 8
-"""Power of the sine window. Leakage falls by the ninth power of the frequency, so that motion of 1 rad hides
-no noise of 1e-9 rad ten lines away; with a Hann window it would hide 1e-5 rad."""
+"""Exponent of the sine window. Leakage falls with the ninth power of the frequency, so that motion of 1 rad
+does not hide noise of 1e-9 rad ten lines away; with a Hann window it would hide 1e-5 rad."""
 
 FIRST_LINE = 4
-"""Lowest frequency that is shown, in cycles of the recording: the window mixes slower ones with the mean."""
+"""Lowest frequency shown, in cycles per recording: the window mixes lower ones with the mean."""
 
 BANDS = 120
 
 ROUNDING = 16 * np.finfo(float).eps
-"""Range of a recording over its largest value up to which it is at rest."""
+"""Relative range of a recording below which it is at rest."""
 
 FOLLOWED = 0.5
-"""Gain of the spline over the samples in a band from which on it follows them."""
+"""Gain of the spline relative to the samples in a band from which it follows them."""
 
 FITS = {
     INTERPOLATE: "interpolated",
     LEAST_SQUARES: "least squares",
     SMOOTH: "smoothed",
 }
-"""Words for each method of the report."""
+"""Words for the fitting methods of the report."""
 
 
 def table_profiles(path: str, robot: Robot, progress: Progress = unseen) -> list[SampledProfile]:
-    """Return the position and all commanded signals that a CSV file has columns of, fitted as a run would.
+    """Return position and commanded signals in the columns of a CSV file, fitted as in a run.
 
     Args:
-        path: the file.
-        robot: whose joints are recorded. Unlike for a run, signals that it takes may be missing.
-        progress: opens a bar over the samples that splines are fitted to.
+        path: path of the file.
+        robot: robot that was recorded; unlike in a run, signals that it requires may be missing.
+        progress: opens a progress bar over the samples to which splines are fitted.
 
     Raises:
         InputError: as `read_recording`.
@@ -80,17 +80,17 @@ def recorded_curves(
     shown: Sequence[str] = (),
     span: Span = WHOLE,
 ) -> list[RecordedCurve]:
-    """Return recorded signals and the splines that were fitted to them, component by component.
+    """Return recorded signals and their splines, component by component.
 
     Args:
-        profiles: the signals; those that need no spline are left out.
-        joint_types: of the robot.
-        file: named in errors.
-        shown: names of the joints to show; all if there are none. A wrench has no joints and is always shown.
+        profiles: recorded signals; those without a spline are omitted.
+        joint_types: joint types of the robot.
+        file: path for errors.
+        shown: names of the joints to show; all if empty. A wrench is always shown.
         span: first and last time of the curves, s; spectra are of the whole recording.
 
     Raises:
-        InputError: there is no such joint, or no sample at these times.
+        InputError: a joint is unknown, or no sample lies in the span.
     """
     curves = []
     for profile in (each for each in profiles if each.estimate is not None):
@@ -115,11 +115,11 @@ def _curve(
     """Return one component.
 
     Args:
-        profile: the signal.
+        profile: recorded signal.
         member: index of the component.
-        joint_types: of the robot.
-        stated: of its fit, an entry of the summary.
-        steps: those to show.
+        joint_types: joint types of the robot.
+        stated: summary of its fit, an entry of the report.
+        steps: samples to show.
     """
     record, fit = profile.record, profile.fit
     values, time = record.values[member], record.time
@@ -141,7 +141,7 @@ def _curve(
         rms=float(stated["residual"]["rms"]),
         noise=float(stated["noise"]),
         inside=(record.start + time[0] + ends["start"], record.start + time[-1] - ends["end"]),
-        # the residual is small, and so is the error of its interpolation where stamps are uneven
+        # interpolating the small residual at even times makes a small error
         spectrum=_spectrum(even, smooth + np.interp(even, time, residual), smooth, stated),
         highest=Highest(
             name=profile.signal.names[-1],
@@ -163,7 +163,7 @@ def _unit(signal: Signal, order: int, member: int, joint_types: Sequence[str]) -
 def _spectrum(
     time: FloatArray, recorded: FloatArray, fitted: FloatArray, stated: Mapping[str, Any]
 ) -> Spectrum:
-    """Return densities in bands of equal width in octaves, from samples at equal steps."""
+    """Return densities in bands of equal logarithmic width, from equally spaced samples."""
     count, step = len(time), float(time[1] - time[0])
     window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** WINDOW_POWER
     unit = math.sqrt(2 * step / float(np.sum(window**2)))

@@ -1,4 +1,4 @@
-"""Guesses at the meaning of the columns of a recording, each with its reason."""
+"""Likely meanings of the columns of a recording, each with its reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vsacli.files.recordings.names import AXES, GENERIC, POSES, QUANTITIES, WORD
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
 TAKEN = ("q", "stiffness")
-"""Quantities that are proposed; others become comments next to them."""
+"""Quantities that are proposed in a mapping; others become comments there."""
 
 ARRAYS = ("q", "dq", "tau_motor_1")
 """Content of the arrays of `sensor_msgs/JointState`: position, velocity, effort."""
@@ -24,25 +24,25 @@ ARRAYS = ("q", "dq", "tau_motor_1")
 OTHER_THAN_MEASURED = (
     *("desired", "command", "commanded", "target", "reference", "ref", "goal", "error", "setpoint"),
 )
-"""Words of columns that are no measurement of a joint."""
+"""Words in names of columns that are not measurements of a joint."""
 
 _BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
-"""A joint's name that needs no robot to be recognized."""
+"""Regular expression of a joint name that is recognized without a robot."""
 
 _INDEX = re.compile(r"[\[_ ]?(\d+)")
 _SEPARATORS = re.compile(r"[./\s]")
 
 
 class Guess(NamedTuple):
-    """A possible meaning of a column.
+    """A likely meaning of a column.
 
     Attributes:
-        place: of the column, from 0.
+        place: position of the column, from 0.
         joint: name of the joint.
-        quantity: of the joint.
+        quantity: quantity of the joint.
         source: entry of the column in a mapping.
-        reason: why, a clause.
-        sure: whether the names themselves say so.
+        reason: reason, a clause.
+        sure: whether the names are unambiguous.
     """
 
     place: int
@@ -54,7 +54,7 @@ class Guess(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the name of the column in this package."""
+        """Name of the column in this package."""
         return f"{self.joint}.{self.quantity}"
 
 
@@ -62,12 +62,12 @@ class _Column(NamedTuple):
     """A column of a quantity.
 
     Attributes:
-        place: of the column, from 0.
-        quantity: of a joint.
-        before: its name before the word for the quantity.
-        words: of its name, without that for the quantity.
+        place: position of the column, from 0.
+        quantity: quantity of a joint.
+        before: part of the name before the word for the quantity.
+        words: words of the name, without that for the quantity.
         entry: index in an array.
-        bare: whether its name says no quantity.
+        bare: whether the name has no word for a quantity.
     """
 
     place: int
@@ -79,12 +79,12 @@ class _Column(NamedTuple):
 
     @property
     def family(self) -> tuple[str, ...]:
-        """The words that its name shares with those of the same signal of other joints."""
+        """Words of the name that are common to the same signal of other joints."""
         return tuple("#" if word.isdecimal() or len(word) == 1 else word for word in self.words)
 
 
 class _Joint(NamedTuple):
-    """The joint of a column, the reason, and whether the name says so."""
+    """The joint of a column, the reason, and whether the name is unambiguous."""
 
     name: str
     reason: str = ""
@@ -92,12 +92,12 @@ class _Joint(NamedTuple):
 
 
 def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]) -> list[Guess]:
-    """Return possible meanings of the columns, each name once.
+    """Return likely meanings of the columns, each name once.
 
     Args:
-        rows: the first rows.
-        time: the stamps.
-        joint_names: of the robot that was recorded; empty if it is not known.
+        rows: first rows of the table.
+        time: column of stamps, if there is one.
+        joint_names: joints of the robot that was recorded; empty if unknown.
     """
     columns, labels = _named_columns(rows, time), _labels(rows)
     if not rows.header.line:
@@ -115,7 +115,7 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
 
 
 def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
-    """Return columns of joints by their names: those with a quantity first, then measured ones."""
+    """Return columns of joints by their names: with a quantity first, then measured before other ones."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
     columns.sort(key=lambda column: (column.bare, any(word in OTHER_THAN_MEASURED for word in column.words)))
@@ -123,7 +123,7 @@ def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
-    """Yield the meanings of a column by its name; without a word for a quantity it may be a position."""
+    """Yield the meaning of a column by its name; a name without a word for a quantity may mean a position."""
     name = split_heading(rows.columns[place])[0]
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
@@ -140,7 +140,7 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:
-    """Names of joints that stand in the rows, as ROS writes them, by their indices in arrays."""
+    """Return joint names found in the rows, as ROS writes them, by their indices in arrays."""
     labels = {}
     for place, column in enumerate(rows.columns):
         words = words_of(column)
@@ -168,7 +168,7 @@ def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Colum
 def _of_robot(
     columns: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
 ) -> Iterator[tuple[_Column, _Joint]]:
-    """Columns with the joints of a robot that their names speak of; if none does, one family in order."""
+    """Yield columns with the joints that their names indicate; if none does, one family in joint order."""
     named, families = False, defaultdict(list)
     for column in columns:
         families[column.family].append(column)
@@ -186,9 +186,9 @@ def _of_robot(
 def _matched(
     family: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
 ) -> list[tuple[_Column, _Joint]]:
-    """Return the columns of a family whose names, or the names in their rows, are those of joints.
+    """Return the columns of a family that match joints, by their names or by names in their rows.
 
-    Where columns count from zero and joints from one, or the other way round, their numbers say nothing.
+    If columns count from zero and joints from one, or vice versa, numbers are not used.
     """
     found, unmatched = [], []
     for column in family:
@@ -216,7 +216,7 @@ def _matched(
 
 
 def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tuple[_Column, _Joint]]:
-    """Columns with joints that are called as their names, or the names in their rows, suggest."""
+    """Yield columns with joints named by their own names, or by names in their rows."""
     rank = 0
     for column in columns:
         label = None if column.entry is None else labels.get(column.entry)
@@ -238,13 +238,13 @@ def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tu
 
 
 def _is_no_joint(column: _Column) -> bool:
-    """Return whether a name speaks of a pose, as `tcp_pos_x`, or says no quantity."""
+    """Return whether a name indicates a pose, such as `tcp_pos_x`, or no quantity."""
     telling = [word for word in column.words if word not in GENERIC]
     return column.bare or any(word in AXES for word in telling) or bool(telling and set(telling) <= {*POSES})
 
 
 def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:
-    """Return the mapping of a column, and doubts about its unit."""
+    """Return the mapping of a column, and a remark if its unit is uncertain."""
     heading = rows.columns[column.place]
     own = split_heading(heading)[1]
     source = MappedColumn(column=rows.called(column.place), unit=own)

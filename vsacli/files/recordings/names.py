@@ -1,4 +1,4 @@
-"""Names of columns compared with names of joints: equal but for case, separators and common words."""
+"""Comparison of column names with joint names, regardless of case, separators and common words."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ GENERIC = (
         "n",
     ),
 )
-"""Words in names of columns that say nothing of which joint it is."""
+"""Words in column names that do not help to identify the joint."""
 
 OF_JOINTS = ("joint", "joints", "axis", "field", "deg", "degree", "degrees", "rad", "mm", "m")
-"""Words that a name without a word for a quantity may have: others, as in `current_1`, are quantities."""
+"""Words allowed in a name without a word for a quantity; others, as in `current_1`, indicate a quantity."""
 
 AXES = ("x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "tcp", "ee", "pose", "cartesian")
-"""Words of which one is enough for a name to speak of a pose, and of no joint."""
+"""Words each of which indicates that a name refers to a pose and not to a joint."""
 
 POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "orientation")
-"""Words that do so if a name has no others; joints of legs and wrists are called by some of them, too."""
+"""Words that do so only if a name has no others, since joints of legs and wrists have such names, too."""
 
 
 def words_of(name: str) -> tuple[str, ...]:
@@ -67,11 +67,11 @@ def words_of(name: str) -> tuple[str, ...]:
 
 
 class Match(NamedTuple):
-    """A joint whose name stands in that of a column.
+    """A joint whose name was found in that of a column.
 
     Attributes:
-        joint: its name.
-        whole: whether all of its name is there, not only the part that distinguishes it from other joints.
+        joint: name of the joint.
+        whole: whether the whole name was found, not only the part that distinguishes it from other joints.
     """
 
     joint: str
@@ -79,10 +79,10 @@ class Match(NamedTuple):
 
 
 class JointNames:
-    """The names of the joints of a robot, to be found in names of columns.
+    """The joint names of a robot, to be found in column names.
 
     Args:
-        names: base to tip.
+        names: joint names, base to tip.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -103,7 +103,7 @@ class JointNames:
         return None
 
     def called(self, words: Sequence[str]) -> str:
-        """Return the joint that a column is named after and nothing else; empty if it is called otherwise."""
+        """Return the joint whose name is the whole column name; empty if there is none."""
         rest = "".join(word for word in words if word not in OF_JOINTS)
         for name in self.names:
             own, core = self._words[name], self._cores[name]
@@ -113,7 +113,7 @@ class JointNames:
         return ""
 
     def _tells(self, core: Sequence[str], words: Sequence[str]) -> bool:
-        """Return whether the rest of a name is enough: a number alone only among words without meaning."""
+        """Return whether the distinguishing part suffices: a number alone only among generic words."""
         common = {word for own in self._words.values() for word in own}
         others = [word for word in words if word not in core]
         return not all(word.isdecimal() for word in core) or all(
@@ -122,8 +122,8 @@ class JointNames:
 
 
 def _common(names: Sequence[Sequence[str]]) -> tuple[int, int]:
-    """Return how many words all names have in common at their beginning, and at their end."""
-    if len(names) < 2:  # a single one would have nothing left
+    """Return the numbers of words common to all names at their beginning, and at their end."""
+    if len(names) < 2:  # a single name would be common to all
         return 0, 0
     shortest = min(map(len, names))
     first = next((at for at in range(shortest) if len({words[at] for words in names}) > 1), shortest)

@@ -1,4 +1,4 @@
-"""Description of a CSV file from elsewhere: columns, rate, health, and a mapping to begin with."""
+"""Description of a foreign CSV file: columns, rate, faults, and a proposed mapping of its columns."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ from vsacli.trajectory.recorded.recording import NEEDED
 from vsacli.trajectory.recorded.stamps import stamp_faults
 
 TOGETHER = 16
-"""Columns that are read at a time: a million rows of them take 128 MB, however wide the table is."""
+"""Columns read at a time: a million rows of them take 128 MB, however many columns the table has."""
 
 AS_WRITTEN = "-"
-"""Stands for a unit where numbers are shown as written."""
+"""Placeholder unit of numbers that are shown as written."""
 
 JITTERS = "jitters"
-"""Beginning of the fault of stamps that equal steps would fix."""
+"""Beginning of the message on stamps for which a rate would help."""
 
 FEWEST_ROWS = 10
-"""Numbers of a column below which nothing is said of its health."""
+"""Minimum number of values of a column to be checked for faults."""
 
 
 def describe_recording(
@@ -58,16 +58,16 @@ def describe_recording(
     progress: Progress = unseen,
     rate: float | None = None,
 ) -> dict[str, Any]:
-    """Return the content of a CSV file, with columns of any names, as JSON values.
+    """Describe a CSV file with any column names as JSON values.
 
     Args:
-        path: the file.
-        robot: that was recorded, to whose joints columns are assigned.
-        progress: opens a bar over the numbers that are looked at.
-        rate: rows per second, of a file without times.
+        path: path of the file.
+        robot: robot that was recorded, to whose joints columns are assigned.
+        progress: opens a progress bar over the bytes of the file.
+        rate: rows per second of a file without times.
 
     Raises:
-        InputError: it is no table, or has times although a rate is given.
+        InputError: the file is not a table, or has times although a rate is given.
     """
     rows = read_first_rows(path)
     joint_names = robot.joint_names if robot else ()
@@ -101,7 +101,7 @@ def describe_recording(
 
 
 def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
-    """Return a comment on the rate of the trajectory where one is needed, or of use."""
+    """Return a comment on the rate in the proposed trajectory if it is required or useful."""
     if time is None:
         return ["# rate: ...  # rows per second: no column holds times"]
     if jittering:
@@ -112,7 +112,7 @@ def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
 def _trajectory(
     file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a trajectory file that takes the positions from the recording."""
+    """Yield a trajectory file with the positions of the recording."""
     yield f"format: {trajectory_file.FORMAT}"
     yield "name: recorded"
     yield from rate
@@ -136,14 +136,14 @@ def _trajectory(
 
 
 class _Survey:
-    """All rows of the columns of numbers, a few columns at a time.
+    """Findings on all rows, read a few columns at a time.
 
     Attributes:
-        rows: how many there are.
-        time: findings on the stamps; None without any.
-        columns: findings on each.
-        warnings: on their health.
-        rate: 1/s, in a few digits; empty unless stamps jitter.
+        rows: number of rows.
+        time: findings on the stamps; None without stamps.
+        columns: findings on each column.
+        warnings: faults of stamps and signals.
+        rate: rate in few digits, 1/s; empty unless stamps jitter.
     """
 
     def __init__(
@@ -216,9 +216,10 @@ class _Survey:
                 self._judge(place, stamps[there], values[there], table, np.flatnonzero(there))
 
     def _stamps(self, table: Table, signal: int | None) -> FloatArray | None:
-        """Times of the rows, s; None if they do not increase.
+        """Return the times of the rows, s; None if they do not increase.
 
-        Described at the first look, in the rows in which a signal has numbers: others are of another topic.
+        At the first call they are described, over the rows in which a signal has numbers, since others are of
+        another topic.
         """
         at = next((i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME), None)
         if at is None:
@@ -272,12 +273,12 @@ class _Survey:
 
 
 def _counts(values: FloatArray) -> bool:
-    """Return whether these are whole numbers that never fall, as of a counter: no signal of a sensor."""
+    """Return whether values are whole numbers that never decrease, as of a counter rather than a sensor."""
     return bool(np.all(values == np.round(values)) and np.all(np.diff(values) >= 0))
 
 
 def is_trajectory(path: str, robot: Robot) -> bool:
-    """Return whether the columns of a CSV file are, by their names, a trajectory of a robot."""
+    """Return whether a CSV file has, by their names, the columns of a trajectory of a robot."""
     try:
         column_layout(read_header(path).columns, CommandedJoints.of(robot), NEEDED, path)
     except InputError:

@@ -1,4 +1,4 @@
-"""A recording as text: its description, and a mapping of its columns in YAML with comments on guesses."""
+"""A recording as text: its description, and a YAML mapping of its columns with comments on guesses."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ COMMENTED = {
     "dq": "measured; a fit of the positions mostly gives a better one",
     "tau_motor_1": "for compare and identify, if it is what motor 1 gives on the joint side of its gear",
 }
-"""Why a column is not proposed but shown."""
+"""Reasons for which columns of a quantity are only shown in comments."""
 
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 
 
 def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
-    """Yield rows and rate, the columns, their faults, and a mapping to paste."""
+    """Yield lines with rows and rate, the columns, their faults, and a proposed trajectory file."""
     time = recording["time"]
     yield f"recording {recording['name']}: {recording['rows']} rows{_timing(time)}"
     yield from aligned([("column", "number", "holds", "smallest", "largest"), *_columns(recording)])
@@ -76,11 +76,11 @@ def mapping_lines(
     """Yield the keys `columns` and `ignore`.
 
     Args:
-        time: the stamps.
-        guesses: possible meanings of the columns.
-        joint_names: of the robot, empty if it is not known.
+        time: column of stamps, if there is one.
+        guesses: likely meanings of the columns.
+        joint_names: joints of the robot, empty if unknown.
         leaves_out: whether there are further columns.
-        rate: rows per second, which is said in place of times.
+        rate: rows per second, in place of times.
     """
     times = [] if rate is not None else _time(time)
     lines = [*times, *_unknown(guesses, joint_names), *map(_entry, guesses)]
@@ -100,7 +100,7 @@ def _time(time: TimeColumn | None) -> Iterator[tuple[str, str]]:
 
 
 def _unknown(guesses: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Joints whose positions no column's name speaks of."""
+    """Yield commented entries for joints without a column of positions."""
     found = {guess.name for guess in guesses}
     for joint in joint_names or ([] if found else ["<joint>"]):
         if f"{joint}.q" not in found:

@@ -1,1 +1,1 @@
-"""Charts, declared once: which curves, bands, limits and titles there are. Figures and pages draw them."""
+"""Charts, declared once with their curves, bands, limits and titles; figures and pages draw them."""

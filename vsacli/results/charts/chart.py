@@ -1,7 +1,7 @@
-"""A chart: curves over time with their bands, bounds and interruptions; and sheets of charts.
+"""A chart: curves over time with their bands, bounds and gaps; and sheets of charts.
 
-Charts hold arrays and words, no colors: a curve has a number from which figures and pages derive its look.
-A page shows charts one by one, a figure as the panels of a sheet, in blocks side by side.
+Charts contain arrays and words, no colors: figures and pages derive the appearance of a curve from its
+number. A page shows charts one by one; a figure shows them as panels of a sheet, in blocks side by side.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from vsacli.results.charts.reduction import Curve
 from vsacli.results.store.reader import StoredResult
 
 PANEL_WIDTH = 3.0
-"""Inches: with fonts of 10 pt, two panels side by side stay readable in one column of a paper."""
+"""Width of a panel, inches: with fonts of 10 pt, two panels side by side stay readable in a column of a
+paper."""
 
 DIFFERENCE = -1
-"""Look of one curve minus another, which is neither of them."""
+"""Look of the difference of two curves, distinct from the looks of both."""
 
 REACHABLE, UNCERTAIN = "reachable", "two standard deviations"
 """Meanings of bands."""
 
 DEVIATIONS = 2
-"""Standard deviations on each side of a curve that its band holds."""
+"""Half-width of the band around a curve, in standard deviations."""
 
 
 class Band(NamedTuple):
-    """Area around a curve: times, lower and upper edge, each (points,), and its number in figures."""
+    """Area around a curve: times, lower and upper edge, each (points,), and number of its look in figures."""
 
     time: FloatArray
     low: FloatArray
@@ -42,7 +43,7 @@ class Band(NamedTuple):
 
     @classmethod
     def around(cls, curve: Curve, deviation: FloatArray, look: int) -> Band | None:
-        """Return the band of a curve with a standard deviation, (points,); None if that is NaN throughout."""
+        """Return the band of a curve for a standard deviation, (points,); None if that is NaN throughout."""
         if np.isnan(deviation).all():
             return None
         spread = DEVIATIONS * deviation
@@ -53,15 +54,15 @@ class Line(NamedTuple):
     """A curve of a chart.
 
     Attributes:
-        curve: its points.
-        look: number of color and stroke in figures, or `DIFFERENCE`.
+        curve: points of the curve.
+        look: number of color and dashes in figures, or `DIFFERENCE`.
         label: name of the joint or of the component of a wrench.
-        colour: number of its color on pages.
-        joint: number of the joint; None if it is of none.
+        colour: number of the color on pages.
+        joint: number of the joint, from 0; None if the curve belongs to no joint.
         file: number of the file, from 0.
         role: "computed", "commanded", "actual" or "measured".
-        band: area around it, if there is one.
-        rms: root mean square of a difference; None of anything else.
+        band: area around the curve, if there is one.
+        rms: root mean square of a difference; None for other curves.
     """
 
     curve: Curve
@@ -76,7 +77,7 @@ class Line(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A bound of the curve of a joint; `look` is its number in figures."""
+    """A bound of the curve of a joint; `look` is the number of its look in figures."""
 
     look: int
     joint: int
@@ -85,12 +86,13 @@ class Limit(NamedTuple):
 
 @dataclass(frozen=True)
 class Failures:
-    """Samples that cannot be executed, or nearly so.
+    """Samples that cannot be executed, or are near-singular.
 
     Attributes:
-        time: (samples,), s.
-        infeasible, singular: (joints, samples).
-        near_singular: feasible, but quantities that grow without bound are large, (joints, samples).
+        time: times, (samples,), s.
+        infeasible, singular: flags, (joints, samples).
+        near_singular: flags of feasible samples near a singularity, where some quantities become very large,
+            (joints, samples).
     """
 
     time: FloatArray
@@ -100,7 +102,7 @@ class Failures:
 
     @classmethod
     def of(cls, result: StoredResult) -> Failures:
-        """Return the failures a result has flagged; none if it was stored without flags."""
+        """Return the failures flagged in a result; none if it was stored without flags."""
         time = result.time
         if "flags" not in result.variables:
             none = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
@@ -109,12 +111,12 @@ class Failures:
         return cls(time, *(has(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR)))
 
     def among(self, joints: Sequence[int]) -> tuple[BoolArray, BoolArray]:
-        """Return which samples are infeasible, and which singular, for any of these joints; (samples,)."""
+        """Return where any of these joints is infeasible, and where any is singular; each (samples,)."""
         chosen = list(joints)
         return np.any(self.infeasible[chosen], axis=0), np.any(self.singular[chosen], axis=0)
 
     def calm(self, joint: int, time: FloatArray) -> BoolArray:
-        """Return at which of these times, (points,), a joint is near-singular neither before nor after."""
+        """Return where a joint is not near-singular at the samples next to these times; (points,)."""
         last = self.time.size - 1
         before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, last)
         after = np.minimum(np.searchsorted(self.time, time), last)
@@ -128,18 +130,18 @@ class Chart:
     """A plot over time.
 
     Attributes:
-        title: in words; empty for none.
-        unit: of its values.
-        lines: its curves.
-        axis: label of the axis of values in figures; empty for none.
-        name: of the variable, as in the file.
-        limits: bounds that are finite.
-        shown: range of the axis of values at first; None for all curves.
-        cut_off: whether peaks of near-singular samples lie beyond that.
+        title: title in words; empty for none.
+        unit: unit of the values.
+        lines: curves of the chart.
+        axis: label of the value axis in figures; empty for none.
+        name: name of the variable in the file.
+        limits: finite bounds.
+        shown: initial range of the value axis; None for the range of all curves.
+        cut_off: whether peaks of near-singular samples exceed this range.
         band: meaning of the bands around curves.
-        from_zero: whether the axis of values begins at 0.
-        zero: whether a line marks 0, as of differences.
-        failures: samples to be shaded, each with the joints of which.
+        from_zero: whether the value axis begins at 0.
+        zero: whether a line marks 0, as for differences.
+        failures: failures to shade, each with the joints concerned.
     """
 
     title: str
@@ -163,15 +165,15 @@ Row: TypeAlias = Sequence[Chart | None]
 
 
 class Block(NamedTuple):
-    """Panels in rows and columns; those of a column share an axis of time.
+    """Panels in rows and columns; the panels of a column share a time axis.
 
     Attributes:
-        time: range of the axes of time, (2 or more,), s, ascending.
-        rows: charts from top to bottom, each row of equal length; None where there is none.
-        most_rows: groups of rows below each other before the next begins beside them; None for all.
-        heights: of the rows of a group, relative to each other.
-        beside: lines named at the right of each row; none if empty.
-        xlabel: label of the axis of time.
+        time: range of the time axes, (2 or more,), s, ascending.
+        rows: charts from top to bottom, in rows of equal length; None for an empty place.
+        most_rows: number of row groups before the next ones continue to the right; None for no limit.
+        heights: relative heights of the rows of a group.
+        beside: legends at the right of the rows; empty for none.
+        xlabel: label of the time axis.
     """
 
     time: FloatArray
@@ -183,7 +185,7 @@ class Block(NamedTuple):
 
     @property
     def folding(self) -> tuple[int, int]:
-        """Groups of rows below each other, and how often to begin beside them."""
+        """Number of row groups below each other, and number of such columns of groups."""
         groups = len(self.rows) // len(self.heights)
         return folding(groups, groups if self.most_rows is None else self.most_rows)
 
@@ -192,11 +194,11 @@ class Sheet(NamedTuple):
     """A figure before it is drawn.
 
     Attributes:
-        title: of the figure.
+        title: title of the figure.
         size: width and height, inches.
-        legend: lines that the legend names.
-        blocks: side by side.
-        widths: of the blocks, relative to each other.
+        legend: labels and looks of the legend.
+        blocks: blocks of panels, side by side.
+        widths: relative widths of the blocks.
     """
 
     title: str
@@ -207,6 +209,6 @@ class Sheet(NamedTuple):
 
 
 def folding(rows: int, most_rows: int) -> tuple[int, int]:
-    """Return how many rows stand below each other, and how often to begin beside them."""
+    """Return the number of rows below each other, and of columns into which the rows are folded."""
     folds = math.ceil(rows / most_rows)
     return math.ceil(rows / folds), folds

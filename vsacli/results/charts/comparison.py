@@ -1,7 +1,7 @@
-"""Several files of a kind on the same axes, and below by how much they differ from the first.
+"""Several files of a kind on the same axes, with their differences from the first file below.
 
-Files are compared if they are of one kind and of the same joints. By default results are compared by their
-motor torques and simulations by their position errors.
+Files can be compared if they are of one kind and have the same joints. By default, results are compared by
+their motor torques and simulations by their position errors.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from vsacli.results.store.reader import StoredResult
 
 
 def check_comparable(files: Sequence[StoredResult]) -> None:
-    """Refuse files that do not belong on the same axes.
+    """Refuse files that cannot share axes.
 
     Raises:
-        InputError: they are of different kinds, or have different joints.
+        InputError: the files are of different kinds, or have different joints.
     """
     if len({file.kind for file in files}) > 1:
         listed = ", ".join(f"{file.path} is a {file.kind}" for file in files)
@@ -52,7 +52,7 @@ def _joints(result: StoredResult) -> str:
 
 
 def distinct_labels(results: Sequence[StoredResult]) -> list[str]:
-    """Return the names of the trajectories; where two are equal, with the stem or the path of the file."""
+    """Return trajectory names; if some are equal, with the stem or the path of each file."""
     for label in _LABELS:
         labels = [label(result) for result in results]
         if len(set(labels)) == len(labels):
@@ -68,15 +68,15 @@ _LABELS: tuple[Callable[[StoredResult], str], ...] = (
 
 
 COMPARISON = "compare"
-"""Name of the figure; the file is called `<stem>-compare`."""
+"""Name of the figure, whose file is called `<stem>-compare`."""
 
 MOST_ROWS = 7
 HEIGHTS = (1.6, 0.9)
-"""Inches: of a panel, and of that below with the differences."""
+"""Heights of a panel and of the panel with the differences below it, inches."""
 
 
 class _Compared(NamedTuple):
-    """A variable that is compared, words for the title of the figure, and the label of its axes."""
+    """A variable to compare, its words in the figure's title, and the label of its axes."""
 
     variable: str
     title: str
@@ -87,11 +87,11 @@ _COMPARED = {
     "result": _Compared("tau_motor", "motor torques", r"$\tau_{motor}$"),
     "simulation": _Compared("q_error", "position errors", "$q - q_d$"),
 }
-"""Variables that are compared by default: of results after Fig. 4 of Buondonno & De Luca (2016)."""
+"""Variables compared by default; for results as in Fig. 4 of Buondonno & De Luca (2016)."""
 
 
 def comparison_names(variables: Sequence[str] | None) -> list[str]:
-    """Return the names of the figures that compare these variables, or the default figures."""
+    """Return the names of the figures that compare these variables, or of the default figure."""
     return [COMPARISON] if variables is None else [f"{COMPARISON}-{variable}" for variable in variables]
 
 
@@ -101,15 +101,15 @@ def comparison_sheets(
     """Overlay results, or simulations, of the same joints: a row of panels per joint, a column per curve.
 
     Args:
-        files: open, all of a kind.
-        variables: names of those to compare, by default one that depends on the kind.
+        files: open files, all of one kind.
+        variables: names of the variables to compare; the default depends on the kind.
 
     Returns:
         The figures by name, see `comparison_names`.
 
     Raises:
-        InputError: the files are of different kinds or have different joints, or one was written without a
-            variable that is compared.
+        InputError: the files are of different kinds or have different joints, or a file was written without a
+            variable to compare.
     """
     check_comparable(files)
     if variables is None:
@@ -128,7 +128,7 @@ def comparison_sheets(
 
 
 def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
-    """Return the curves of all files for each joint, and below their differences from the first file."""
+    """Return the curves of all files for each joint, with their differences from the first file below."""
     there = charts.existing(charts.first.declared[compared.variable])
     there = there[:, : int(np.count_nonzero(np.any(there, axis=0)))]
     signals = charts.signals({compared.variable: "computed"}, uncertain=False)

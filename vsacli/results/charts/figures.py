@@ -1,6 +1,6 @@
-"""Figures of stored files, by name: results after Figs. 1-3 of Buondonno & De Luca (2016), simulations.
+"""Figures of stored files, by name: results as in Figs. 1-3 of Buondonno & De Luca (2016), and simulations.
 
-Joints of one unit share panels; many joints are split into groups, whose names stand beside the panels.
+Joints of one unit share panels; many joints are split into groups, with their names next to the panels.
 """
 
 from __future__ import annotations
@@ -23,36 +23,37 @@ from vsacli.results.store.reader import StoredResult
 JOINTS_PER_PANEL = 7
 
 GROUP_HEIGHT, LEGEND_WIDTH = 2.3, 1.3
-"""Inches; the latter is for names beside the panels of a group."""
+"""Height of the panels of a group, and width of the names next to them, inches."""
 
 NARROW_WIDTH, LOW_HEIGHT = 2.5, 1.4
-"""Inches: a stiffness panel where there are several columns of them, beside the positions."""
+"""Size of a stiffness panel next to the positions if there are several columns of them, inches."""
 
 CORRIDOR_HEIGHT, CORRIDOR_ROWS = 1.7, 5
-"""Inches, and panels below each other, of the figure of the stiffness alone."""
+"""Height of a panel, inches, and rows of panels in the figure of the stiffness alone."""
 
 MOTION_HEIGHT, MOTION_ROWS = 1.7, 7
-"""The same of the motion of a simulation."""
+"""Height of a panel, inches, and rows of panels in the figure of a simulated motion."""
 
 FEASIBILITY = "feasibility"
-"""Name of the figure of `check-feasibility`; its file is called `<stem>-feasibility`."""
+"""Name of the figure of `check-feasibility`, whose file is called `<stem>-feasibility`."""
 
 FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
-"""Variables of the figure."""
+"""Variables needed for that figure."""
 
 Part: TypeAlias = tuple[str, str]
-"""A variable and the label of its axis; `{force}` moves the joint, `{motor}` numbers the motor."""
+"""A variable and the label of its axis; `{force}` becomes force or torque, `{motor}` the number of the
+motor."""
 
 
 class Drawing(NamedTuple):
-    """A figure: the variables that it needs, and the function that declares it."""
+    """A figure: the variables that it needs, and the function that declares its sheet."""
 
     needs: tuple[str, ...]
     sheet: Callable[[StoredCharts], Sheet]
 
 
 def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
-    """Return the joints that share a panel: of one type, hence one unit, evenly split where they are many."""
+    """Return the joints that share a panel: of one type and thus one unit; large groups are split evenly."""
     groups: list[list[int]] = []
     for joint_type in dict.fromkeys(joint_types):
         joints = [joint for joint, other in enumerate(joint_types) if other == joint_type]
@@ -62,19 +63,19 @@ def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
 
 
 def result_title(result: StoredResult) -> str:
-    """Robot and trajectory, once if they are called alike, and where an incomplete run ended."""
+    """Return robot and trajectory, once if their names are equal, and the end of an incomplete run."""
     ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
     return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
 
 
 def axis_label(words: str, unit: str, joint_type: str, column: int) -> str:
-    """Return the label of an axis of a `Part`."""
+    """Return the axis label of a `Part`."""
     force = "force" if joint_type == "prismatic" else "torque"
     return f"{words.format(force=force, motor=MOTORS[column])} [{unit}]"
 
 
 def variable_words(variable: Variable) -> str:
-    """Return the label of a variable without words of its own."""
+    """Return the axis label of a variable that has no label in words."""
     return f"{variable.name}_{{motor}}" if "motor" in variable.dims else variable.name
 
 
@@ -93,7 +94,7 @@ def _of_parts(*parts: Part) -> Drawing:
 
 
 def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
-    """Return a row of panels for each group of joints that have a variable."""
+    """Return a row of panels for each group of joints with the variable."""
     name, words = part
     there = charts.existing(charts.first.declared[name])
     groups = [group for group in panel_groups(charts.first.joint_types) if there[group].any()]
@@ -114,12 +115,12 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
 
 
 def legend_width(charts: StoredCharts) -> float:
-    """Inches that names take beside the panels: where one legend would be too long to find a joint in it."""
+    """Return the width of names next to the panels, inches; 0 for few joints, which one legend names."""
     return LEGEND_WIDTH if len(charts.first.joint_names) > JOINTS_PER_PANEL else 0.0
 
 
 def _legend(charts: StoredCharts) -> dict[str, int]:
-    """Return the joints, unless they are named beside the panels."""
+    """Return the legend of the joints; empty if their names are next to the panels."""
     return {} if legend_width(charts) else {name: at for at, name in enumerate(charts.first.joint_names)}
 
 
@@ -141,17 +142,17 @@ def feasibility(charts: StoredCharts) -> Sheet:
 
 
 def check_drawable(actuators: Sequence[str]) -> None:
-    """Refuse a robot whose joints, by the types of their actuators, have no stiffness to draw.
+    """Refuse a robot without stiffness to draw, by the actuator types of its joints.
 
     Raises:
-        InputError: they have not.
+        InputError: all joints are rigid.
     """
     if not compliant_joints(actuators):
         raise InputError.one("there is no stiffness to plot: all joints are rigid")
 
 
 def _motion(charts: StoredCharts) -> Sheet:
-    """Fig. 1: positions at the left, stiffness at the right if any joint has one."""
+    """Return Fig. 1: positions at the left; at the right the stiffness, if any joint has one."""
     part = ("q", "joint position $q$")
     if not charts.compliant:
         return grouped(charts, part)
@@ -173,7 +174,7 @@ _PARTS: dict[str, tuple[Part, ...]] = {
     "motor-current": (("current", "current of motor {motor}, $i_{motor}$"),),
     "motor-voltage": (("voltage", "voltage of motor {motor}, $u_{motor}$"),),
 }
-"""The figures of a result beside its motion; Figs. 2 and 3 are the first two."""
+"""Figures of a result in addition to its motion; the first two are Figs. 2 and 3."""
 
 _OF_SIMULATIONS: dict[str, Part] = {
     "position-error": ("q_error", "position error $q - q_d$"),
@@ -185,13 +186,13 @@ _OF_SIMULATIONS: dict[str, Part] = {
 }
 
 _FOLLOWED = {"q": "$q$", "stiffness": r"$\sigma$"}
-"""Commanded variables of simulations, a column of panels each, with the axis label."""
+"""Commanded variables of simulations, with axis label; each has a column of panels."""
 
 _ROLES = {"commanded": 0, "actual": 1}
 
 
 def _energy(charts: StoredCharts) -> Sheet:
-    """Return the energy in the springs at the left, if there are any; the work of each motor beside it."""
+    """Return the energy in the springs, if there are any, and the work of each motor at its right."""
     parts = _PARTS["energy"] if charts.compliant else _PARTS["energy"][1:]
     return grouped(charts, *parts)
 
@@ -228,11 +229,11 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
     **{name: _of_parts(*parts) for name, parts in _PARTS.items()},
     "energy": Drawing(tuple(name for name, _ in _PARTS["energy"]), _energy),
 }
-"""The figures of a result of `invdyn`, by name."""
+"""Figures of a result of `invdyn`, by name."""
 
 
 def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
-    """Return the figures of a result of a robot that has the variables that they need."""
+    """Return the figures whose variables the results of a robot have."""
     return {
         name: drawing
         for name, drawing in RESULT_DRAWINGS.items()
@@ -241,7 +242,7 @@ def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
 
 
 def simulation_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
-    """Return the figures of a simulation of a robot one of whose joints has the variables they show."""
+    """Return the figures of a simulation whose variables at least one joint has."""
     return {
         "motion": Drawing((*_FOLLOWED, *map(actual, _FOLLOWED)), _simulated_motion),
         **{
@@ -253,7 +254,7 @@ def simulation_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
 
 
 def drawings_of(stored: StoredResult) -> dict[str, Drawing]:
-    """Return the figures that a file of its kind has, by name."""
+    """Return the figures of a file by name, according to its kind."""
     if stored.kind == "simulation":
         return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
     return result_drawings(stored.has)
@@ -265,7 +266,7 @@ def drawable_figures(
     """Return the names of the figures that can be drawn from these variables.
 
     Raises:
-        InputError: there is none; `path` is the file it names.
+        InputError: no figure can be drawn; with the file `path`.
     """
     omitted = omitted_figures(drawings, variables)
     if len(omitted) == len(drawings):
@@ -284,16 +285,16 @@ def omitted_figures(drawings: Mapping[str, Drawing], variables: Collection[str])
 
 
 def missing_variables(figure: str, variables: Sequence[str]) -> str:
-    """Return the sentence for a figure that cannot be drawn."""
+    """Return the message for a figure that cannot be drawn."""
     needed = " and ".join(variables)
     return f"figure {figure} needs {needed}, which this result was written without (--variables)"
 
 
 def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> list[str]:
-    """Return the names of the figures that can be drawn: of these variables, or else those that files have.
+    """Return the names of the figures of these variables, or of all default figures that can be drawn.
 
     Raises:
-        InputError: there is no curve of one of the variables, or of none if they are not asked for.
+        InputError: a variable has no curve, or no default figure can be drawn.
     """
     if variables is None:
         return drawable_figures(drawings_of(stored), stored.variables, stored.path)
@@ -301,7 +302,7 @@ def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> lis
 
 
 def sheets_of(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Sheet]]:
-    """Yield the chosen figures by name, each declared when it is asked for: its curves take memory."""
+    """Yield the chosen figures by name; each is declared only when needed, since its curves take memory."""
     charts, drawings = StoredCharts([stored]), drawings_of(stored)
     for name in chosen_figures(stored, variables):
         if variables is None:
@@ -312,10 +313,10 @@ def sheets_of(stored: StoredResult, variables: Sequence[str] | None = None) -> I
 
 
 def drawable_variables(result: StoredResult, names: Sequence[str]) -> tuple[Variable, ...]:
-    """Return the variables of these names, in declared order.
+    """Return the variables with these names, in declared order.
 
     Raises:
-        InputError: for each of which there is no curve, why.
+        InputError: with the reason for each variable without a curve.
     """
     selected = select_variables(names, result.declared)
     reasons = [reason for variable in selected if (reason := _undrawable(result, variable))]
@@ -325,7 +326,7 @@ def drawable_variables(result: StoredResult, names: Sequence[str]) -> tuple[Vari
 
 
 def _undrawable(result: StoredResult, variable: Variable) -> str:
-    """Return why there is no curve of a variable; nothing if there is one."""
+    """Return why a variable has no curve; empty if it has one."""
     name = variable.name
     if name == "flags":
         return "flags are bits, no curve; where steps cannot be done, figures of other variables have bands"

@@ -1,4 +1,4 @@
-"""Charts of measured signals over computed ones, and the curves of recorded signals and their splines."""
+"""Charts of measured against computed signals, and the curves of recorded signals and their splines."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from vsacli.results.charts.reduction import Curve
 
 MOST_ROWS = 8
 ROW_HEIGHT = 1.6
-"""Inches."""
+"""Height of a row of panels, inches."""
 
 
 class MeasuredCurve(NamedTuple):
-    """A signal as it was measured and computed.
+    """A signal, measured and computed.
 
     Attributes:
-        name: of the signal.
-        unit: of its values.
-        rms: root mean square of measured minus computed.
-        time: (samples,), s.
-        computed, measured: (samples,).
+        name: name of the signal.
+        unit: unit of the values.
+        rms: root mean square of measured minus computed values.
+        time: times, (samples,), s.
+        computed, measured: values, (samples,).
     """
 
     name: str
@@ -36,10 +36,10 @@ class MeasuredCurve(NamedTuple):
     measured: FloatArray
 
     def charts(self, computed: str = "computed") -> tuple[Chart, Chart]:
-        """Return measured over computed values, and measured minus computed ones.
+        """Return measured and computed values in one chart, and measured minus computed values in another.
 
         Args:
-            computed: name of the curve that is compared with the measured one.
+            computed: label of the curve compared with the measured one.
         """
         over = [
             Line(Curve.reduced(self.time, values), look, label, look, role=role)
@@ -66,15 +66,15 @@ def measured_sheet(curves: Sequence[MeasuredCurve], title: str) -> Sheet:
 
 
 class Spectrum(NamedTuple):
-    """Amplitude densities of a recording, in its unit per root of Hz.
+    """Amplitude densities of a recording, in its unit per square root of Hz.
 
     Attributes:
-        frequencies: centers of bands, (bands,), Hz.
-        recorded: of the samples, (bands,).
-        fitted: of the spline at the same times, (bands,).
-        noise: of white noise as large as the report states; 0 if it states none.
+        frequencies: center frequencies of bands, (bands,), Hz.
+        recorded: density of the samples, (bands,).
+        fitted: density of the spline at the same times, (bands,).
+        noise: density of white noise of the reported size; 0 if none is reported.
         cutoff: frequency up to which the spline follows the samples, Hz; NaN if it follows all of them.
-        above: frequency above which noise that a filter made smooth prevails, Hz; NaN if there is none.
+        above: frequency above which low-pass filtered noise dominates, Hz; NaN if there is none.
     """
 
     frequencies: FloatArray
@@ -89,10 +89,11 @@ class Highest(NamedTuple):
     """The highest derivative of a signal that is needed.
 
     Attributes:
-        name: such as "d4q".
-        unit: of its values.
-        order: of the derivative.
-        deviation: of its values over their root mean square, as the report states it; NaN if it does not.
+        name: name of the derivative, such as "d4q".
+        unit: unit of the values.
+        order: order of the derivative.
+        deviation: reported standard deviation, relative to the root mean square of the values; NaN if not
+            reported.
     """
 
     name: str
@@ -105,18 +106,18 @@ class RecordedCurve(NamedTuple):
     """A component of a recorded signal.
 
     Attributes:
-        name: of the component, such as elbow.q.
-        unit: of its values.
-        fit: the kind of spline in a few words.
-        knots: of the spline.
-        recorded: the samples.
-        fitted: the spline between the same times.
+        name: name of the component, such as elbow.q.
+        unit: unit of the values.
+        fit: short description of the kind of spline.
+        knots: number of knots of the spline.
+        recorded: curve of the samples.
+        fitted: curve of the spline over the same time.
         residual: samples minus spline.
         rms: root mean square of the residual.
-        noise: standard deviation of a sample, as the report states it.
-        inside: times between which the derivatives of the spline can be relied on, s.
-        spectrum: of samples and spline.
-        highest: the highest derivative that is needed.
+        noise: reported standard deviation of a sample.
+        inside: times between which the derivatives of the spline are reliable, s.
+        spectrum: spectra of samples and spline.
+        highest: highest derivative that is needed.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Charts of the changes by an optimization, and of motor torques within the tolerances of a robot."""
+"""Charts of optimized motions before and after, and of motor torques within the tolerances of a robot."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from vsacli.results.charts.reduction import Curve, visible_range
 
 MOST_ROWS = 6
 ROW_HEIGHT, PACE_HEIGHT = 1.7, 3.0
-"""Inches."""
+"""Heights of panels, inches."""
 
 BEFORE, AFTER, UNIFORM = 1, 0, 3
-"""Line styles: the optimum is the solid line."""
+"""Looks of lines; the optimum is the solid line."""
 
 PATH = f"place on the path, as the time at which it was commanded [{TIME}]"
 
 
 class Moved(NamedTuple):
-    """Motion of a joint; all (samples,), torques (motors, samples).
+    """Motion of a joint; all arrays (samples,), torques (motors, samples).
 
     Attributes:
-        place: on the path, or the time.
-        stiffness: NaN throughout if the joint has none to choose.
-        lower, upper: ends of its attainable range.
-        torques: of the motors.
+        place: position on the path, or time.
+        stiffness: stiffness; NaN throughout if it cannot be commanded.
+        lower, upper: minimum and maximum attainable stiffness.
+        torques: torques of the motors.
     """
 
     place: FloatArray
@@ -51,7 +51,7 @@ class Moved(NamedTuple):
     torques: FloatArray
 
     def stiffness_line(self, look: int) -> Line:
-        """Return the stiffness as a line, that of the optimum with its attainable range."""
+        """Return the stiffness as a line; at the optimum with its attainable range."""
         band = Band(self.place, self.lower, self.upper, look)
         there = look == AFTER and not np.isnan(self.lower).all()
         return Line(Curve.reduced(self.place, self.stiffness), look, band=band if there else None)
@@ -62,14 +62,14 @@ class Moved(NamedTuple):
 
 
 class JointChange(NamedTuple):
-    """A joint before and after.
+    """A joint before and after optimization.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         joint_type: revolute or prismatic.
-        before: as commanded.
-        after: at the optimum.
-        limits: of its motor torques, (2,), infinite if there are none.
+        before: motion as commanded.
+        after: motion at the optimum.
+        limits: bounds of the motor torques, (2,), infinite if there are none.
     """
 
     name: str
@@ -80,7 +80,7 @@ class JointChange(NamedTuple):
 
     @property
     def stiffness(self) -> Chart | None:
-        """The stiffness inside its attainable range; None if the joint has none to choose."""
+        """Chart of the stiffness within its attainable range; None if the stiffness cannot be commanded."""
         if not np.isfinite(self.after.stiffness).any():
             return None
         both = np.concatenate([self.before.stiffness, self.after.stiffness])
@@ -96,7 +96,7 @@ class JointChange(NamedTuple):
 
     @property
     def torques(self) -> Chart:
-        """The torques of all motors with their limits."""
+        """Chart of the torques of all motors with their limits."""
         unit = TORQUE.unit(self.joint_type)
         lines = [*self.before.torque_lines(BEFORE), *self.after.torque_lines(AFTER)]
         limits = [Limit(AFTER, 0, float(value)) for value in self.limits if np.isfinite(value)]
@@ -107,9 +107,9 @@ def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool)
     """Return a figure with a row of panels for each joint: stiffness and motor torques.
 
     Args:
-        joints: before and after.
-        title: of the figure.
-        along_path: whether places are on the path, rather than times.
+        joints: motions before and after.
+        title: title of the figure.
+        along_path: whether places are positions on the path instead of times.
     """
     rows, folds = folding(len(joints), MOST_ROWS)
     panels = [[joint.stiffness, joint.torques] for joint in joints]
@@ -126,10 +126,10 @@ def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str)
     """Return the figure of the speed along the path at the optimum.
 
     Args:
-        place: on the path, (samples,), s as commanded.
-        speed: there, relative to the motion as commanded, (samples,).
-        uniform: that of the fastest motion that is sped up as a whole; NaN if it does not matter.
-        title: of the figure.
+        place: position on the path, (samples,), s as commanded.
+        speed: speed there relative to the commanded motion, (samples,).
+        uniform: relative speed of the fastest uniformly scaled motion; NaN if unknown.
+        title: title of the figure.
     """
     ends = place[[0, -1]]
     lines, legend = [Line(Curve.reduced(place, speed), AFTER)], {"optimum": AFTER}
@@ -142,7 +142,7 @@ def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str)
 
 
 class Torque(NamedTuple):
-    """Torque of a motor over time, with its standard deviation; all (samples,)."""
+    """Torque of a motor over time, with its standard deviation; arrays (samples,)."""
 
     joint: str
     joint_type: str
@@ -151,7 +151,7 @@ class Torque(NamedTuple):
     deviation: FloatArray
 
     def chart(self, time: FloatArray) -> Chart:
-        """Return the torque with its band, all of which the axis holds."""
+        """Return the torque with its band, both entirely within the range of the axis."""
         curve, spread = Curve(time, self.values), DEVIATIONS * self.deviation
         low, high = np.nanmin(self.values - spread), np.nanmax(self.values + spread)
         room = 0.05 * (high - low) or 1.0

@@ -1,9 +1,9 @@
-"""Reduction of long runs to visible detail: curves, their envelopes, stretches of samples, ranges of axes.
+"""Reduction of long runs to visible detail: curves, envelopes, marked intervals, and ranges of axes.
 
-Figures and pages show the same reduction, so that a peak of one sample is seen everywhere. A run is divided
-into columns of equal time, as wide as a pixel; each keeps its first and last sample, its extremes and a gap.
-Ranges of axes follow from the parts that have to be seen: attainable stiffness near the command, and
-    everything but the peaks of nearly singular samples.
+Figures and pages show the same reduction, so that a peak of one sample is visible everywhere. A run is
+divided into columns of equal time, one pixel wide; each keeps its first and last sample, its extremes and a
+gap. Ranges of axes are chosen for the relevant parts: attainable stiffness near the command, and everything
+except peaks of near-singular samples.
 """
 
 from __future__ import annotations
@@ -18,28 +18,29 @@ from vsacli.base.arrays import BoolArray, FlagArray, FloatArray, IndexArray, by_
 from vsacli.base.simulation_variables import actual
 
 COLUMNS = 1200
-"""Intervals of time that a long run is divided into: one pixel column each of a 4 inch panel at 300 dpi."""
+"""Time intervals into which a long run is divided: one pixel column each of a 4 inch panel at 300 dpi."""
 
 FULL_DETAIL = 2 * COLUMNS
-"""Runs of up to this many samples are drawn as they are."""
+"""Largest number of samples drawn without reduction."""
 
 WIDE_COLUMNS = 200
-"""Intervals of which an envelope is drawn: each is about as wide as a line in a panel of 3 inches."""
+"""Time intervals of an envelope, each about as wide as a line in a panel of 3 inches."""
 
 RESTLESS = 3.0
-"""Range of the samples of such an interval, over the step of their mean to the next, from which on an
-envelope is drawn. A curve that rises or falls has 1, and so has a wave of which 100 fill a panel, whose line
-still reads; one of which 300 do, a blot, 5; noise 4 with four samples in an interval, and more with more."""
+"""Smallest ratio of the range of samples in such an interval to the step of their mean to the next interval
+for which an envelope is drawn. The ratio is 1 for a monotone curve, and for a wave with 100 periods in a
+panel, whose line is still readable; 5 with 300 periods, a blot; 4 for noise with four samples in an interval,
+and more with more samples."""
 
 SEEN_SHARE = 0.01
-"""Share of the height of a panel that the width of a line takes."""
+"""Width of a line as a fraction of the height of a panel."""
 
 BLOCK = 65536
-"""Samples read at once, about."""
+"""Approximate number of samples read at once."""
 
 
 class Sampled(Protocol):
-    """An object that holds variables over time, as a result file does."""
+    """An object with variables over time, such as a result file."""
 
     @property
     def time(self) -> FloatArray:
@@ -47,18 +48,18 @@ class Sampled(Protocol):
 
     @property
     def joint_names(self) -> Sequence[str]:
-        """Names of the joints, or of whatever else the second axis of its variables runs over."""
+        """Names of the joints, or of the other objects along the second axis of the variables."""
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
-        """Samples start..stop-1 of a variable, (samples, joints) or (samples, joints, 2)."""
+        """Return samples start..stop-1 of a variable, (samples, joints) or (samples, joints, 2)."""
 
 
 class Envelope(NamedTuple):
     """Mean and extremes of the samples of each column.
 
     Attributes:
-        time: of the middle of each column, (columns,), s.
-        mean, low, high: of its samples, (..., columns); NaN if one of them is.
+        time: centers of the columns, (columns,), s.
+        mean, low, high: mean and extremes, (..., columns); NaN if a sample is NaN.
     """
 
     time: FloatArray
@@ -72,9 +73,9 @@ class Envelope(NamedTuple):
         return cls(time, values, values, values).joined(starts)
 
     def joined(self, starts: IndexArray) -> Envelope:
-        """Return the envelope with fewer columns, which begin at these."""
+        """Return an envelope with fewer columns, which begin at these columns."""
         ends = np.append(starts[1:], self.time.size) - 1
-        with np.errstate(invalid="ignore"):  # means of infinities
+        with np.errstate(invalid="ignore"):  # mean of infinities of both signs
             mean = np.add.reduceat(self.mean, starts, axis=-1) / (ends - starts + 1)
         low = np.minimum.reduceat(self.low, starts, axis=-1)
         high = np.maximum.reduceat(self.high, starts, axis=-1)
@@ -82,15 +83,15 @@ class Envelope(NamedTuple):
 
     @property
     def restless(self) -> bool:
-        """Whether a line through all samples of the one curve would be a blot, as of noise.
+        """Whether a line through all samples of the single curve would be a blot, as for noise.
 
-        Its samples go up and down within a column much more than from column to column, and visibly.
+        This is so if the samples vary visibly within a column, and much more than from column to column.
         """
         whole = np.isfinite(self.mean)
         if np.count_nonzero(whole) < 2:
             return False
         high, low = self.high[whole], self.low[whole]
-        with np.errstate(over="ignore"):  # of a simulation that diverged
+        with np.errstate(over="ignore"):  # a simulation may have diverged
             steps = np.abs(np.diff(self.mean[whole]))
             visible = SEEN_SHARE * (high.max() - low.min())
             return bool(np.median(high - low) > max(visible, RESTLESS * np.median(steps)))
@@ -101,9 +102,9 @@ class Curve:
     """One curve.
 
     Attributes:
-        time: (points,), s, ascending.
-        values: (points,); NaN breaks the curve.
-        envelope: range of its samples, if a line through them would be a blot.
+        time: times, (points,), s, ascending.
+        values: values, (points,); NaN breaks the curve.
+        envelope: range of the samples, if a line through them would be a blot.
     """
 
     time: FloatArray
@@ -112,7 +113,7 @@ class Curve:
 
     @classmethod
     def reduced(cls, time: FloatArray, values: FloatArray) -> Curve:
-        """Return the visible part of a curve with all its samples, (samples,)."""
+        """Return the visible part of a curve given with all its samples, (samples,)."""
         starts = _starts(time)
         kept = kept_samples(values, starts)
         return Curves(time[kept], values[None, kept], Envelope.of(time, values[None], starts))[0]
@@ -123,9 +124,9 @@ class Curves:
     """Curves of one joint over common times.
 
     Attributes:
-        time: (points,), s, ascending.
-        values: (curves, points); NaN breaks a curve.
-        envelope: of all samples, which may be more than the points.
+        time: times, (points,), s, ascending.
+        values: values, (curves, points); NaN breaks a curve.
+        envelope: envelope of all samples, which may outnumber the points.
     """
 
     time: FloatArray
@@ -133,7 +134,7 @@ class Curves:
     envelope: Envelope
 
     def __getitem__(self, curve: int) -> Curve:
-        """One of them."""
+        """Return one of the curves."""
         time, *ranges = self.envelope
         columns = Envelope(time, *(each[curve] for each in ranges))
         wide = columns.joined(column_starts(time, WIDE_COLUMNS))
@@ -141,19 +142,19 @@ class Curves:
 
 
 def read_curves(result: Sampled, names: Sequence[str]) -> tuple[Curves, ...]:
-    """Read the curves of each joint: the variables in the order of `names`, a variable of motors as two."""
+    """Read the curves of each joint, in the order of `names`; a variable of motors has two curves."""
     time = result.time
     pieces = [_block_curves(result, names, time, bounds) for bounds in _blocks(_starts(time), time.size)]
     return tuple(_joined(of_joint) for of_joint in zip(*pieces, strict=True))
 
 
 def _starts(time: FloatArray) -> IndexArray:
-    """Return the first samples of the columns: those of a short run are a sample each."""
+    """Return the first sample of each column; in a short run each sample is a column."""
     return column_starts(time) if time.size > FULL_DETAIL else np.arange(time.size)
 
 
 def _blocks(starts: IndexArray, samples: int) -> list[IndexArray]:
-    """Divide the run: for each block, the first samples of its columns and the sample after its last."""
+    """Divide the run into blocks: first samples of their columns, and the sample after the last."""
     bounds = np.append(starts, samples)
     cuts = np.union1d(np.flatnonzero(np.diff(bounds // BLOCK)) + 1, bounds.size - 1)
     return [bounds[first : last + 1] for first, last in zip([0, *cuts[:-1]], cuts, strict=True)]
@@ -162,7 +163,7 @@ def _blocks(starts: IndexArray, samples: int) -> list[IndexArray]:
 def _block_curves(
     result: Sampled, names: Sequence[str], time: FloatArray, bounds: IndexArray
 ) -> list[Curves]:
-    """Reduce one block of each joint."""
+    """Reduce one block of samples, for each joint."""
     start, stop = int(bounds[0]), int(bounds[-1])
     shape = (len(result.joint_names), -1, stop - start)
     variables = [by_joint(result.read(name, start, stop)).reshape(shape) for name in names]
@@ -186,19 +187,19 @@ def _joined(pieces: Sequence[Curves]) -> Curves:
 
 
 def column_starts(time: FloatArray, columns: int = COLUMNS) -> IndexArray:
-    """Return the first sample of each of these equal intervals of time that hold any; ascending from 0."""
+    """Return the first sample of each of the equal time intervals that is not empty; ascending from 0."""
     edges = np.linspace(time[0], time[-1], columns + 1)[:-1]
     return np.unique(np.searchsorted(time, edges))
 
 
 def kept_samples(values: FloatArray, starts: IndexArray) -> IndexArray:
-    """Return ascending indices of the samples that draw the same line as all of them.
+    """Return ascending indices of the samples that draw the same line as all samples.
 
-    From each column the first and the last sample and the extremes; between any two of these a NaN where
-    there is one, so that no gap is bridged.
+    From each column the first and the last sample and the extremes are kept; between any two of these also a
+    NaN, if there is one, so that no gap is bridged.
 
     Args:
-        values: one curve, (samples,).
+        values: values of one curve, (samples,).
         starts: first sample of each column, ascending from 0.
     """
     lengths = np.diff(starts, append=values.size)
@@ -220,16 +221,16 @@ def _first_hits(hits: BoolArray, starts: IndexArray) -> IndexArray:
 
 
 def marked_spans(time: FloatArray, marked: BoolArray) -> FloatArray:
-    """Return the stretches of time made of marked samples, each reaching half-way to its neighbors.
+    """Return the time intervals of marked samples, each extended half-way to its neighbors.
 
-    Stretches less than a column apart are drawn as one.
+    Intervals less than a column apart are joined.
 
     Args:
-        time: (samples,), s, ascending.
-        marked: (samples,).
+        time: times, (samples,), s, ascending.
+        marked: marks, (samples,).
 
     Returns:
-        Start and end of each stretch, (stretches, 2), s.
+        Start and end of each interval, (intervals, 2), s.
     """
     borders = np.concatenate([time[:1], (time[1:] + time[:-1]) / 2, time[-1:]])
     changes = np.flatnonzero(np.diff(marked, prepend=False, append=False))
@@ -239,7 +240,7 @@ def marked_spans(time: FloatArray, marked: BoolArray) -> FloatArray:
 
 
 REACH = 0.25
-"""Distance from the command up to which a bound is shown, relative to the command."""
+"""Distance from the command within which a bound is shown, relative to the command."""
 
 MARGIN = 0.06
 """Free space above and below, relative to the visible range."""
@@ -248,12 +249,13 @@ MARGIN = 0.06
 def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, float]:
     """Return lower and upper end of a stiffness axis.
 
-    It holds the whole command, every bound the command violates, and the bounds near it; bounds far off, or
-    infinite, do not squeeze the command into a line.
+    The range contains the entire command, every bound that the command violates, and bounds near it; distant
+    or infinite bounds do not compress the command into a line.
 
     Args:
-        command: (points,), N m/rad (N/m); may hold NaN.
-        bounds: nothing, or lower and upper end of the corridor, each (points,); may hold NaN and infinities.
+        command: commanded stiffness, (points,), N m/rad (N/m); may contain NaN.
+        bounds: nothing, or minimum and maximum attainable stiffness, each (points,); may contain NaN and
+            infinities.
     """
     command = command[np.isfinite(command)]
     if not command.size:
@@ -275,25 +277,26 @@ _OF_MOTORS = (
     *("dissipated_power", "current", "voltage", "copper_loss"),
 )
 GROWING = frozenset({*_OF_MOTORS, *map(actual, _OF_MOTORS)})
-"""Variables that grow without bound towards a singular sample, where they are undefined: rates of deflections
-follow from the inverse of the decoupling matrix, and motion and torque of motors from these."""
+"""Variables that grow without bound near a singular sample, and are undefined at it: deflection rates follow
+from the inverse of the decoupling matrix, and motion and torque of motors from these."""
 
 TOLERATED = 0.5
-"""Share of the range of all other samples by which near-singular ones may exceed it uncut."""
+"""Share of the range of all other samples by which near-singular samples may exceed it without being cut
+off."""
 
 ROOM = 0.08
-"""Free space above and below, relative to that range; marks of cut peaks stand in it."""
+"""Free space above and below, relative to that range, for the marks of peaks that are cut off."""
 
 
 def calm_range(curves: Sequence[FloatArray], calm: Sequence[BoolArray]) -> tuple[float, float] | None:
     """Return the range of an axis for all curves of a panel; None if no point is far beyond the calm ones.
 
-    Half of the points of each curve that are not calm are shown as well: a curve that is near-singular from
-    one end of the panel to the other does not vanish from it.
+    The range also contains half of the points of each curve that are not calm, so that a curve that is
+    near-singular from one end of the panel to the other remains visible.
 
     Args:
-        curves: values of each, (points,); NaN where there is none.
-        calm: which of them are not nearly singular.
+        curves: values of each curve, (points,); NaN where there is none.
+        calm: marks of the points that are not near-singular, (points,) for each curve.
     """
     finite = [np.isfinite(values) for values in curves]
     steady = np.concatenate([each[there & at] for each, there, at in zip(curves, finite, calm, strict=True)])

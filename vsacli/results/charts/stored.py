@@ -1,8 +1,8 @@
 """Charts of stored results and simulations, of one file or of several on the same axes.
 
-`Signals` reads and reduces a variable once; `StoredCharts` makes charts of it: curves with their standard
-deviations, limits, the range that near-singular peaks do not set, attainable stiffness, and differences.
-`charts_of` gives everything that a page shows of a variable.
+`Signals` reads and reduces a variable once. `StoredCharts` makes its charts: curves with standard deviations,
+limits, axis ranges without near-singular peaks, attainable stiffness, and differences. `charts_of` returns
+everything that a page shows of a variable.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from vsacli.robot.joint import existing
 BOUNDS = ("stiffness_lower", "stiffness_upper")
 
 By: TypeAlias = Literal["joint", "file", "role"]
-"""Property that colors and dashes of the lines of a chart distinguish."""
+"""Property that the looks of the lines of a chart distinguish."""
 
 
 class Difference:
-    """A result minus another one, at those of its own times that both have; the other is interpolated.
+    """A result minus another one, at the times of the former that both cover; the latter is interpolated.
 
     Attributes:
-        time: those times, (samples,), s; empty if the files have no time in common.
-        joint_names: base to tip.
+        time: common times, (samples,), s; empty if the files do not overlap.
+        joint_names: names of the joints, base to tip.
     """
 
     def __init__(self, result: StoredResult, other: StoredResult) -> None:
@@ -48,14 +48,14 @@ class Difference:
         self.joint_names = result.joint_names
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
-        """Read differences at the times start..stop-1, of the variable's shape; NaN where one of both is."""
+        """Return differences at times start..stop-1, in the shape of the variable; NaN where a value is."""
         stop = self.time.size if stop is None else stop
         own = np.asarray(self._result.read(name, self._first + start, self._first + stop), dtype=np.float64)
-        with np.errstate(over="ignore", invalid="ignore"):  # infinities are as far apart as NaN says
+        with np.errstate(over="ignore", invalid="ignore"):  # inf - inf is NaN
             return own - self._interpolated(name, self.time[start:stop])
 
     def _interpolated(self, name: str, time: FloatArray) -> FloatArray:
-        """Return values of the other result, linear between its samples."""
+        """Return values of the other result, interpolated linearly between its samples."""
         steps = self._other.time
         before = max(int(np.searchsorted(steps, time[0], side="right")) - 1, 0)
         after = int(np.searchsorted(steps, time[-1])) + 1
@@ -67,7 +67,7 @@ class Difference:
         return np.stack(found, axis=-1).reshape(len(time), *values.shape[1:])
 
     def rms(self, name: str) -> FloatArray:
-        """Return the root mean square over the times at which neither is NaN, of the shape of a sample."""
+        """Return the root mean square of all finite differences, in the shape of a sample."""
         total, count = 0.0, 0
         with np.errstate(over="ignore", invalid="ignore"):
             for start in range(0, self.time.size, BLOCK):
@@ -79,14 +79,14 @@ class Difference:
 
 
 class Signals:
-    """A variable of each joint of some files, in the roles in which they hold it.
+    """A variable of each joint of some files, in all roles stored there.
 
     Args:
-        files: by their numbers.
-        roles: such as "commanded", by the names that they are stored under.
-        width: curves that a joint has of each, 1 or 2.
-        spread: name of the standard deviation; empty if there is none.
-        rms: of differences, (joints, width), by the numbers of the files.
+        files: files by number.
+        roles: roles, such as "commanded", by the names under which they are stored.
+        width: number of curves of each joint, 1 or 2.
+        spread: name of the standard deviation; empty for none.
+        rms: root mean squares of differences, (joints, width), by number of the file.
     """
 
     def __init__(
@@ -121,12 +121,12 @@ class Signals:
 
 
 class StoredCharts:
-    """The charts of files of one kind and of the same joints.
+    """The charts of files of one kind with the same joints.
 
     Attributes:
-        files: open.
-        first: the first of them.
-        common: names of the variables that all of them hold.
+        files: open files.
+        first: first of the files.
+        common: names of the variables in all files.
     """
 
     def __init__(self, files: Sequence[StoredResult]) -> None:
@@ -135,27 +135,27 @@ class StoredCharts:
 
     @cached_property
     def failures(self) -> list[Failures]:
-        """The failures of each file."""
+        """Failures of each file."""
         return [Failures.of(file) for file in self.files]
 
     @cached_property
     def compliant(self) -> list[int]:
-        """The joints that have a stiffness."""
+        """Joints with a stiffness."""
         return compliant_joints(self.first.actuators)
 
     def existing(self, variable: Variable) -> BoolArray:
-        """Return which curves of a variable any of the files has at each joint, (joints, 1 or 2)."""
+        """Return which curves of a variable any file has at each joint, (joints, 1 or 2)."""
         return np.asarray(np.any([file.existing(variable) for file in self.files], axis=0))
 
     def signals(self, roles: Mapping[str, str], *, uncertain: bool = True) -> Signals:
-        """Read a variable by the names it is stored under, if `uncertain` with its standard deviation."""
+        """Read a variable by the names of its roles, with its standard deviation if `uncertain`."""
         name = next(iter(roles))
         spread = deviation(name) if uncertain and deviation(name) in self.common else ""
         width = self.existing(self.first.declared[name]).shape[1]
         return Signals(dict(enumerate(self.files)), roles, width, spread)
 
     def differences(self, name: str) -> Signals:
-        """Read a variable of the other files minus that of the first, where they have times in common."""
+        """Read a variable of the other files minus that of the first file, at common times."""
         several = {number: Difference(file, self.first) for number, file in enumerate(self.files[1:], 1)}
         apart = {number: each for number, each in several.items() if each.time.size}
         rms = {number: each.rms(name).reshape(len(each.joint_names), -1) for number, each in apart.items()}
@@ -164,7 +164,7 @@ class StoredCharts:
     def chart(
         self, name: str, signals: Signals, column: int, joints: Sequence[int], by: By = "joint"
     ) -> Chart:
-        """Return the chart of a curve of some joints, of one type, without title."""
+        """Return the chart of a curve of some joints, all of one type, without title."""
         lines = signals.lines(column, joints, by)
         shown = self.calm(lines) if name in GROWING else None
         unit = self._variable(name).quantity.unit(self.first.joint_types[joints[0]])
@@ -172,11 +172,11 @@ class StoredCharts:
         return Chart("", unit, lines, name=name, limits=limits, shown=shown, cut_off=shown is not None)
 
     def calm(self, lines: Sequence[Line], *others: int) -> tuple[float, float] | None:
-        """Return the range of an axis if near-singular peaks would set it otherwise.
+        """Return the range of an axis without near-singular peaks; None if they do not matter.
 
         Args:
-            lines: of joints.
-            others: numbers of files that have to be calm as well, as differences take them.
+            lines: lines of joints.
+            others: numbers of further files that must be calm, as for differences.
         """
         calm = []
         for line in lines:
@@ -188,7 +188,7 @@ class StoredCharts:
         return calm_range([line.curve.values for line in lines], calm)
 
     def corridors(self) -> Iterator[Chart]:
-        """Yield the stiffness of each joint within its attainable range, as far as that is stored."""
+        """Yield the stiffness of each joint within its attainable range, if that is stored."""
         bounds = BOUNDS if set(BOUNDS) <= set(self.common) else ()
         curves = read_curves(self.first, ["stiffness", *bounds])
         quantity = VARIABLES["stiffness"].quantity
@@ -225,7 +225,7 @@ class StoredCharts:
         ]
 
     def charts_of(self, name: str) -> list[Chart]:
-        """Return all charts of a variable: by motor and type of joint, of simulations with the outcome."""
+        """Return all charts of a variable, by motor and type of joint; in simulations with actual values."""
         variable = self._variable(name)
         if "joint" not in variable.dims:
             return list(self._of_wrench(variable))
@@ -248,7 +248,7 @@ class StoredCharts:
         return charts
 
     def _roles(self, name: str) -> dict[str, str]:
-        """Return the roles of a variable by its stored names; of several files the outcome alone."""
+        """Return the roles of a variable by its stored names; for several files only that of the outcome."""
         simulated = actual(name) in self.common
         roles = {name: "commanded" if simulated else "computed"}
         roles |= {actual(name): "actual", measured(name): "measured"}
@@ -259,12 +259,10 @@ class StoredCharts:
         return there
 
     def _columns(self, variable: Variable) -> Iterator[tuple[int, str, list[int]]]:
-        """Yield each column of a variable and type of joint: title, and the joints that have it."""
+        """Yield each column of a variable and type of joint, with a title and the joints that have it."""
         there, types = self.existing(variable), self.first.joint_types
         words = variable.long_name
-        if (
-            actual(variable.name) in self.common
-        ):  # command and outcome are one chart, which is neither of both
+        if actual(variable.name) in self.common:  # one chart of command and outcome
             words = VARIABLES[variable.name].long_name.replace("commanded ", "")
         for column in range(there.shape[1]):
             motor = f", motor {MOTORS[column]}" if "motor" in variable.dims else ""
@@ -275,7 +273,7 @@ class StoredCharts:
                     yield column, f"{words}{motor}{kind}", joints
 
     def _of_wrench(self, variable: Variable) -> Iterator[Chart]:
-        """Yield forces and moments."""
+        """Yield charts of forces and of moments."""
         assert isinstance(variable.quantity, WrenchQuantity), "see WRENCH_AXES"
         curves = [read_curves(_Components(file), [variable.name]) for file in self.files]
         for words, axes in (("forces", range(3)), ("moments", range(3, 6))):
@@ -289,7 +287,7 @@ class StoredCharts:
 
 
 class _Components:
-    """A wrench over time, its components in place of joints."""
+    """A wrench over time, with its components in place of joints."""
 
     joint_names = WRENCH_AXES
 
@@ -305,6 +303,6 @@ class _Components:
 
 
 def compliant_joints(actuators: Sequence[str]) -> list[int]:
-    """Return the joints that have a stiffness, by the types of their actuators."""
+    """Return the joints with a stiffness, by the types of their actuators."""
     there = existing(VARIABLES["stiffness"], actuators)
     return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]

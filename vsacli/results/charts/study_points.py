@@ -1,4 +1,4 @@
-"""Points of the table of a study: margin and cost of each run, over the parameters."""
+"""Data points of a study table: margin and cost of each run over the parameters."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ from vsacli.base.errors import InputError
 from vsacli.results.store.study_table import StoredStudy
 
 NAMED_RUNS = 3
-"""Number of worst runs that are named next to their points."""
+"""Number of runs with the smallest margins that are labeled with their numbers."""
 
 NORMAL_95 = 1.96
-"""Standard deviations of a normal distribution within which 95 % lie."""
+"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
 COSTS = {
     "cost_after": "{}",
     "energy_spent": "energy that motors spend",
     "peak_tau_motor": "largest motor torque",
 }
-"""Columns that hold the cost of a motion, in words or in those of the table: the first there is counts."""
+"""Columns that hold the cost of a motion, in order of preference, with their labels; `{}` stands for the
+table's."""
 
 ADDED = "J"
-"""Unit of costs that those of the joints add up to; of others the largest counts."""
+"""Unit of costs that are summed over the joints; of other costs the maximum counts."""
 
 
 class StudyPoints:
-    """The numbers of a table that figures and pages show.
+    """The values of a study table that figures and pages show.
 
     Attributes:
-        name: of the study.
+        name: name of the study.
         runs: numbers of the runs, (rows,).
         margin: smallest margin of all joints, (rows,), relative; NaN if a run failed.
-        feasible: whether every step was feasible and regular, (rows,).
+        feasible: whether every sample was feasible and regular, (rows,).
 
     Raises:
         InputError: the table has no margins, or no rows.
@@ -51,24 +52,24 @@ class StudyPoints:
 
     @cached_property
     def varying(self) -> dict[str, FloatArray]:
-        """The numbers that are not the same in all rows, by path."""
+        """Values of the numeric parameters that are not the same in all rows, by path."""
         table = self._table
         found = {path: table.read(path) for path in table.parameters if not table.parameter_is_text(path)}
         return {path: values for path, values in found.items() if np.ptp(values) > 0}
 
     @cached_property
     def cost(self) -> tuple[str, FloatArray] | None:
-        """The words for the cost, and that of each run, NaN if samples have none; None if none was kept."""
+        """Label of the cost, and cost of each run, NaN if samples have none; None if no cost is stored."""
         return next((self._cost(name) for name in COSTS if name in self._table.columns), None)
 
     @property
     def optimised(self) -> bool:
-        """Whether each run is an optimum, whose margin is the one that was requested."""
+        """Whether each run is an optimum, whose margin is the requested one."""
         return "cost_after" in self._table.columns
 
     @property
     def shown(self) -> list[tuple[str, FloatArray]]:
-        """Columns drawn over the parameters: margin and cost, or for optima the costs before and after."""
+        """Columns to draw over the parameters: margin and cost, or for optima the costs before and after."""
         cost = [] if self.cost is None else [self.cost]
         first = self._cost("cost_before") if self.optimised else ("smallest margin [%]", 100 * self.margin)
         return [first, *cost]
@@ -91,24 +92,24 @@ class StudyPoints:
 
     @property
     def exceedance(self) -> tuple[FloatArray, FloatArray]:
-        """Return the margins, ascending, and for each the share of runs that have at least this margin."""
+        """Margins, ascending, and for each the share of runs with at least this margin."""
         margins = np.sort(self.margin[np.isfinite(self.margin)])
         return margins, np.arange(len(margins), 0, -1) / len(self.margin)
 
     def unit(self, path: str) -> str:
-        """Return the unit of a number, empty if it has none."""
+        """Return the unit of a parameter, empty if it has none."""
         unit = self._table.unit(path)
         return "" if unit == "1" else unit
 
     @property
     def worst(self) -> IndexArray:
-        """The rows with the smallest margins."""
+        """Rows with the smallest margins."""
         order = np.argsort(np.where(np.isnan(self.margin), np.inf, self.margin), kind="stable")
         return order[: min(NAMED_RUNS, int(np.isfinite(self.margin).sum()))]
 
     @property
     def front(self) -> IndexArray:
-        """Feasible rows with less cost than any with a larger margin, the least margin first."""
+        """Pareto front: feasible rows that cost less than any with a larger margin, by ascending margin."""
         assert self.cost is not None, "a front is asked for where there is a cost"
         rows = np.flatnonzero(self.feasible & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
         rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
@@ -118,7 +119,7 @@ class StudyPoints:
 
 
 def _least(margins: FloatArray) -> FloatArray:
-    """Return the least margin of all joints; those without an attainable range have none."""
+    """Return the smallest margin of all joints; joints without an attainable range are ignored."""
     least: FloatArray = np.where(np.isnan(margins), np.inf, margins).min(axis=1)
     return np.where(np.isinf(least), np.nan, least)
 

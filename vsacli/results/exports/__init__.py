@@ -1,4 +1,4 @@
-"""Variables of results and simulations for other programs: a selection, and a file for each format."""
+"""Export of variables of results and simulations: a selection, and a file format for other programs."""
 
 from __future__ import annotations
 
@@ -12,4 +12,4 @@ FORMATS = LazyRegistry(
         "joint-trajectory": "vsacli.results.exports.formats:JOINT_TRAJECTORY",
     }
 )
-"""Formats by their names on a command line, each a `ResultFormat`."""
+"""Formats by their names on the command line, each a `ResultFormat`."""

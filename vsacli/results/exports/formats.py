@@ -1,9 +1,9 @@
-"""Formats of exported results: CSV, MATLAB files, Parquet, JointTrajectory messages; and datasets of xarray.
+"""Formats of exported results: CSV, MATLAB files, Parquet, JointTrajectory messages; and xarray datasets.
 
-CSV has a column for each joint and variable, whose floats read back bit for bit. MATLAB files are of version
-5, which MATLAB, Octave and SciPy read. Parquet holds the columns of the CSV. Messages
-`trajectory_msgs/msg/JointTrajectory` of ROS 2 are JSON, and written such that readers of YAML find the same
-in it: a point behind each mantissa, and no letter beyond ASCII.
+CSV has a column for each joint and variable, with floats that are read back bit for bit. MATLAB files have
+version 5, for MATLAB, Octave and SciPy. Parquet has the columns of the CSV. ROS 2 messages
+`trajectory_msgs/msg/JointTrajectory` are JSON, written so that YAML readers read the same values: a decimal
+point in each mantissa, and ASCII characters only.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def write_csv(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
-    """Write a header line and a line for each sample; a file should be open with newline=""."""
+    """Write a header line and a line for each sample; open a file with newline=""."""
     names = selection.result.joint_names
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *(column for each in selection.chosen for column in each.columns(names))])
@@ -45,7 +45,7 @@ def write_csv(selection: Selection, stream: TextIO, done: Callable[[int], object
 
 
 def _cells(columns: npt.NDArray[Any]) -> list[list[Any]]:
-    """Return columns as numbers; NaN becomes None, which csv leaves empty."""
+    """Return columns as numbers; NaN becomes None, which the csv module writes as an empty cell."""
     missing = np.isnan(columns)
     if missing.any():
         columns = columns.astype(object)
@@ -58,13 +58,13 @@ CSV = ResultFormat(write_csv, missing="empty cells")
 
 
 MAX_VARIABLE_BYTES = 2**31 - 2**16
-"""The format counts the bytes of a variable in 32 bits, of which readers take 31; less the header."""
+"""Maximum size of a variable: the format counts bytes in 32 bits, readers in 31; less the header."""
 
 
 def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
-    """Write `time`, each variable (samples, joints[, 2]), with names and units.
+    """Write `time`, each variable (samples, joints[, 2]), and names and units.
 
-    A variable is read when its turn comes, so that no more than one is in memory.
+    Each variable is read when it is written, so that only one is in memory.
     """
     from scipy.io import savemat
 
@@ -84,7 +84,7 @@ def check_sizes(selection: Selection) -> None:
 
 
 class _Variables(Mapping[str, Any]):
-    """The variables of the file by name, each made when it is asked for."""
+    """The variables of the file by name, each created on access."""
 
     def __init__(self, selection: Selection, done: Callable[[int], object]) -> None:
         self._made: dict[str, Callable[[], Any]] = {
@@ -115,12 +115,12 @@ def _reading(selection: Selection, chosen: Chosen, done: Callable[[int], object]
 
 
 def _cell_array(texts: Sequence[str]) -> Any:
-    """Return a column of texts, which MATLAB indexes by braces."""
+    """Return a cell array with one column of texts."""
     return np.array(texts, dtype=object)[:, None]
 
 
 def _units(selection: Selection) -> dict[str, Any]:
-    """Return the units of each variable by name: one for each joint, or axis of the wrench."""
+    """Return the units of each variable by name: one for each joint, or each axis of the wrench."""
     types = selection.result.joint_types
     units = {each.name: _cell_array(each.units(types)) for each in selection.chosen}
     return {"time": "s", **units}
@@ -130,11 +130,11 @@ MAT = ResultFormat(write_mat, binary=True, missing="NaN", check=check_sizes)
 
 
 OF_RESULT = ("robot_name", "trajectory_name", "verdict")
-"""Attributes of the result in the metadata of a table."""
+"""Attributes of the result that are stored in the metadata of the table."""
 
 
 def write_parquet(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
-    """Write the columns of the CSV, in groups of rows of which one at a time is in memory."""
+    """Write the columns of the CSV in row groups, one of which is in memory at a time."""
     from pyarrow import Table, array, parquet
 
     schema = _schema(selection)
@@ -149,7 +149,7 @@ def write_parquet(selection: Selection, stream: IO[bytes], done: Callable[[int],
 
 
 def check_installed(_selection: Selection) -> None:
-    """Refuse if there is nothing that could write it."""
+    """Refuse the format if pyarrow is not installed."""
     try:
         import pyarrow  # noqa: F401
     except ModuleNotFoundError:
@@ -184,18 +184,17 @@ PARQUET = ResultFormat(write_parquet, binary=True, missing="nulls", check=check_
 
 
 FIELDS = {"positions": "q", "velocities": "dq", "accelerations": "ddq", "effort": "tau_e"}
-"""The variable in each field of a point. The effort is the torque of the joint on the link: motors may be
-two,
-and their torques depend on springs that the message does not know."""
+"""Variable in each field of a point. The effort is the torque of the joint on the link, since a joint may
+have two motors, whose torques depend on springs that the message cannot describe."""
 
 WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
-"""A number such as 1e-05, which is a number in JSON but a text in YAML."""
+"""Regular expression of numbers such as 1e-05, which are numbers in JSON but texts in YAML."""
 
 NANOSECONDS = 10**9
-"""Nanoseconds in a second: times of messages are whole seconds and nanoseconds."""
+"""Nanoseconds in a second; times of messages are whole seconds and nanoseconds."""
 
 LONGEST = 2**31 - 1
-"""Seconds of a message: builtin_interfaces/msg/Duration has 32 bits for them, with a sign."""
+"""Maximum number of seconds in a message: builtin_interfaces/msg/Duration has a signed 32-bit integer."""
 
 
 def check_fields(selection: Selection) -> None:
@@ -229,7 +228,7 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
 
 
 def _fields(selection: Selection) -> dict[str, str]:
-    """Return the variable that each field takes from a file of this kind."""
+    """Return the variable for each field, according to the kind of the file."""
     simulated = selection.result.kind == "simulation"
     return {field: actual(name) if simulated else name for field, name in FIELDS.items()}
 
@@ -254,12 +253,12 @@ JOINT_TRAJECTORY = ResultFormat(
 def labelled_dataset(
     arrays: Mapping[str, AnyArray], joint_names: Sequence[str], joint_types: tuple[str, ...]
 ) -> xarray.Dataset:
-    """Return the dataset that xarray makes of a result file with these variables.
+    """Return the dataset that xarray would read from a result file with these variables.
 
     Args:
-        arrays: variables by name, each (samples, ...) with the dimensions that are declared for it.
-        joint_names: base to tip.
-        joint_types: "revolute" or "prismatic".
+        arrays: variables by name, each (samples, ...) with its declared dimensions.
+        joint_names: names of the joints, base to tip.
+        joint_types: types of the joints, "revolute" or "prismatic".
 
     Raises:
         ModuleNotFoundError: xarray is not installed.
@@ -273,7 +272,7 @@ def labelled_dataset(
     variables = {}
     for name, array in arrays.items():
         attributes = variable_attributes(VARIABLES[name], joint_types)
-        attributes.pop("coordinates", None)  # xarray knows them
+        attributes.pop("coordinates", None)  # xarray derives it from the dataset
         variables[name] = (("time", *VARIABLES[name].dims), array, attributes)
     used = {dim for dims, _, _ in variables.values() for dim in dims}
     coordinates = {name: label for name, label in labels.items() if name in used}

@@ -16,19 +16,19 @@ from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, Chosen, 
 from vsacli.results.store.reader import StoredResult
 
 TORQUES = {"result": ("tau_motor",), "simulation": ("q_actual", "stiffness_actual", "tau_motor_actual")}
-"""Variables by the kind of the file: the torques to send, or the simulated motion."""
+"""Default variables by the kind of the file: the torques to send, or the simulated motion."""
 
 
 @dataclass(frozen=True)
 class ResultFormat:
-    """A format in which variables of a result leave.
+    """A format for the export of result variables.
 
     Attributes:
-        write: writes a selection to a stream of text, or of bytes, and tells how many steps are done.
-        binary: whether the stream is one of bytes.
-        missing: how it shows a value that is missing; None if it cannot.
-        variables: exported by default, by the kind of the file.
-        check: refuses variables that the format has no place for, by name.
+        write: function that writes a selection to a text or binary stream, and reports the samples done.
+        binary: whether the stream is binary.
+        missing: representation of a missing value in words; None if the format has none.
+        variables: variables exported by default, by the kind of the file.
+        check: function that refuses a selection that the format cannot represent.
     """
 
     write: Callable[[Selection, Any, Callable[[int], object]], None]
@@ -40,13 +40,13 @@ class ResultFormat:
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples of a joint, or of an axis of the wrench, that are not finite.
+    """Non-finite samples of a joint, or of an axis of the wrench.
 
     Attributes:
         place: joint and variable, or the column of the wrench.
         fault: MISSING or INFINITE.
-        time: of the first, s.
-        count: how many they are.
+        time: time of the first such sample, s.
+        count: number of such samples.
     """
 
     place: str
@@ -60,7 +60,7 @@ class Gap:
 
 
 class UndefinedSamplesError(VsacliError):
-    """Samples to be exported have no finite value; nothing has been written."""
+    """Samples to export without a finite value; nothing has been written."""
 
     def __init__(self, path: Path, gaps: Iterable[Gap], missing: str | None) -> None:
         self.gaps = tuple(gaps)
@@ -88,18 +88,20 @@ def export_result(
     """Write time and variables in a format.
 
     Args:
-        result: an open result or simulation file.
-        stream: where to write, text or bytes as the format says; of text, its lines end as they are written.
-        form: the format.
-        variables: names, exported in declared order; by default those of the format.
+        result: open result or simulation file.
+        stream: output stream, text or binary as the format requires; line ends of text are written as they
+            are.
+        form: format to write.
+        variables: names of the variables, exported in declared order; by default those of the format.
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
-        allow_nan: show that samples are missing, and infinite ones as they are, instead of refusing.
-        side: of the gear on which motion and torque of the motors are given; see `Selection`.
-        progress: shows how much is done.
+        allow_nan: whether to export missing samples as such, and infinite values unchanged, instead of
+            refusing.
+        side: side of the gear on which motion and torque of the motors are given; see `Selection`.
+        progress: shows the progress.
 
     Raises:
-        InputError: a variable is not in the file or has no place in the format, the rate is not possible, a
-            gear ratio is not known, or a package is missing.
+        InputError: a variable is not in the file or not possible in the format, the rate is not possible, a
+            gear ratio is unknown, or a package is missing.
         UndefinedSamplesError: a sample is NaN or infinite and `allow_nan` is false.
     """
     wanted = form.variables[result.kind] if variables is None else variables
@@ -115,7 +117,7 @@ def export_result(
 
 
 def _gaps(selection: Selection, chosen: Chosen) -> Iterator[Gap]:
-    """Yield the samples of a variable that are not finite, of each joint that has it."""
+    """Yield the non-finite samples of a variable, for each joint that has it."""
     faults = np.concatenate(
         [chosen.faults(selection.read(chosen, *span)) for span in selection.spans([chosen])]
     )

@@ -1,4 +1,4 @@
-"""The part of a result that is exported: some variables, at a sample rate, on one side of the gears."""
+"""The exported part of a result: some variables, at a sample rate, on one side of the gears."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ Side: TypeAlias = Literal["joint", "motor"]
 """Side of the gear of a motor."""
 
 CELLS = 2**18
-"""Values of a variable held in memory at a time."""
+"""Number of values of a variable in memory at a time."""
 
 RATE_TOLERANCE = 1e-6
-"""Relative error of a rate typed with at least six digits, such as 333.3333."""
+"""Relative tolerance of a rate, for rates typed with at least six digits, such as 333.3333."""
 STEP_TOLERANCE = 1e-3
-"""Error of stored times, in steps: twice that of times at 1 kHz printed with six decimals."""
+"""Tolerance of stored times, in sampling intervals: twice the error of times at 1 kHz printed with six
+decimals."""
 
 MISSING, INFINITE = "has no value", "is infinite"
 FAULTS = ("", MISSING, INFINITE)
-"""Faults of a sample, as sentences go on."""
+"""Faults of a sample, as predicates in messages."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,10 @@ class Chosen:
     """A variable of an export.
 
     Attributes:
-        variable: its declaration; on the side of the motors its name ends in `_shaft`.
-        stored: its name in the result.
-        there: (joints, columns of each), which columns there are; of the wrench (axes, 1).
-        scale: factor of its stored values; None if they stay as they are.
+        variable: declaration of the variable; on the motor side its name ends in `_shaft`.
+        stored: name of the variable in the result.
+        there: mask of existing columns, (joints, columns of each), or (axes, 1) for the wrench.
+        scale: factor for the stored values; None if they are exported unchanged.
     """
 
     variable: Variable
@@ -51,16 +52,16 @@ class Chosen:
 
     @property
     def on_shaft(self) -> bool:
-        """Whether it is of the shaft of a motor, which turns at any joint."""
+        """Whether the variable is on the motor shaft, which rotates at joints of any type."""
         return self.scale is not None
 
     @property
     def name(self) -> str:
-        """Return the name in the export."""
+        """Name in the export."""
         return self.variable.name
 
     def columns(self, joint_names: Iterable[str]) -> Iterator[str]:
-        """Return the names of the columns that there are."""
+        """Return the names of the existing columns."""
         return compress(column_names(self.variable, joint_names), self.there.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
@@ -71,7 +72,7 @@ class Chosen:
         return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
-        """Return the columns that there are, (columns, samples), of (samples, ...)."""
+        """Return the existing columns, (columns, samples), of values (samples, ...)."""
         flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
         return flat
 
@@ -82,7 +83,7 @@ class Chosen:
         return [f"{joint}.{self.name}" for joint in joint_names]
 
     def faults(self, values: FloatArray | FlagArray) -> npt.NDArray[np.uint8]:
-        """(samples, places): the worst fault of the values that there are, as index of `FAULTS`."""
+        """Return the worst fault of the existing values as an index of `FAULTS`, (samples, places)."""
         shape = len(values), *self.there.shape
         faulty = [
             np.any(np.reshape(test(values), shape) & self.there, axis=-1) for test in (np.isnan, np.isinf)
@@ -91,28 +92,28 @@ class Chosen:
 
 
 class Samples(NamedTuple):
-    """Consecutive samples of an export: times, (samples,) s, and values (samples, ...) by name."""
+    """Consecutive samples of an export: times, (samples,), s, and values, (samples, ...), by name."""
 
     time: FloatArray
     values: Mapping[str, FloatArray | FlagArray]
 
 
 class Selection:
-    """A selection of variables of a result for an export.
+    """Variables of a result selected for export.
 
     Args:
-        result: an open result or simulation file.
-        variables: names; they are exported in declared order.
+        result: open result or simulation file.
+        variables: names of the variables, exported in declared order.
         rate: samples per second, the stored rate or a whole fraction of it; all samples if None.
-        side: of the gear on which motion and torque of the motors are given; on the side "motor" they are in
-            rad and N m at any joint.
+        side: side of the gear on which motion and torque of the motors are given; on the side "motor" in rad
+            and N m at any joint.
 
     Attributes:
-        result: as given.
-        chosen: the variables.
+        result: result or simulation file as given.
+        chosen: selected variables.
 
     Raises:
-        InputError: there is no such variable, the rate is not possible, or a gear ratio is not known.
+        InputError: a variable is unknown, the rate is not possible, or a gear ratio is unknown.
     """
 
     def __init__(
@@ -137,11 +138,11 @@ class Selection:
 
     @property
     def steps(self) -> int:
-        """Samples of all variables together."""
+        """Number of samples, summed over all variables."""
         return len(self.time) * len(self.chosen)
 
     def spans(self, together: Sequence[Chosen]) -> Iterator[tuple[int, int]]:
-        """Yield consecutive ranges of samples, at least one, in which some variables need little memory."""
+        """Yield at least one range of consecutive samples, each small enough to bound memory use."""
         widest = max((each.there.size for each in together), default=1)
         length = max(1, CELLS // (widest * self._stride))
         count = len(self.time)
@@ -149,14 +150,14 @@ class Selection:
             yield start, min(start + length, count)
 
     def blocks(self) -> Iterator[Samples]:
-        """Yield all samples, some of them in memory at a time; at least one block."""
+        """Yield all samples in blocks that fit into memory; at least one block."""
         for start, stop in self.spans(self.chosen):
             yield Samples(
                 self.time[start:stop], {each.name: self.read(each, start, stop) for each in self.chosen}
             )
 
     def read(self, chosen: Chosen, start: int, stop: int) -> FloatArray | FlagArray:
-        """Read some samples of a variable, (samples, ...)."""
+        """Read samples start..stop-1 of a variable, (samples, ...)."""
         span = start * self._stride, min(stop * self._stride, self.result.samples)
         values = self.result.read(chosen.stored, *span)[:: self._stride]
         return values if chosen.scale is None else values * chosen.scale
@@ -171,14 +172,14 @@ def _chosen(result: StoredResult, variable: Variable, on_shaft: bool) -> Chosen:
 
 
 def _existing(result: StoredResult, variable: Variable) -> BoolArray:
-    """Return which columns of a variable there are, (joints, columns of each); of the wrench (axes, 1)."""
+    """Return a mask of existing columns, (joints, columns of each), or (axes, 1) for the wrench."""
     if "joint" not in variable.dims:
         return np.ones((len(column_names(variable, ())), 1), dtype=bool)
     return result.existing(variable)
 
 
 def _check_geared(result: StoredResult) -> None:
-    """Refuse values on the motor side of a gear with unknown ratio."""
+    """Refuse values on the motor side if a gear ratio is unknown."""
     there = _existing(result, VARIABLES["tau_motor"])
     unknown = np.any(np.isnan(result.gear_ratio) & there, axis=1).tolist()
     if any(unknown):
@@ -194,7 +195,7 @@ def stride_of(result: StoredResult, rate: float) -> int:
     """Return the decimation factor from the stored rate to a rate, Hz.
 
     Raises:
-        InputError: the stored rate is no whole multiple of it, or there is none.
+        InputError: the stored rate is not a multiple of it, or the times are not equally spaced.
     """
     check_rate(rate)
     stored = _stored_rate(result)
@@ -213,13 +214,13 @@ def stride_of(result: StoredResult, rate: float) -> int:
 
 
 def check_rate(rate: float) -> None:
-    """Raise InputError unless a rate, Hz, is finite and positive."""
+    """Refuse a rate, Hz, that is not finite and positive."""
     if not (rate > 0 and math.isfinite(rate)):
         raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
 
 
 def _stored_rate(result: StoredResult) -> float:
-    """Return the samples per second of a file with equal steps."""
+    """Return the samples per second of a file with equally spaced times."""
     time, steps = result.time, result.samples - 1
     if steps < 1:
         raise InputError.one(
@@ -238,5 +239,5 @@ def _stored_rate(result: StoredResult) -> float:
 
 
 def _round(rate: float) -> float:
-    """Round a rate to three digits, as somebody would choose it."""
+    """Round a rate to three digits, for a proposal."""
     return float(f"{rate:.3g}")

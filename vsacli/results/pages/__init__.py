@@ -1,7 +1,7 @@
 """Pages of results and of measurements: one self-contained HTML file each.
 
-Charts are packed here, the same as in figures; their look and behavior are in `page.html`, `page.css` and
-the scripts next to them.
+This package packs the charts, the same as in figures; their look and behavior are defined in `page.html`,
+`page.css` and the scripts next to them.
 """
 
 from vsacli.results.pages.document import RemedyText

@@ -1,7 +1,7 @@
-"""One HTML file: the template of the project around texts, numbers and scripts, closed to the network.
+"""One HTML file from a template with texts, numbers and scripts, without access to the network.
 
-A page carries BokehJS, which draws its plots, as the Python package `bokeh` brings it. Each
-file has its `PageTexts`: its report, its provenance, and its inputs.
+A page contains BokehJS, which draws its plots, from the Python package `bokeh`. Each file has its
+`PageTexts`: its report, its provenance, and its inputs.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from vsacli.results.store.inputs import StoredInput
 TEMPLATE, STYLE = "page.html", "page.css"
 
 SCRIPTS = ("marks.js", "figures.js", "charts.js", "robot.js", "scatter.js", "page.js")
-"""The project's own, in the order in which they run."""
+"""Scripts of this package, in the order in which they run."""
 
 LIBRARY_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
-"""The library itself, and its functions for JavaScript; not its widgets, tables, WebGL and MathJax."""
+"""BokehJS and its API for scripts, without widgets, tables, WebGL and MathJax."""
 
 LARGEST_SHOWN = 200_000
-"""Letters of an input up to which a page shows all of it; tables of samples are longer."""
+"""Maximum number of characters of an input that a page shows; tables of samples are longer."""
 
 FAIR = ("over_limit", "doubtful", "strayed", "untold")
 """Verdicts on complete runs with findings."""
@@ -40,11 +40,11 @@ TOO_LONG = "too long for a page"
 
 
 class Library(NamedTuple):
-    """A library for a page.
+    """A script library for a page.
 
     Attributes:
-        name: with its version.
-        scripts: run by a page in this order.
+        name: name and version.
+        scripts: scripts in the order in which a page runs them.
     """
 
     name: str
@@ -52,10 +52,10 @@ class Library(NamedTuple):
 
 
 def plotting_library() -> Library:
-    """Return the installed library, found by its files, since importing Bokeh takes a second.
+    """Return the installed library; its files are read directly, since importing Bokeh takes a second.
 
     Raises:
-        InputError: it is not installed.
+        InputError: Bokeh is not installed.
     """
     try:
         installed = distribution("bokeh")
@@ -68,11 +68,11 @@ def plotting_library() -> Library:
 
 
 class RemedyText(NamedTuple):
-    """The fix of a run that failed.
+    """The fixes of a failed run.
 
     Attributes:
-        lines: a sentence or more each.
-        command: that the last line announces; empty if there is none.
+        lines: text in lines.
+        command: command announced by the last line; empty if there is none.
     """
 
     lines: Sequence[str]
@@ -80,18 +80,18 @@ class RemedyText(NamedTuple):
 
 
 class PageTexts(NamedTuple):
-    """The texts on a page about a file.
+    """The texts of a page about one file.
 
     Attributes:
         title: robot and trajectory.
-        label: short, to tell it from the others on the page.
-        verdict: as in the report; empty without one.
+        label: short name that distinguishes the file from others on the page.
+        verdict: verdict of the report; empty without one.
         tone: "good", "fair" or "bad".
-        report: printed by the command that made it.
-        provenance: pairs of a word and its value.
-        inputs: the files that were read.
-        remedy: what would fix it; None if it needs none, or none was looked for.
-        table: what the report has beside the table in it; header first, empty if there is nothing.
+        report: report as printed by the command that made the file.
+        provenance: pairs of a name and its value.
+        inputs: input files.
+        remedy: fixes; None if none are needed, or none were searched.
+        table: table of the report in addition to that in the text; header first, empty if there is none.
     """
 
     title: str
@@ -106,12 +106,12 @@ class PageTexts(NamedTuple):
 
 
 class InputText(NamedTuple):
-    """A file that was read.
+    """An input file.
 
     Attributes:
-        path: of it.
-        sha256: of its content, in hex.
-        content: its text; None if a page does not show it.
+        path: path of the file.
+        sha256: digest of the content, hexadecimal.
+        content: text of the file; None if the page does not show it.
         instead: sentence in place of the content.
     """
 
@@ -124,16 +124,16 @@ class InputText(NamedTuple):
 def rendered(
     library: Library, title: str, texts: Sequence[PageTexts], data: Mapping[str, Any], packed: Packed
 ) -> str:
-    """Return the page.
+    """Return the page as HTML.
 
     Args:
-        library: that draws its plots.
-        title: of the page.
+        library: library that draws the plots.
+        title: title of the page.
         texts: texts on each file.
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
-    import jinja2  # what bokeh brings along
+    import jinja2  # a dependency of bokeh
 
     folder = files(__package__)
     scripts = [*library.scripts, *((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)]
@@ -151,18 +151,18 @@ def rendered(
 
 
 def _hash(script: str) -> str:
-    """Return the hash of a script for the Content Security Policy, which lets no other script run."""
+    """Return the hash of a script for the Content Security Policy, which blocks all other scripts."""
     digest = hashlib.sha256(script.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
 def tone_of(verdict: str) -> str:
-    """Return the look of a verdict, as of `PageTexts`."""
+    """Return the tone of a verdict for `PageTexts`."""
     return "good" if verdict == "ok" else "fair" if verdict in FAIR else "bad"
 
 
 def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the provenance of a file as pairs of a word and its value; inputs are left out."""
+    """Return the provenance of a file as pairs of a name and its value, without inputs."""
     rows = []
     for name, value in provenance.items():
         if name != "inputs" and value not in ("", {}):
@@ -173,25 +173,25 @@ def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def input_text(file: StoredInput) -> InputText:
-    """Return an input as a page shows it."""
+    """Return a stored input as a page shows it."""
     text = None if file.content is None else file.content.decode("utf-8", "backslashreplace")
     instead = f"{TOO_LONG}; vsacli info --extract gets it from the file"
     return InputText(one_line(file.path), file.sha256, _shown(text), instead)
 
 
 def source_text(file: Source) -> InputText:
-    """Return a file as it was read, as a page shows it."""
+    """Return an input file as a page shows it."""
     return InputText(one_line(file.path), file.sha256, _shown(file.text), TOO_LONG)
 
 
 def _shown(text: str | None) -> str | None:
-    """Return a text if a page shows all of it, else nothing."""
+    """Return a text in printable lines; None if it is too long for a page."""
     if text is None or len(text) > LARGEST_SHOWN:
         return None
     return "\n".join(map(one_line, text.splitlines()))
 
 
 def printable(report: ReportText) -> ReportText:
-    """Return a report whose texts name files or columns, with nothing in it that a page would not show."""
+    """Return a report with all characters printable; its texts may contain names of files or columns."""
     rows = [tuple(map(one_line, row)) for row in report.rows]
     return ReportText(one_line(report.headline), rows, list(map(for_terminal, report.lines)))

@@ -13,22 +13,22 @@ from vsacli.base.json_records import json_value
 from vsacli.results.charts.chart import REACHABLE, Band, Chart
 
 BEYOND = 5.0
-"""Height up to which the corridor is drawn beyond its part that is shown at first, in heights of that."""
+"""Height up to which the attainable range extends beyond the initial view, in heights of that view."""
 
 CUT_OFF = "peaks of near-singular steps are cut off; Ctrl and the wheel show them"
 
 
 class Packed:
-    """Arrays that a page holds, each once and known by its number.
+    """Arrays of a page, each stored once and referenced by its number.
 
-    Single precision is enough to see: a screen shows four digits of a curve, a cursor six.
+    Single precision suffices: a screen resolves four digits of a curve, a cursor shows six.
     """
 
     def __init__(self) -> None:
         self._numbers: dict[bytes, int] = {}
 
     def add(self, values: ArrayLike) -> int:
-        """Return the number of an array, of any shape; values not finite, or too large, become NaN."""
+        """Return the number of an array of any shape; values not finite in single precision become NaN."""
         with np.errstate(over="ignore"):
             single = np.asarray(values, dtype="<f4")
         content = np.where(np.isfinite(single), single, np.float32(np.nan)).astype("<f4").tobytes()
@@ -36,15 +36,15 @@ class Packed:
 
     @property
     def texts(self) -> list[str]:
-        """The arrays in base64, by number."""
+        """Arrays in base64, by number."""
         return [base64.b64encode(content).decode("ascii") for content in self._numbers]
 
     def chart(self, chart: Chart, start: float) -> dict[str, Any]:
-        """Return a chart for `charts.js`, its arrays by their numbers.
+        """Return a chart for `charts.js`, with arrays replaced by their numbers.
 
         Args:
-            chart: over time.
-            start: time from which the page counts, s.
+            chart: chart over time.
+            start: time origin of the page, s.
         """
         series = []
         for line in chart.lines:
@@ -74,7 +74,7 @@ class Packed:
         }
 
     def _band(self, band: Band, chart: Chart) -> tuple[int, int]:
-        """Return lower and upper edge, those of a corridor as far as anybody would look."""
+        """Return the numbers of lower and upper edge; an attainable range is cut off far outside the view."""
         low, high = band.low, band.high
         if chart.band == REACHABLE and chart.shown is not None:
             spare = BEYOND * (chart.shown[1] - chart.shown[0])
@@ -83,6 +83,6 @@ class Packed:
 
 
 def as_script(content: Any) -> str:
-    """JSON values for an element `script`, which nothing in them can end."""
+    """Return JSON values for a `script` element, without characters that could end it."""
     text = json.dumps(json_value(content), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -1,7 +1,7 @@
-"""Pages of curves over time: of results or simulations on the same axes, and of measured signals.
+"""Pages of curves over time: results or simulations on the same axes, and measured signals.
 
-Variables stand in sections. Samples that cannot be executed, and the ends of recordings, are shaded in all
-plots, and the robot moves as a chain.
+Variables are grouped in sections. Samples that cannot be executed, and the ends of recordings, are shaded in
+all plots, and the robot is animated as a chain.
 """
 
 from __future__ import annotations
@@ -39,10 +39,11 @@ from vsacli.results.store.reader import ACHIEVED, StoredResult
 from vsacli.robot.kinematics import frames_in_base
 
 MOST_FRAMES = 1000
-"""Instants of the robot that a page holds; a screen shows 60 a second, and between them it interpolates."""
+"""Maximum number of instants of the animated robot; the page interpolates between them at 60 frames a
+second."""
 
 OPEN = 4
-"""Sections of measured signals that are open from the start, as many as those of a result."""
+"""Number of sections of measured signals that are open initially, as many as for a result."""
 
 TROUBLES = {
     "infeasible": Flag.INFEASIBLE,
@@ -50,16 +51,16 @@ TROUBLES = {
     "near-singular": Flag.NEAR_SINGULAR,
     "over a limit": LIMITS,
 }
-"""Findings about a sample by the bits of its flags."""
+"""Findings about a sample, with the bits of `flags` that denote them."""
 
 
 class Section(NamedTuple):
-    """Variables below one heading.
+    """Variables under one heading.
 
     Attributes:
-        heading: of the section.
-        names: of the variables; of simulations those that were commanded.
-        shown: whether their plots are there from the start, as those of `plot` are.
+        heading: heading of the section.
+        names: names of the variables; for simulations those of the commanded ones.
+        shown: whether the section is open initially, like the figures of `plot`.
     """
 
     heading: str
@@ -80,7 +81,7 @@ SECTIONS = (
     Section("Wrench", ("wrench", "dwrench", "ddwrench")),
     Section("Derivatives", ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness", "dtau_e", "ddtau_e")),
 )
-"""Sections of a page; other variables follow at its end."""
+"""Sections of a page; further variables follow at the end."""
 
 
 def result_page(
@@ -92,14 +93,14 @@ def result_page(
     """Return the page of results, or of simulations, as HTML.
 
     Args:
-        files: open; the differences are those to the first.
-        reports: of each file.
-        remedies: the fix of each, where something would be worth saying.
-        progress: called with the number of variables that are drawn.
+        files: open files; differences are relative to the first.
+        reports: report of each file.
+        remedies: fixes of each file, or None.
+        progress: called with the number of variables to draw.
 
     Raises:
-        InputError: the files do not belong on the same axes, hold nothing to draw, or are damaged; or what a
-            page needs is not installed.
+        InputError: the files cannot share axes, have nothing to draw, or are damaged; or a library that pages
+            need is not installed.
     """
     library = plotting_library()
     check_comparable(files)
@@ -132,9 +133,9 @@ def result_page(
 
 
 def sections_of(variables: Collection[str]) -> Iterator[Section]:
-    """Yield the sections of a file with these variables, each with those that have plots of their own.
+    """Yield the sections for these variables, each with the variables that have their own plots.
 
-    Standard deviations and the bounds of stiffness are drawn with their variable, flags as stretches.
+    Standard deviations and bounds of the stiffness are drawn with their variable, flags as time intervals.
     """
     with_others = {"flags", *BOUNDS, *map(deviation, variables)}
     own = dict.fromkeys(ACHIEVED.get(name, name) for name in variables if name not in with_others)
@@ -148,7 +149,7 @@ def sections_of(variables: Collection[str]) -> Iterator[Section]:
 
 
 def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[str, Any]:
-    """Return the values of a file that scripts need."""
+    """Return the values of a file for the scripts."""
 
     def after(spans: Sequence[Sequence[float]]) -> list[list[float]]:
         return [[time - start for time in span] for span in spans]
@@ -178,7 +179,7 @@ def _texts(file: StoredResult, label: str, report: ReportText, remedy: RemedyTex
 
 
 def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
-    """Return the stretches of each kind of trouble, for each joint, s; only kinds that there are."""
+    """Return the time intervals (s) of each kind of trouble present, for each joint."""
     if "flags" not in result.variables:
         return {}
     flags = np.asarray(result.read("flags"), dtype=np.uint32)
@@ -191,7 +192,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
 
 
 def doubtful(result: StoredResult) -> list[list[float]]:
-    """Return the stretches at both ends of a recording, s, where derivatives of its splines are unreliable.
+    """Return the intervals (s) at the ends of a recording where derivatives of its splines are unreliable.
 
     Raises:
         InputError: the report is damaged.
@@ -210,19 +211,20 @@ def doubtful(result: StoredResult) -> list[list[float]]:
 
 
 def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, int] | None:
-    """Return how the chain of a file moves, as far as its positions are known; None if they are not.
+    """Return the motion of the chain, for the animation; None if positions are not stored.
 
     Args:
-        result: the file.
-        start: time from which the page counts, s.
-        packed: holds the arrays.
+        result: result or simulation file.
+        start: time origin of the page, s.
+        packed: store of the arrays.
 
     Returns:
         Numbers of arrays in the base frame, m:
         `time`, (instants,), s after the start of the page;
         `origins` of DH frames 0 to N and of the end effector, (instants, joints + 2, 3);
-        `elbows`, where the common normal of two axes meets the first, (instants, joints, 3): from the frame
-        before, along its z axis, to there reaches the offset d, and from there to the next frame a;
+        `elbows`, intersections of the common normal of two axes with the first, (instants, joints, 3): the
+            offset d leads there along the z axis of the previous frame, the length a from there to the next
+            frame;
         `axes`, unit vectors along the axes of the joints, (instants, joints, 3).
     """
     name = next((each for each in (actual("q"), "q") if each in result.variables), None)
@@ -251,9 +253,9 @@ def measured_page(
     """Return the page of measured signals, as HTML.
 
     Args:
-        texts: texts on them; the label is the title of the page.
-        curves: by the headings of their sections; all share an axis of time.
-        computed: name of the curves compared with the measured ones.
+        texts: texts of the page; the label is its title.
+        curves: curves by heading of their section; all share a time axis.
+        computed: label of the curves compared with the measured ones.
 
     Raises:
         InputError: a library that pages need is not installed.
@@ -283,7 +285,7 @@ def measured_page(
 
 
 def _measured(curve: MeasuredCurve, computed: str, packed: Packed) -> Iterator[dict[str, Any]]:
-    """Yield a plot of both curves, and one of measured minus computed."""
+    """Yield a plot of both curves, and one of measured minus computed values."""
     over, apart = curve.charts(computed)
     name = one_line(curve.name)
     yield packed.chart(replace(over, title=name), 0.0)

@@ -1,4 +1,4 @@
-"""The page of the table of a study, or of several: margin and cost of each run, over the parameters."""
+"""The page of one or several study tables: margin and cost of each run over the parameters."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from vsacli.results.pages.packing import Packed
 from vsacli.results.store.study_table import StoredStudy
 
 MOST_RUNS = 20_000
-"""Points of a plot; with more a browser is slow, and they hide one another."""
+"""Maximum number of points in a plot; more slow a browser down and hide one another."""
 
 
 def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> str:
-    """Return the page of tables of studies, as HTML.
+    """Return the page of study tables, as HTML.
 
     Args:
-        tables: open.
-        reports: of each study.
+        tables: open tables.
+        reports: report of each study.
 
     Raises:
         InputError: a table has no margins, or no rows, or is damaged; or a library that pages need is not
@@ -44,7 +44,7 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
 
 
 def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
-    """Return the values of a study that scripts need, with arrays of the runs that are drawn."""
+    """Return the values of a study for the scripts, with arrays of the drawn runs."""
     drawn = _drawn(points)
     verdicts = table.texts("verdict")
     margins, shares = points.exceedance
@@ -71,7 +71,7 @@ def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) 
 
 
 def _drawn(points: StudyPoints) -> IndexArray:
-    """Return the rows that are drawn: all, or this many, the worst and the front among them."""
+    """Return the rows to draw: all, or `MOST_RUNS` and in addition the worst rows and the front."""
     chosen = [evenly(len(points.runs), MOST_RUNS), points.worst]
     if points.cost is not None:
         chosen.append(points.front)

@@ -3,7 +3,7 @@
 from vsacli.base.errors import StorageError
 
 try:
-    import matplotlib.font_manager  # noqa: F401 - where Matplotlib looks for a folder to keep what it finds
+    import matplotlib.font_manager  # noqa: F401 - Matplotlib creates its cache folder on this import
 except OSError as error:
     reason = "Matplotlib has no folder for its files; name one by the environment variable MPLCONFIGDIR"
     raise StorageError("figures", f"cannot be drawn: {reason}") from error

@@ -1,4 +1,4 @@
-"""Figures of stored files, drawn one by one, and figures as files: reproducible to the byte, all or none."""
+"""Figures of stored files, drawn one by one, and saved reproducibly to the byte, all or none."""
 
 from __future__ import annotations
 
@@ -25,13 +25,15 @@ Figures: TypeAlias = dict[str, Figure]
 """Figures by name, such as "motion"."""
 
 LARGE = 150.0
-"""Square inches from which on a figure is cleared away before the next is drawn; 20 joints have fewer. It is
-full of circles, and the collector, which counts objects, does not see that its picture has 100 MB."""
+"""Area (square inches) from which memory is collected before the next figure is drawn; 20 joints have less.
+Its reference cycles delay its release, and the collector, which counts objects, does not notice the 100 MB of
+its image."""
 
 FORMATS = ("png", "pdf", "svg")
 
 MOST_PIXELS = 24e6
-"""Largest picture, pixels: some 60 joints at the usual resolution, held twice by Matplotlib (4 B each)."""
+"""Largest image, pixels: some 60 joints at the usual resolution; Matplotlib holds two copies of 4 B per
+pixel."""
 
 # Without dates, so that equal results give equal files.
 _METADATA: dict[str, dict[str, str | None]] = {
@@ -42,43 +44,43 @@ _METADATA: dict[str, dict[str, str | None]] = {
 
 
 def draw_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Figure]]:
-    """Draw the figures of `plot_stored`, each when it is asked for: those of many joints are large."""
+    """Draw the figures of `plot_stored` lazily, since those of many joints are large."""
     for name, sheet in sheets_of(stored, variables):
         figure = drawn(sheet)
         large = np.prod(sheet.size) > LARGE
         yield name, figure
-        del figure, sheet  # before the next one is drawn
+        del figure, sheet  # frees memory before the next one is drawn
         if large:
             gc.collect()
 
 
 def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Figures:
-    """Draw the figures of a result or a simulation by name, all that its variables allow.
+    """Draw all figures of a result or a simulation that its variables allow, by name.
 
     Args:
-        stored: the open file, or an excerpt.
-        variables: names of those to draw instead, each in a figure that is called after it.
+        stored: open file, or an excerpt.
+        variables: names of variables to draw instead, each in a figure of its name.
 
     Raises:
-        InputError: the file has nothing to draw, or there is no curve of one of the variables.
+        InputError: the file has nothing to draw, or a variable has no curve.
     """
     return dict(draw_stored(stored, variables))
 
 
 def compare_files(files: Sequence[StoredResult], variables: Sequence[str] | None = None) -> Figures:
-    """Draw results, or simulations, of the same joints over each other; see `comparison_sheets`."""
+    """Draw results, or simulations, of the same joints on the same axes; see `comparison_sheets`."""
     return {name: drawn(sheet) for name, sheet in comparison_sheets(files, variables)}
 
 
 class FigureFiles:
-    """The files of figures, staged before the first is drawn.
+    """The files of figures, staged before the first figure is drawn.
 
     Args:
-        names: of the figures.
-        folder: of the files; it is made if it does not exist.
-        stem: beginning of their names.
+        names: names of the figures.
+        folder: folder for the files; it is created if it does not exist.
+        stem: beginning of the file names.
         file_format: one of `FORMATS`.
-        outputs: the files of the command.
+        outputs: output files of the command.
 
     Raises:
         StorageError: as `Outputs.folder` and `Outputs.file`.
@@ -92,7 +94,7 @@ class FigureFiles:
         self._files = {name: outputs.file(Path(folder) / f"{stem}-{name}.{file_format}") for name in names}
 
     def save(self, figures: Mapping[str, Figure | Sheet]) -> None:
-        """Save figures by name; sheets are drawn.
+        """Save figures by name; draw sheets first.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -113,10 +115,10 @@ def save_figures(
     """Save figures by name into a folder, all of them or none; see `FigureFiles`.
 
     Returns:
-        The paths, in the order of the figures.
+        Paths in the order of the figures.
 
     Raises:
-        StorageError: a file exists and `overwrite` is false, or the folder cannot be written.
+        StorageError: a file exists and `overwrite` is false, or the folder cannot be written to.
     """
     with Outputs(overwrite=overwrite) as outputs:
         FigureFiles(figures, folder, stem, file_format, outputs).save(figures)
@@ -132,6 +134,6 @@ def _rendered(figure: Figure, file_format: str) -> bytes:
 
 
 def _resolution(figure: Figure) -> float:
-    """Return dots an inch: as usual, but fewer for a figure that would have too many pixels."""
+    """Return the resolution, dpi: the usual one, or less for a figure with too many pixels."""
     width, height = figure.get_size_inches()
     return min(float(rcParams["savefig.dpi"]), math.sqrt(MOST_PIXELS / (width * height)))

@@ -1,4 +1,4 @@
-"""Charts as panels: curves that break at gaps, their bands and limits, cut-off peaks, shaded failures."""
+"""Charts as panels: curves with gaps, bands, limits, marks of cut-off peaks, and shaded failures."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from vsacli.results.plots.styles import LineStyle, line_style, shortened
 
 MARKERS_PER_CURVE = 8
 MARKER_STAGGER = 0.37
-"""Shift of the markers from curve to curve, in marker distances: those of coinciding curves stay apart."""
+"""Shift of the markers from curve to curve, in marker distances, so that markers of equal curves stay
+apart."""
 
 LIMIT_SIGHT = 0.5
-"""Share of the height of a panel beyond it within which limits are still drawn: farther ones would leave
-curves less than half of it."""
+"""Distance beyond a panel within which limits are still drawn, relative to its height; with more distant
+limits the curves would occupy less than half of it."""
 
 LIMIT_ROOM = 0.05
-"""Free space behind a limit, as a share of that sight."""
+"""Free space beyond a limit, relative to that distance."""
 
 ZERO: dict[str, Any] = {"color": "0.6", "linewidth": 0.8}
-"""Zero line of differences and margins."""
+"""Style of the zero line of differences and margins."""
 
 _LIMIT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (1, 2))}
 _ENVELOPE: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.5}
@@ -36,7 +37,7 @@ _SPREAD: dict[str, Any] = {"alpha": 0.3, "linewidth": 0}
 _AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "zorder": 0.8}
 _EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
 
-# Opaque and edged: bands do not darken where they meet, and a single sample stays visible.
+# Opaque with an edge, so that adjacent bands do not darken and a single sample stays visible.
 _INFEASIBLE = {"facecolor": "0.8", "edgecolor": "0.8", "linewidth": 1.5, "zorder": 0.5}
 _SINGULAR = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
@@ -45,7 +46,7 @@ _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 
 
 
 def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
-    """Draw a chart into an empty panel; return the artists of the legend besides its lines."""
+    """Draw a chart into an empty panel; return the legend entries besides those of its lines."""
     if chart.zero:
         axes.axhline(0.0, **ZERO)
     corridors = _draw_corridors(axes, chart) if chart.band == REACHABLE else None
@@ -70,23 +71,23 @@ def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
 
 
 def add_title(axes: Axes, title: str) -> None:
-    """Set the title of a panel, at its left and taken literally."""
+    """Set the title of a panel, left-aligned and without math parsing."""
     axes.set_title(shortened(title), loc="left", parse_math=False)
 
 
 def draw_curve(axes: Axes, curve: Curve, style: LineStyle, index: int = 0) -> list[Artist]:
-    """Draw a curve that breaks at NaN; a point alone between two gaps becomes a dot.
+    """Draw a curve with gaps at NaN; a single point between two gaps becomes a dot.
 
-    Of one whose samples would make a blot of a line, their mean and range.
+    A curve with an envelope is drawn by its mean and range.
 
     Args:
-        axes: where to draw.
-        curve: of a joint or result.
+        axes: panel to draw into.
+        curve: curve of a joint or result.
         style: color, dashes and marker.
-        index: number of the curve in its panel, which places its markers.
+        index: number of the curve in the panel, which shifts its markers.
 
     Returns:
-        Entries of a legend besides the line.
+        Legend entries besides the line.
     """
     time, values = (curve.time, curve.values) if curve.envelope is None else curve.envelope[:2]
     markers = _marker_points(time, index * MARKER_STAGGER % 1)
@@ -102,7 +103,7 @@ def draw_curve(axes: Axes, curve: Curve, style: LineStyle, index: int = 0) -> li
 
 
 def _marker_points(time: FloatArray, shift: float) -> list[int]:
-    """Return points next to `MARKERS_PER_CURVE` equidistant times."""
+    """Return the points nearest to `MARKERS_PER_CURVE` equidistant times."""
     wanted = time[0] + (np.arange(MARKERS_PER_CURVE) + shift) / MARKERS_PER_CURVE * (time[-1] - time[0])
     return [int(point) for point in np.unique(np.searchsorted(time, wanted))]
 
@@ -110,7 +111,8 @@ def _marker_points(time: FloatArray, shift: float) -> list[int]:
 def _draw_spreads(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
     """Draw bands of standard deviations.
 
-    The axes keep their range, as at the ends of a recording deviations may be hundreds of times those inside.
+    The axes keep their range, since deviations at the ends of a recording may be hundreds of times larger
+    than inside.
     """
     bands = [line.band for line in lines if line.band is not None]
     shown = axes.get_ylim() if bands else None
@@ -123,7 +125,7 @@ def _draw_spreads(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
 
 
 def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
-    """Draw ranges of the stiffness, as far as they are shown."""
+    """Draw attainable ranges of the stiffness, as far as they are visible."""
     bands = [line.band for line in chart.lines if line.band is not None]
     bottom, top = chart.shown or axes.get_ylim()
     for time, low, high, _ in bands:
@@ -135,7 +137,7 @@ def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
 
 
 def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
-    """Draw bounds of curves that are drawn already, as far as they are in sight or nearly so."""
+    """Draw bounds of curves already drawn; extend the axis for bounds nearly in sight, omit others."""
     low, high = axes.get_ylim()
     reach = LIMIT_SIGHT * (high - low)
     seen = {(limit.look, limit.value) for limit in limits if low - reach <= limit.value <= high + reach}
@@ -148,16 +150,16 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
 
 
 def _shade(axes: Axes, time: FloatArray, infeasible: BoolArray, singular: BoolArray) -> list[Artist]:
-    """Draw gray bands where samples are infeasible, hatched ones where they are singular, at full height.
+    """Draw full-height bands at samples that are infeasible (gray) or singular (hatched).
 
     Args:
-        axes: where to draw.
-        time: (samples,), s.
-        infeasible: (samples,).
-        singular: (samples,).
+        axes: panel to draw into.
+        time: times, (samples,), s.
+        infeasible: marks, (samples,).
+        singular: marks, (samples,).
 
     Returns:
-        Entries of a legend for the bands drawn.
+        Legend entries of the bands.
     """
     handles: list[Artist] = []
     kinds: tuple[tuple[BoolArray, dict[str, Any], str], ...] = (
@@ -173,7 +175,7 @@ def _shade(axes: Axes, time: FloatArray, infeasible: BoolArray, singular: BoolAr
 
 
 class _Peak(NamedTuple):
-    """The farthest point of a stretch at which a curve leaves the panel."""
+    """The extreme point of an interval in which a curve leaves the panel."""
 
     time: float
     value: float
@@ -181,7 +183,7 @@ class _Peak(NamedTuple):
 
 
 def _mark_peaks(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
-    """Mark where curves leave a panel whose scale near-singular peaks do not set."""
+    """Mark the peaks of near-singular samples that are cut off at the edge of a panel."""
     time = lines[0].curve.time
     middle = (time[0] + time[-1]) / 2
     for sign, end in zip((-1, 1), axes.get_ylim(), strict=True):
@@ -192,7 +194,7 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
 
 
 def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
-    """Return the farthest point of each stretch beyond one end of the panel."""
+    """Return the extreme point of each interval beyond one end of the panel."""
     time, values, color = line.curve.time, line.curve.values, line_style(line.look).color
     heights = np.where(np.isnan(values), -np.inf, sign * values)
     changes = np.flatnonzero(np.diff(heights > sign * end, prepend=False, append=False))
@@ -202,7 +204,7 @@ def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
 
 
 def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float) -> None:
-    """Draw a triangle for each peak at the edge that it leaves by, and write the height of the farthest."""
+    """Draw a triangle for each peak at the edge of the panel, and write the value of the largest."""
     place, edge = axes.get_xaxis_transform(), 0.97 if sign > 0 else 0.03
     marker = "^" if sign > 0 else "v"
     for peak in peaks:
@@ -210,9 +212,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float) -> None:
     farthest = max(peaks, key=lambda peak: sign * peak.value)
     at_right, value = farthest.time > middle, farthest.value
     axes.annotate(
-        f"{value:.0f}"
-        if 1000 <= abs(value) < 1e6
-        else f"{value:.3g}",  # exponents only where they are needed
+        f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}",  # avoids exponents
         (farthest.time, edge),
         (-6 if at_right else 6, 0),
         xycoords=place,

@@ -1,4 +1,4 @@
-"""Recorded signals and the splines that stand for them: samples, residual and spectrum of each component."""
+"""Figures of recorded signals and their splines: samples, residual and spectra of each component."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from vsacli.results.plots.styles import LineStyle, house_style, line_handle, lin
 
 COLUMNS, MOST_ROWS = 4, 14
 ROW_HEIGHT = 1.8
-"""Inches."""
+"""Height of a row of panels, inches."""
 
 LEAST_DENSITY = 1e-12
-"""Share of the largest density below which nothing is shown: it is rounding."""
+"""Density, relative to the largest, below which only rounding errors remain and nothing is shown."""
 
 _SAMPLES: dict[str, Any] = {"color": "0.65", "linewidth": 3.0}
 _NOISE: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (1, 2))}
@@ -57,7 +57,7 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
 
 
 def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) -> None:
-    """Let the panels of a column share a time axis, and label it at their lower ends."""
+    """Share the time axis of the panels of a column, and label it below the last."""
     times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
     span = np.array([min(times), max(times)])
     for first in range(0, len(panels), rows):
@@ -71,7 +71,7 @@ def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) ->
 def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     axes.plot(curve.recorded.time, curve.recorded.values, **_SAMPLES)
     handles = draw_curve(axes, curve.fitted, _FIT)
-    if not np.any(curve.spectrum.recorded):  # at rest: rounding is no scale
+    if not np.any(curve.spectrum.recorded):  # at rest: rounding errors must not set the scale
         middle = float(np.mean(curve.recorded.values))
         axes.set_ylim(middle - 0.1 * (abs(middle) or 1.0), middle + 0.1 * (abs(middle) or 1.0))
     add_title(axes, curve.name)
@@ -80,7 +80,7 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 
 def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
-    """Draw the residual of the spline, the stated noise, and the ends with poor derivatives."""
+    """Draw the residual of the spline, the reported noise, and the ends with unreliable derivatives."""
     axes.axhline(0.0, **ZERO)
     handles = draw_curve(axes, curve.residual, line_style(DIFFERENCE))
     if curve.rms > 0:
@@ -102,8 +102,8 @@ def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> list[Artist]:
     """Draw densities of a derivative on logarithmic axes.
 
-    Differentiation multiplies by the frequency: noise that is small in the signal may exceed the motion in
-    its highest derivative.
+    Differentiation multiplies by the angular frequency: noise that is small in the signal may exceed the
+    motion in its highest derivative.
     """
     spectrum = curve.spectrum
     axes.set_ylabel(rf"[{unit}/$\sqrt{{\mathrm{{Hz}}}}$]")
@@ -122,7 +122,7 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
 
 
 def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
-    """Shade the motion's band, and noise that the spline follows up to its cut-off."""
+    """Shade the frequency band of the motion, and that of noise below the cut-off of the spline."""
     first, last = float(spectrum.frequencies[0]), float(spectrum.frequencies[-1])
     handles: list[Artist] = []
     end = last if math.isnan(spectrum.cutoff) else spectrum.cutoff

@@ -1,4 +1,4 @@
-"""Sheets as figures: panels in rows and columns with common axes of time, one legend and a title."""
+"""Sheets as figures: panels in rows and columns with common time axes, one legend and a title."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from vsacli.results.plots.panels import draw_chart
 from vsacli.results.plots.styles import house_style, line_handle, line_style, make_legible, shortened
 
 LATE = 1e5
-"""First time, s, from which on ticks count from it: their digits would not fit side by side."""
+"""Start time, s, from which ticks count from the start, since their digits would not fit side by side."""
 
 FINE, FEW_TICKS = 0.1, 4
-"""Length of a span, s, below which the digits of more than this many ticks would not fit side by side."""
+"""Time span, s, below which the digits of more than `FEW_TICKS` ticks would not fit side by side."""
 
 TITLE_LENGTH, LABEL_BESIDE = 70, 16
-"""Characters of a title, and of a name beside a panel."""
+"""Maximum length of a title, and of a name next to a panel, characters."""
 
 _INCHES_PER_CHARACTER = 0.07
 _INCHES_PER_HANDLE = 0.7
@@ -38,7 +38,7 @@ AxesGrid = npt.NDArray[Any]
 
 
 def drawn(sheet: Sheet) -> Figure:
-    """Draw a figure."""
+    """Draw a sheet as a figure."""
     with house_style():
         figure = Figure(sheet.size, layout="constrained")
         places = figure.add_gridspec(1, len(sheet.blocks), width_ratios=list(sheet.widths))
@@ -49,12 +49,12 @@ def drawn(sheet: Sheet) -> Figure:
 
 
 def line_handles(lines: charts.Legend) -> list[Artist]:
-    """Return the entries of a legend for lines."""
+    """Return the legend entries of lines."""
     return [line_handle(line_style(look), label) for label, look in lines.items()]
 
 
 def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
-    """Draw charts into panels of their own; return the artists of the legend besides the lines."""
+    """Draw the charts of a block; return the legend entries besides those of the lines."""
     handles: list[Artist] = []
     panels = _panels(place, block)
     for of_row, row in zip(panels, block.rows, strict=True):
@@ -67,7 +67,7 @@ def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
 
 
 def _panels(place: SubplotSpec, block: Block) -> AxesGrid:
-    """Return the panels of a block, (rows, columns); those without a chart are removed."""
+    """Return the panels of a block, (rows, columns); panels without a chart are removed."""
     rows, folds = block.folding
     each, columns = len(block.heights), len(block.rows[0])
     places = place.subgridspec(rows * each, folds * columns, height_ratios=[*block.heights] * rows)
@@ -88,7 +88,7 @@ def _panels(place: SubplotSpec, block: Block) -> AxesGrid:
 
 
 def share_time(column: Sequence[Axes], time: FloatArray, label: str = f"time [{TIME}]") -> None:
-    """Let panels, top to bottom, share an axis of time over this span, labelled below the last."""
+    """Share a time axis with this span among panels, top to bottom, and label it below the last."""
     for axes in column[:-1]:
         axes.sharex(column[-1])
         axes.tick_params(labelbottom=False)
@@ -104,7 +104,7 @@ def share_time(column: Sequence[Axes], time: FloatArray, label: str = f"time [{T
 
 
 def _name_beside(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Name lines beside a panel, at its right."""
+    """Add a legend of lines at the right of a panel."""
     labels = [shortened(str(handle.get_label()), LABEL_BESIDE) for handle in handles]
     _take_literally(axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5)))
 

@@ -1,4 +1,4 @@
-"""Torque over speed of each motor, within its peak and continuous limits."""
+"""Figure of torque over speed of each motor, with its peak and continuous limits."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import house_style, line_style, shortened
 
 PANEL_HEIGHT = 2.3
-"""Inches."""
+"""Height of a panel, inches."""
 
 TITLE_LENGTH = 32
-"""Characters of each of its two lines that a panel is wide."""
+"""Characters in a line of the title of a panel, which has two lines."""
 
 MOST_ROWS = 6
-"""Rows of two panels before further ones begin to the right."""
+"""Maximum number of rows of two panels; further panels continue at the right."""
 
 SIGHT = 6.0
-"""Limits beyond the motion by this factor are not shown, so that the motion remains visible."""
+"""Limits larger than the motion by more than this factor are not shown, so that the motion stays visible."""
 
 ROOM = 1.08
 """Factor by which axes extend beyond their content."""
 
 POINTS = 400
-"""Points on the edge of the operating range of a motor."""
+"""Number of points on the edge of the operating range of a motor."""
 
 PEAK_LOOK: dict[str, Any] = {"facecolor": "#e8eef9", "linewidth": 0.0}
 CONTINUOUS_LOOK: dict[str, Any] = {"facecolor": "#c3d4f1", "linewidth": 0.0}
@@ -49,13 +49,13 @@ EDGE, BRAKING = "0.35", 0.3
 
 
 class Bounds(NamedTuple):
-    """The limits of a motor, infinite where there is none.
+    """Limits of a motor, infinite where there is none.
 
     Attributes:
-        max_torque, continuous_torque: largest, and of the root mean square.
-        max_velocity: largest speed.
-        max_voltage: largest voltage.
-        torque_constant, resistance: which make a voltage of torque and speed.
+        max_torque, continuous_torque: maximum of torque, and of its root mean square.
+        max_velocity: maximum speed.
+        max_voltage: maximum voltage.
+        torque_constant, resistance: constants that relate the voltage to torque and speed.
     """
 
     max_torque: float
@@ -66,7 +66,7 @@ class Bounds(NamedTuple):
     resistance: float
 
     def torque_at(self, speed: FloatArray) -> FloatArray:
-        """Return the largest torque that drives at a speed; NaN where it cannot turn so fast."""
+        """Return the largest driving torque at a speed; NaN above the largest attainable speed."""
         torque = np.full_like(speed, self.max_torque)
         if math.isfinite(self.max_voltage):
             left = self.max_voltage - self.torque_constant * speed
@@ -80,15 +80,15 @@ class Bounds(NamedTuple):
 
 
 class TorqueSpeed(NamedTuple):
-    """A motor over some motions.
+    """Operating points of a motor over some motions.
 
     Attributes:
-        name: whose motor it is.
-        drive: which motor, with which gear.
-        torque_unit, velocity_unit: of the values below.
-        bounds: of the motor.
-        runs: by trajectory its velocities and torques, each (samples,).
-        rms: root mean squares of velocity and torque over all of them.
+        name: joint and motor.
+        drive: motor model and gear.
+        torque_unit, velocity_unit: units of the values.
+        bounds: limits of the motor.
+        runs: velocities and torques, each (samples,), by trajectory.
+        rms: root mean squares of velocity and torque over all trajectories.
     """
 
     name: str
@@ -101,7 +101,7 @@ class TorqueSpeed(NamedTuple):
 
 
 def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
-    """Draw a panel for each motor: sizes of torque over sizes of speed, paler where it brakes."""
+    """Draw a panel for each motor: |torque| over |speed|, paler where it brakes."""
     with house_style():
         folds = math.ceil(len(motors) / (2 * MOST_ROWS))
         columns = min(2 * folds, len(motors))
@@ -122,7 +122,7 @@ def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
 
 
 def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
-    """Draw a panel; return its artists for the legend."""
+    """Draw a panel; return its legend entries."""
     speeds, torques = (np.concatenate([np.abs(run[part]) for run in motor.runs.values()]) for part in (0, 1))
     right = _end(float(speeds.max()), [min(motor.bounds.max_velocity, _fastest(motor.bounds))])
     top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
@@ -143,13 +143,13 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
 
 
 def _end(used: float, bounds: Sequence[float]) -> float:
-    """Return the end of an axis: beyond the motion, and beyond visible bounds."""
+    """Return the end of an axis, beyond the motion and beyond visible bounds."""
     seen = [bound for bound in bounds if bound <= SIGHT * used]
     return ROOM * max([used, *seen]) or 1.0
 
 
 def _fastest(bounds: Bounds) -> float:
-    """Return the speed at which the voltage leaves no torque."""
+    """Return the no-load speed at the maximum voltage."""
     return bounds.max_voltage / bounds.torque_constant if math.isfinite(bounds.max_voltage) else math.inf
 
 
@@ -173,7 +173,7 @@ def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[A
 
 
 def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, color: str) -> None:
-    """Draw sizes of torque over sizes of speed, dark where the motor drives."""
+    """Draw |torque| over |speed|, dark where the motor drives."""
     drives = velocity * torque >= 0
     for shown, alpha, order in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
         axes.plot(

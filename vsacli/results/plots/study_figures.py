@@ -1,6 +1,6 @@
 """Figures of studies: margin and cost over the parameters, the Pareto front, the probability of success.
 
-And the ranking of a sensitivity analysis: a bar for each parameter.
+The ranking of a sensitivity analysis has a bar for each parameter.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from vsacli.results.plots.styles import house_style, line_handle, line_style, sh
 from vsacli.results.store.study_table import StoredStudy
 
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
-"""Names of the figures; the files are called `<stem>-<name>`."""
+"""Names of the figures, whose files are called `<stem>-<name>`."""
 
 PANEL_HEIGHT = 2.4
-"""Inches."""
+"""Height of a panel, inches."""
 
 MOST_LETTERS = 30
-"""Longest label in one line along a panel."""
+"""Longest label on one line along a panel, characters."""
 
 MOST_PANELS = 6
-"""Numbers that vary whose panels one figure holds: those that the margin follows most."""
+"""Maximum number of parameters in one figure: those with the highest correlation to the margin."""
 
 BAR_HEIGHT = 0.28
-"""Inches."""
+"""Height of a bar, inches."""
 
 LABEL_LENGTH, ROOM_FOR_LABELS = 16, 0.35
-"""Characters of a joint's name beside its bar, and the space for it, relative to the longest bar."""
+"""Characters of a joint's name next to its bar, and the space for it, relative to the longest bar."""
 
 _FINE, _LOST = line_style(2).color, line_style(1).color
 
 
 def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
-    """Draw the figures of the table of a study, by name.
+    """Draw the figures of a study table, by name.
 
     Raises:
         InputError: there is nothing to draw.
@@ -64,17 +64,17 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
 
 
 def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Figure:
-    """Draw how probable each margin is in several studies.
+    """Draw the distribution of margins of several studies.
 
     Raises:
-        InputError: there is nothing to draw in one.
+        InputError: a study has nothing to draw.
     """
     with house_style():
         return _feasibility([StudyPoints(table) for table in tables], labels)
 
 
 def _over_numbers(points: StudyPoints) -> Figure:
-    """Draw margin, and cost below, over each number that varies."""
+    """Draw margin, and cost below, over each varying parameter."""
     paths = _most_followed(points)
     rows = 1 if points.cost is None else 2
     figure = Figure((PANEL_WIDTH * max(2, len(paths)), PANEL_HEIGHT * rows + 0.9), layout="constrained")
@@ -93,7 +93,7 @@ def _over_numbers(points: StudyPoints) -> Figure:
 
 
 def _most_followed(points: StudyPoints) -> list[str]:
-    """Return the numbers that the margin follows most, by their correlation, in the order of the table."""
+    """Return the parameters with the highest correlation to the margin, in the order of the table."""
     there = np.isfinite(points.margin)
 
     def followed(path: str) -> float:
@@ -128,7 +128,7 @@ def _handles(points: StudyPoints) -> list[Line2D]:
 
 
 def _is_grid(points: StudyPoints) -> bool:
-    """Return whether two numbers vary, each value of one combined once with each of the other."""
+    """Return whether two parameters vary on a full grid: each pair of their values occurs once."""
     if len(points.varying) != 2:
         return False
     pairs = np.column_stack(list(points.varying.values()))
@@ -137,7 +137,7 @@ def _is_grid(points: StudyPoints) -> bool:
 
 
 def _over_map(points: StudyPoints) -> Figure:
-    """Draw margin and cost, or costs before and after an optimization, as maps over two numbers."""
+    """Draw margin and cost, or costs before and after an optimization, as maps over two parameters."""
     (across, x), (up, y) = points.varying.items()
     maps = points.shown
     figure = Figure((1.5 * PANEL_WIDTH * len(maps), PANEL_HEIGHT + 1.2), layout="constrained")
@@ -163,12 +163,12 @@ def _over_map(points: StudyPoints) -> Figure:
 
 
 def _fitting(label: str) -> str:
-    """Return a label with its unit, in two lines if it is longer than a panel is high."""
+    """Return a label with its unit, on two lines if it is longer than a panel is high."""
     return label if len(label) <= MOST_LETTERS else label.replace(" [", "\n[")
 
 
 def _pareto(points: StudyPoints) -> Figure:
-    """Draw cost over margin of the feasible runs, and those of which none is better in both."""
+    """Draw cost over margin of the feasible runs, with the Pareto front."""
     assert points.cost is not None, "see study_figures"
     words, cost = points.cost
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
@@ -187,7 +187,7 @@ def _pareto(points: StudyPoints) -> Figure:
 
 
 def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figure:
-    """Draw the share of the runs whose smallest margin is at least so large, and of the feasible ones."""
+    """Draw the share of runs with at least a given margin; the legend gives the share of feasible runs."""
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
     axes, handles = figure.add_subplot(), []
     for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
@@ -205,7 +205,7 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figur
 
 
 def _label(points: StudyPoints, path: str) -> str:
-    """Return the label of an axis with a number."""
+    """Return the axis label of a parameter."""
     unit = points.unit(path)
     return f"{shortened(path)}\n[{unit}]" if unit else shortened(path)
 
@@ -214,9 +214,9 @@ class Bar(NamedTuple):
     """The effect of a change of a parameter.
 
     Attributes:
-        label: the parameter, and its change.
-        share: largest change of a motor torque over the largest torque of its joint.
-        joint: that one.
+        label: parameter and its change.
+        share: largest change of a motor torque, relative to the largest torque of its joint.
+        joint: joint of that motor.
     """
 
     label: str
@@ -225,7 +225,7 @@ class Bar(NamedTuple):
 
 
 def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
-    """Draw a bar for each parameter, the most important on top, with the joint that it moves most."""
+    """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
     with house_style():
         figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
         axes = figure.add_subplot()

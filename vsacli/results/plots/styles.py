@@ -1,7 +1,7 @@
-"""Looks of all panels: settings of Matplotlib, line styles, and names that fit and can be read.
+"""Appearance of all panels: settings of Matplotlib, line styles, and names that fit and are legible.
 
-The first line styles are the paper's, continued to any number of joints. Names in letters that Matplotlib's
-own font lacks are drawn in a font of this machine, or else by their codes.
+The first line styles are the paper's, continued for any number of joints. Characters that Matplotlib's own
+font lacks are drawn in a font of this machine, or else as escape codes.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ SETTINGS: dict[RcKeyType, Any] = {
 }
 
 LONGEST_LABEL = 36
-"""Characters of a name that fit into a legend."""
+"""Maximum length of a name in a legend, characters."""
 
-# Black, red and blue are the paper's; with the others each remains apart for colour-blind readers.
+# Black, red and blue are the paper's; all colors are distinct for color-blind readers.
 _COLORS = ("black", "#d8261c", "#1f4fd8", "#009e73", "#e69f00", "#9b4f96", "#56b4e9", "#8c564b")
-# One more than the colours, so that the pairs repeat only after 72 joints.
+# One more than the colors, so that pairs repeat only after 72 joints.
 _STROKES = (
     ("-", ""),
     ("--", ""),
@@ -73,7 +73,7 @@ _STROKES = (
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Color, dashes and marker of a line, in Matplotlib's words."""
+    """Color, dashes and marker of a line, in Matplotlib's terms."""
 
     color: str
     linestyle: str
@@ -81,26 +81,26 @@ class LineStyle:
 
     @property
     def words(self) -> dict[str, Any]:
-        """Keyword arguments of a line."""
+        """Keyword arguments for a line."""
         return {**dataclasses.asdict(self), "markerfacecolor": "none"}
 
 
 def line_style(index: int) -> LineStyle:
-    """Return the style of a look: from 0 solid black, dashed red, blue with +, and so on."""
+    """Return the style of a look: 0 solid black, 1 dashed red, 2 blue with +, and so on."""
     if index == DIFFERENCE:
         return LineStyle(_COLORS[2], "-", "")
     return LineStyle(_COLORS[index % len(_COLORS)], *_STROKES[index % len(_STROKES)])
 
 
 def shortened(name: str, length: int = LONGEST_LABEL) -> str:
-    """Cut a name in its middle to a length a figure can hold; names often differ at their ends."""
+    """Shorten a name in its middle to a length that fits a figure, since names often differ at their ends."""
     tail = length // 2
     return name if len(name) <= length else name[: length - tail - 1] + "…" + name[-tail:]
 
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw with these settings alone, whatever a matplotlibrc on this machine says."""
+    """Draw with these settings alone, regardless of a matplotlibrc on this machine."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
@@ -108,24 +108,24 @@ def house_style() -> Iterator[None]:
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
-    """Return the entry of a legend for a curve."""
+    """Return the legend entry of a curve."""
     return Line2D([], [], **style.words, label=label)
 
 
 USUAL = "DejaVu Sans"
-"""The font that comes with matplotlib."""
+"""Default font, included in Matplotlib."""
 
 SUBSTITUTE = "Last Resort"
-"""Beginning of the name of the font that draws a picture of its script for every letter."""
+"""Beginning of the name of a fallback font, which draws the same symbol for all letters of a script."""
 
 REGULAR = 400
-"""Weight of a font that is neither bold nor light."""
+"""Font weight that is neither bold nor light."""
 
 
 def make_legible(figure: Figure) -> None:
-    """Give texts a further font for letters missing in the usual one; letters that no font has become codes.
+    """Add fonts for characters missing in the default font; characters in no font become escape codes.
 
-    Otherwise two names in a script without installed font would be two rows of equal boxes.
+    Otherwise two names in a script without an installed font would look the same, as rows of boxes.
     """
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -146,13 +146,13 @@ def _mend(text: Text, missing: frozenset[str]) -> None:
 
 @cache
 def usual_letters() -> frozenset[str]:
-    """Return the letters of the usual font, and the end of a line."""
+    """Return the characters of the default font, and the line feed."""
     return _letters(findfont(USUAL)) | {"\n"}
 
 
 @cache
 def further_fonts(missing: frozenset[str]) -> tuple[tuple[str, frozenset[str]], ...]:
-    """Return names of installed fonts that draw some of these letters, each with those it is for."""
+    """Return names of installed fonts for these characters, each with the characters that it supplies."""
     found = []
     for entry in installed_fonts():
         if not missing:
@@ -175,7 +175,7 @@ def installed_fonts() -> Iterator[FontEntry]:
 
 @cache
 def _letters(path: str) -> frozenset[str]:
-    """Return the letters of a font; none for fonts of colored pictures, which have no outlines."""
+    """Return the characters of a font; none for color bitmap fonts, which have no outlines."""
     try:
         font = get_font(path)
         font.set_size(10, 72)

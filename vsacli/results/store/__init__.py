@@ -1,7 +1,7 @@
-"""The result file: written atomically, read with nothing but h5py; format page: docs/file-formats."""
+"""The result file: written atomically, readable with h5py alone; see docs/file-formats for its format."""
 
 from vsacli.base.interrupts import interrupts_deferred
 
 with interrupts_deferred():
-    # When a process ends HDF5 calls into h5py, and crashes, if the import came no further than half its way.
+    # At exit HDF5 calls into h5py, and crashes if the import of h5py was interrupted.
     import h5py  # noqa: F401  # the modules in here import it themselves

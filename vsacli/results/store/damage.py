@@ -1,8 +1,8 @@
-"""Checks of damaged and hostile HDF5 files, which keep from the library what it would not survive.
+"""Checks of damaged and malicious HDF5 files, which protect the HDF5 library.
 
-HDF5 reports most damage by exceptions. It loops without end on one kind, an object of size zero in a heap of
-texts, and it allocates whatever a damaged shape asks for. Nothing is looked at before it is needed: opening
-a file takes no longer the more samples it holds.
+HDF5 reports most damage by exceptions. On an object of size zero in a heap of texts it loops forever, and it
+allocates as much memory as a damaged shape requests. Content is checked only when it is needed, so the time
+to open a file does not depend on the number of samples.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _HEAP = b"GCOL\x01\0\0\0"
 _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
 _LARGEST_CHUNK = 2**20
-"""Bytes that a chunk may have in memory, whatever it is compressed to in the file."""
+"""Bytes that a chunk may have in memory, regardless of its compressed size in the file."""
 
 
 class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
-    """An HDF5 file open for reading, of which the library sees no heap of texts that it would not survive.
+    """An HDF5 file open for reading, whose damaged heaps of texts are hidden from the library.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Raises:
-        InputError: there is no such file, or it is none of HDF5, or damaged where it begins.
+        InputError: the file does not exist, is not HDF5, or is damaged at its beginning.
         StorageError: the operating system refuses to read it, or another program is writing it.
     """
 
@@ -66,16 +66,16 @@ class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
         self._bytes.close()
 
     def bytes_at(self, offset: int, size: int) -> bytes:
-        """Bytes of the file as they are, fewer if it ends before."""
+        """Return bytes of the file unchanged, fewer at the end of the file."""
         self._bytes.seek(offset)
         return self._bytes.read(size)
 
 
 class _CheckedBytes(io.FileIO):
-    """A file as HDF5 is given it: in place of a heap of texts that has no end, it reads zeros.
+    """A file as passed to HDF5: zeros replace a heap of texts in which HDF5 would loop forever.
 
-    HDF5 reads a heap from its first byte on, whole or its first 4096 bytes, and refuses one that does not
-    begin as heaps do.
+    HDF5 reads a heap from its first byte on, whole or its first 4096 bytes, and refuses one without the
+    signature of heaps.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -87,20 +87,20 @@ class _CheckedBytes(io.FileIO):
             raise
 
     def readinto(self, buffer: Any) -> int:
-        """Read bytes, all that there are."""
+        """Fill the buffer from the file; beyond the end of the file with zeros."""
         view, start, done = memoryview(buffer), self.tell(), 0
         while count := super().readinto(view[done:]):
             done += count
         if bytes(view[: len(_HEAP)]) == _HEAP and not self._ends(start):
             done = 0
-        view[done:] = bytes(len(view) - done)  # beyond the end of the file there is nothing
+        view[done:] = bytes(len(view) - done)  # zeros beyond the end of the file, or in place of the heap
         return len(view)
 
     def _ends(self, offset: int) -> bool:
-        """Return whether a heap is as large as it says, and each of its objects ends.
+        """Return whether a heap is as large as its header states, and each of its objects ends.
 
-        A heap collection (HDF5 file format 3.0, III.E) is a row of objects, each after its header of index,
-        reference count and size; index 0 is the free space at the end.
+        A heap collection (HDF5 file format 3.0, III.E) is a sequence of objects, each after its header of
+        index, reference count and size; index 0 is the free space at the end.
         """
         self.seek(offset)
         head = self.read(_COLLECTION.size)
@@ -109,10 +109,10 @@ class _CheckedBytes(io.FileIO):
 
 
 def _lock(file: io.FileIO) -> None:
-    """Tell programs that would write a file that it is read, as HDF5 itself does, where the system can.
+    """Lock a file for reading, as HDF5 itself does, where the system supports it.
 
     Raises:
-        BlockingIOError: one is writing.
+        BlockingIOError: another program is writing the file.
     """
     if os.environ.get("HDF5_USE_FILE_LOCKING", "").upper() in ("FALSE", "0"):
         return
@@ -127,7 +127,7 @@ def _lock(file: io.FileIO) -> None:
 
 
 def _check_signature(path: str | Path) -> None:
-    """Tell a missing file, a folder and a file of another kind from each other before HDF5 sees them."""
+    """Refuse a missing file, a pipe, a folder, and files other than HDF5, before HDF5 opens them."""
     if "\0" in str(path):
         raise InputError.one("the path holds a NUL character", path)
     try:
@@ -148,7 +148,7 @@ def _check_signature(path: str | Path) -> None:
 
 @contextlib.contextmanager
 def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
-    """HDF5 reports truncation and corruption, here of something in a file, by any of these exceptions."""
+    """Turn exceptions by which HDF5 reports truncation or corruption, here of `what`, into InputError."""
     try:
         yield
     except InputError:
@@ -184,11 +184,11 @@ def _all_end(objects: bytes) -> bool:
 
 
 def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
-    """Return a dataset if its values are in this file and need no more memory at a time than it has bytes.
+    """Return a dataset if its values are in this file, and chunks and texts claim no more bytes than it has.
 
     Raises:
-        KeyError: there is none.
-        ValueError: it is a link to another file or kept there, or its chunks or texts ask for more.
+        KeyError: the dataset does not exist.
+        ValueError: the dataset is a link or stored elsewhere, or its chunks or texts are too large.
     """
     for path in accumulate(name.split("/"), "{}/{}".format):
         link = file.get(path, getlink=True)
@@ -206,10 +206,10 @@ def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
 
 
 def check_present(attributes: Container[str], needed: Iterable[str], name: str = "the file") -> None:
-    """Refuse something that lacks attributes which each file has.
+    """Refuse an object that lacks attributes required in each file.
 
     Raises:
-        ValueError: naming those that are missing.
+        ValueError: with the missing attributes.
     """
     missing = [each for each in needed if each not in attributes]
     if missing:
@@ -217,20 +217,20 @@ def check_present(attributes: Container[str], needed: Iterable[str], name: str =
 
 
 def read_attributes(file: h5py.File) -> None:
-    """Read all attributes of everything once: damage of one shows only then."""
+    """Read all attributes of all objects once, since damage of one shows only then."""
     file.visititems(lambda _name, each: dict(each.attrs) and None)
 
 
 def file_size(file: h5py.File) -> int:
-    """Bytes of an open file."""
+    """Return the bytes of an open file."""
     return int(file.id.get_filesize())
 
 
 def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
-    """Return the dataset, if to read it whole takes no more memory than its file has bytes.
+    """Return the dataset if its values need no more memory than its file has bytes.
 
     Raises:
-        ValueError: its shape asks for more.
+        ValueError: the values need more memory.
     """
     size = file_size(dataset.file)
     if dataset.nbytes > size:
@@ -239,11 +239,10 @@ def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
 
 
 def check_times(time: FloatArray) -> None:
-    """Refuse times that no run has, which searches, splines and rates would not survive.
+    """Refuse times that no run has, on which searches, splines and rates would fail.
 
     Raises:
-        ValueError: one is not finite or not later than the one before, or they last longer than any
-            trajectory.
+        ValueError: times are not finite or not ascending, or beyond the range allowed in trajectories.
     """
     finite, rising = np.isfinite(time), time[1:] > time[:-1]
     if not finite.all():
@@ -257,7 +256,7 @@ def check_times(time: FloatArray) -> None:
 
 
 def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
-    """The size that follows from the shape of a chunk, and the one that the library allocates."""
+    """Check the size that follows from the shape of a chunk, and the size that the library allocates."""
     if dataset.chunks is None:
         return
     claimed = dataset.dtype.itemsize
@@ -270,7 +269,7 @@ def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
 
 
 def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
-    """Texts of any length are references to heaps, each a length, an address and an index."""
+    """Check the total length of texts, stored as references to heaps with length, address and index."""
     offset, size = dataset.id.get_offset(), file_size(file)
     if offset is None:
         return

@@ -1,4 +1,4 @@
-"""Files in the layout of a result file: simulations, and results with derivatives by numbers of the robot."""
+"""Files in the layout of a result file: simulations, and results with derivatives by robot parameters."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 _COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
-"""Variables beside their derivatives."""
+"""Variables stored in addition to the derivatives."""
 
 _SLOPE = "_slope"
-"""Ending of the names of derivatives."""
+"""Suffix of the names of derivatives."""
 
 
 class SimulationWriter(ResultWriter):
-    """Writes a simulation file; the trajectory's samples are the most it can have.
+    """Writer of a simulation file, with at most as many samples as the trajectory.
 
     Args:
-        file, robot, trajectory, provenance: as of `ResultWriter`.
-        sensed: whether the run has readings of sensors.
+        file, robot, trajectory, provenance: as for `ResultWriter`.
+        sensed: whether the run has sensor readings.
     """
 
     _format = SIMULATION
@@ -55,7 +55,7 @@ class SimulationWriter(ResultWriter):
 
 
 class Number(NamedTuple):
-    """A number of the robot: the path to it, its value in SI units, and its unit."""
+    """A parameter of the robot: its path, its value in SI units, and its unit."""
 
     path: str
     value: float
@@ -63,7 +63,7 @@ class Number(NamedTuple):
 
 
 class Sloped(Protocol):
-    """Consecutive steps with derivatives."""
+    """Consecutive samples with derivatives."""
 
     @property
     def time(self) -> FloatArray:
@@ -71,18 +71,18 @@ class Sloped(Protocol):
 
     @property
     def block(self) -> Block:
-        """The variables themselves."""
+        """Variables at these samples."""
 
     def over_time(self, name: str) -> FloatArray:
-        """Derivatives of a variable, (samples, numbers, joints[, 2])."""
+        """Return derivatives of a variable, (samples, parameters, joints[, 2])."""
 
 
 class SensitivityWriter(ResultWriter):
-    """Writes a sensitivity file.
+    """Writer of a sensitivity file.
 
     Args:
-        numbers: by which is differentiated.
-        slopes: names of the variables that are, each with whether it is one of motors.
+        numbers: parameters of the derivatives.
+        slopes: names of the differentiated variables, each with whether it is a variable of motors.
     """
 
     _format = SENSITIVITY
@@ -130,7 +130,7 @@ class SensitivityWriter(ResultWriter):
         return dataset
 
     def _values(self, block: Any, name: str) -> AnyArray:
-        """Return the values of a block, as `Sloped`, for a dataset."""
+        """Return the values of a `Sloped` block for a dataset."""
         variable = name.removesuffix(_SLOPE)
         return super()._values(block.block, name) if variable == name else block.over_time(variable)
 

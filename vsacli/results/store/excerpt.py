@@ -1,4 +1,4 @@
-"""A part of a result or simulation: some of its joints, over a stretch of time."""
+"""A part of a result or simulation: some joints over a time span."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from vsacli.base.variables import OF_ANY_ROBOT, Variable
 from vsacli.results.store.reader import StoredResult
 
 Span = tuple[float, float]
-"""First and last time of a stretch, both included, s."""
+"""First and last time of a span, both included, s."""
 
 WHOLE: Span = (-math.inf, math.inf)
 
 
 class Excerpt(StoredResult):
-    """Some joints of an open file over a stretch of time, read as if the file held nothing else.
+    """Some joints of an open file over a time span, with the interface of a file that contains only these.
 
     Args:
-        whole: the open file, which has to stay open.
-        joints: names, base to tip whatever their order here; all if there are none.
-        span: the stretch of time.
+        whole: open file, which must stay open.
+        joints: names in any order, read from base to tip; all joints if empty.
+        span: time span.
 
     Raises:
-        InputError: a joint is not one of the file's, or no step lies in the stretch.
+        InputError: a joint is unknown, or no sample lies in the span.
     """
 
     def __init__(self, whole: StoredResult, joints: Sequence[str] = (), span: Span = WHOLE) -> None:
-        vars(self).update(vars(whole))  # all but what follows is that of the whole file
+        vars(self).update(vars(whole))  # everything not set below is that of the whole file
         self.kind, self.command, self.declared = whole.kind, whole.command, whole.declared
         self._original, self._steps = whole, steps_between(whole.time, span, whole.path)
         self._joints = joint_numbers(whole.joint_names, joints, whole.path)
@@ -48,7 +48,7 @@ class Excerpt(StoredResult):
         )
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
-        """Steps start..stop-1 of the stretch; see `StoredResult.read`."""
+        """Read samples start..stop-1 of the span; see `StoredResult.read`."""
         first = self._steps.start
         end = self.samples if stop is None else min(stop, self.samples)
         values = self._original.read(name, first + start, first + end)
@@ -75,16 +75,16 @@ class Excerpt(StoredResult):
         return self._original.existing(variable)[self._joints]
 
     def has(self, variable: Variable) -> bool:
-        """Return whether the variable is one of these joints, as far as that depends on the robot file."""
+        """Return whether these joints have the variable, as far as that depends on the robot file."""
         one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
         return one_of_them and super().has(variable)
 
 
 def steps_between(time: FloatArray, span: Span, path: str | Path) -> slice:
-    """Return which of ascending times lie in a stretch.
+    """Return the slice of ascending times that lie in a span.
 
     Raises:
-        InputError: none does; names the file.
+        InputError: no time does; with the file.
     """
     start, stop = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
     if start >= stop:
@@ -99,10 +99,10 @@ def _words(span: Span) -> str:
 
 
 def joint_numbers(names: Sequence[str], chosen: Sequence[str], path: str | Path) -> list[int]:
-    """Return the numbers of chosen joints, ascending; those of all if none is chosen.
+    """Return the indices of the chosen joints, ascending; all if none is chosen.
 
     Raises:
-        InputError: a joint is not among the names; names the file.
+        InputError: a joint is not among the names; with the file.
     """
     unknown = [name for name in chosen if name not in names]
     if unknown:

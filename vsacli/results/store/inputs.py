@@ -1,4 +1,4 @@
-"""The files that a run has read, whole inside its result: so it can be repeated, and they be had back."""
+"""Input files of a run, stored in its result, so that the run can be repeated and the files be extracted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vsacli.results.store.damage import CheckedFile, own_dataset
 from vsacli.results.store.schema import TEXT, storable
 
 LARGEST_STORED = 256 * 2**20
-"""Bytes up to which a file is stored; a recording of a million rows and fifteen columns has 200 MB."""
+"""Maximum size (bytes) of a stored file; a recording of a million rows and fifteen columns has 200 MB."""
 
 CHUNK = 2**20
 COMPRESSION = 1
@@ -25,14 +25,14 @@ COMPRESSION = 1
 
 
 class StoredInput(NamedTuple):
-    """A file that a run has read.
+    """An input file of a run.
 
     Attributes:
-        path: as the command was given it.
-        sha256: of its content, in hex.
-        role: "robot" or "trajectory" of the file that describes one, else empty.
-        content: its text; None if it was too large to be stored.
-        changes: changes after reading, values by path.
+        path: path as given on the command line.
+        sha256: digest of the content, hexadecimal.
+        role: "robot" or "trajectory" for the file that describes one, else empty.
+        content: content of the file; None if it was too large to store.
+        changes: changes applied after reading, values by path.
     """
 
     path: str
@@ -43,11 +43,11 @@ class StoredInput(NamedTuple):
 
 
 def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]]) -> None:
-    """Write a subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice.
+    """Write a subgroup `file_1`, `file_2`, ... for each input file, once even if it was used twice.
 
     Args:
-        inputs: the group.
-        sources: by the thing they describe; the first file of each leads to the others.
+        inputs: group to write to.
+        sources: files by the object that they describe; the first file of each refers to the others.
     """
     roles = {files[0]: role for role, files in sources.items() if files}
     every = dict.fromkeys(source for files in sources.values() for source in files)
@@ -65,7 +65,7 @@ def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]])
 
 
 def _write_content(group: h5py.Group, source: Source) -> None:
-    """The bytes of a large file, unless it is another by now."""
+    """Write the bytes of a large file, unless it has changed since it was read."""
     try:
         with open(place_of(source.path), "rb") as file:
             size = os.fstat(file.fileno()).st_size
@@ -84,11 +84,11 @@ def _write_content(group: h5py.Group, source: Source) -> None:
                 piece = np.frombuffer(file.read(CHUNK), np.uint8)
                 stored[start : start + len(piece)] = piece
     except OSError:
-        return  # it has gone, and the run with what was read of it goes on
+        return  # the file is gone; the run continues with the data read from it
 
 
 def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
-    """Yield the files, in the order in which they were written."""
+    """Yield the input files in the order in which they were written."""
     number = 1
     while (name := f"inputs/file_{number}") in file:
         attributes = {key: str(value) for key, value in file[name].attrs.items()}

@@ -37,13 +37,13 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper"), "direction": ("negative", "positive")}
-"""Dimensions that only the robot's arrays have, each if an array has it."""
+"""Labels of dimensions that only the robot's arrays have; each is written if an array has it."""
 
 GZIP_LEVEL = 4
 
 
 def row_bytes(variable: Variable, joints: int, precision: str) -> int:
-    """Return the size of one sample."""
+    """Return the size of one sample in bytes."""
     return math.prod(row_shape(variable, joints)) * storage_type(variable, precision).itemsize
 
 
@@ -59,16 +59,16 @@ def create_layout(
     """Write everything that is known before the first sample; the time axis has its planned length.
 
     Args:
-        file: without content.
-        format_name: of the attribute `format`.
-        robot: the robot.
-        trajectory: the trajectory.
-        variables: those that are stored.
-        provenance: further root attributes on how they are computed.
-        precision: of the values, one of `FLOATS`.
+        file: empty file.
+        format_name: value of the attribute `format`.
+        robot: robot of the run.
+        trajectory: trajectory of the run.
+        variables: variables to store.
+        provenance: further root attributes on the computation.
+        precision: precision of the values, one of `FLOATS`.
 
     Returns:
-        The datasets that take samples, by the names of their variables, `time` first.
+        The datasets for samples by the names of their variables, `time` first.
     """
     file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, provenance)})
     scales = _create_coordinates(file, robot, trajectory.samples)
@@ -105,7 +105,7 @@ def _root_attributes(robot: Robot, trajectory: Trajectory, provenance: Mapping[s
 
 
 def _scipy_version() -> str:
-    """Return the version in its file; an import, or the package that finds versions, outlasts a short run."""
+    """Return the version from SciPy's files; importing it or importlib.metadata outlasts a short run."""
     spec = find_spec("scipy")
     text = Path(spec.origin or "").with_name("version.py").read_text(encoding="utf-8") if spec else ""
     found = re.search(r'^version\s*=\s*"([^"]+)"', text, re.MULTILINE)
@@ -136,7 +136,7 @@ def _create_wrench_axis(file: h5py.File, frame: str) -> h5py.Dataset:
 def create_labels(
     file: h5py.File, name: str, labels: Iterable[str], long_name: str, *, track_order: bool = True
 ) -> h5py.Dataset:
-    """Write texts, such as the names of a dimension."""
+    """Write a dataset of texts, such as the names along a dimension."""
     texts = np.array([storable(label) for label in labels], dtype=TEXT)
     dataset = file.create_dataset(name, data=texts, dtype=TEXT, track_order=track_order)
     dataset.attrs["long_name"] = long_name
@@ -167,7 +167,7 @@ def _create_variable(
 def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5py.Dataset]) -> None:
     """Write the subgroup `robot`: each declared field as an array, e.g. `gravity`, `joints/link_mass`.
 
-    One group for the joints, and no deeper: a group `motor` would collide with the coordinate `motor`.
+    The joints have one flat group, since a group `motor` would collide with the coordinate `motor`.
     """
     group = inputs.create_group("robot", track_order=True)
     scales, fields = dict(coordinates), resolve(robot)
@@ -183,12 +183,12 @@ def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5p
 
 
 def resolve(robot: Robot) -> list[ResolvedField]:
-    """Return every declared field of a robot, with defaults, in SI units, motors at their joints."""
+    """Return every declared field of a robot with defaults, in SI units, motor values on the joint side."""
     return list(_resolved(robot))
 
 
 def _resolved(record: Any) -> Iterator[ResolvedField]:
-    record = getattr(record, "at_joint", record)  # motors as the joint has them
+    record = getattr(record, "at_joint", record)  # motor values on the joint side
     for name, (field, _) in declared(type(record)).items():
         content = getattr(record, name)
         if content is not None:
@@ -211,11 +211,11 @@ def _write_field(
 
 
 def _add_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
-    """Write a dataset of numbers, or of texts in an array of the type `TEXT`; attributes keep their order."""
+    """Write a dataset of numbers, or of texts in an array of type `TEXT`; attributes keep their order."""
     return group.create_dataset(name, data=values, dtype=values.dtype, track_order=True)
 
 
 def attach_scales(dataset: h5py.Dataset, scales: Iterable[h5py.Dataset]) -> None:
-    """Attach to each axis its scale."""
+    """Attach its scale to each axis."""
     for axis, scale in enumerate(scales):
         dataset.dims[axis].attach_scale(scale)

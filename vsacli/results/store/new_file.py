@@ -1,9 +1,9 @@
-"""An HDF5 file that is being written: samples in chunks, written in a thread, safe from the disk and signals.
+"""Writing of an HDF5 file: samples in chunks, in a thread, robust to disk errors and signals.
 
-HDF5 cannot be unwound from a failed write, and crashes if an exception crosses its code. So it is given a
-`Sink`, which raises none, and signals that end the run wait until a piece is written. Chunks are put together
-here in the order in which they are stored, with one copy, and written whole: the library would copy each
-block into chunks of its own, look every chunk up, and keep those in its cache that are not full.
+HDF5 cannot recover from a failed write, and crashes if an exception propagates through its code. It therefore
+writes to a `Sink`, which raises none, and signals that end the run are deferred during each write. Chunks are
+assembled here in storage order, with one copy, and written whole: the library would copy each block into its
+own chunks, look up every chunk, and keep incomplete ones in its cache.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
 CHUNK_CACHE_SLOTS = 11
-"""Chunks of a dataset that HDF5 finds in its cache: few, since rows are written in order."""
+"""Slots of HDF5's chunk cache for a dataset: few, since rows are written in order."""
 
 BEHIND_FROM = 2**24
-"""Bytes that are written at once, in some 10 ms, before a thread is worth its start."""
+"""Bytes written directly, in some 10 ms, before a thread is worth its start."""
 
 BEHIND = 2**25
-"""Bytes that may wait to be written: some more than a block of seven joints with all variables."""
+"""Bytes that may wait to be written: slightly more than a block of seven joints with all variables."""
 
 SYNCED = 2**26
-"""Bytes after which the disk begins to store them, so that little is left for the end."""
+"""Bytes after which the disk starts to store them, so that little remains at the end."""
 
 CHUNK_BYTES = 2**19
-"""Size of a chunk, at most. Of 64 kB to 1 MB tried, those from 256 kB on take the same time; smaller ones
-cost time for each chunk, larger ones memory for each variable."""
+"""Maximum size of a chunk. Of 64 kB to 1 MB tried, sizes from 256 kB on take the same time; smaller chunks
+take time for each chunk, larger ones memory for each variable."""
 
 
 class NewFile:
     """Context manager that writes an HDF5 file, which is complete after `finish` of a subclass.
 
     Args:
-        file: where it is staged.
+        file: staged file to write.
     """
 
     def __init__(self, file: Staged) -> None:
@@ -65,10 +65,10 @@ class NewFile:
         self._bytes = self._synced = self._held = 0
 
     def __enter__(self) -> Self:
-        """Create the file, with everything but samples and report.
+        """Create the file with everything except samples and report.
 
         Raises:
-            StorageError: it cannot be written, or does not fit its disk.
+            StorageError: the file cannot be written, or does not fit on its disk.
         """
         check_free_space(self._staged.path, self._size())
         try:
@@ -86,7 +86,7 @@ class NewFile:
         self.discard()
 
     def _size(self) -> int:
-        """Return the bytes that the file will have, about."""
+        """Return the approximate size of the file in bytes."""
         raise NotImplementedError
 
     def _create(self) -> None:
@@ -108,7 +108,7 @@ class NewFile:
 
     @contextlib.contextmanager
     def used(self) -> Iterator[None]:
-        """Surround any use of HDF5; an error of the disk takes precedence over the one of HDF5 that follows.
+        """Surround any use of HDF5; a disk error takes precedence over the HDF5 error that follows from it.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -123,11 +123,11 @@ class NewFile:
                 raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
     def do(self, task: Callable[[], None], size: int) -> None:
-        """Use the file in a task that holds this many bytes: now, or of a long file in a thread.
+        """Run a task that writes `size` bytes: immediately, or in a thread once the file is long.
 
-        Within `used`, as the task itself is; tasks are done in their order. Signals never reach the thread,
-        and its exceptions are raised by a later call or by `wait`. While too many bytes wait, so does the
-        caller.
+        To be called within `used`, as the task itself is; tasks run in order. Signals never reach the thread,
+        and its exceptions are raised by a later call or by `wait`. While too many bytes are waiting, the
+        caller waits too.
         """
         self._bytes += size
         if self._bytes <= BEHIND_FROM:
@@ -146,7 +146,7 @@ class NewFile:
             self._sink.begin_sync()
 
     def wait(self) -> None:
-        """Wait until all tasks are done; within `used`."""
+        """Wait until all tasks are done; to be called within `used`."""
         while self._waiting:
             self._await_oldest()
 
@@ -156,7 +156,7 @@ class NewFile:
         done.result()
 
     def _close(self) -> None:
-        """Write remaining chunks; within `used`."""
+        """Write remaining chunks; to be called within `used`."""
         assert self._sink is not None, "it is open"
         self._file.close()
         self._sink.close()
@@ -170,11 +170,11 @@ class NewFile:
 
 
 class Sink(io.RawIOBase):
-    """A file object for h5py whose writing never fails in HDF5's sight.
+    """A file object for h5py whose writes never fail from HDF5's point of view.
 
-    HDF5 cannot be unwound from a failed write: closing its file fails as well, and the process then crashes
-    at exit. So the first error is kept here, later writes are dropped, and the caller looks at `error`
-    after each step.
+    HDF5 cannot recover from a failed write: closing its file fails as well, and the process then crashes at
+    exit. The first error is therefore stored in `error`, which the caller checks after each use, and later
+    writes are dropped.
     """
 
     def __init__(self, file: io.FileIO) -> None:
@@ -195,7 +195,7 @@ class Sink(io.RawIOBase):
         return self._file.readinto(buffer)
 
     def write(self, data: Any) -> int:
-        """Write all of `data`, or note why not."""
+        """Write all of `data`, or store the error."""
         rest = memoryview(data)
         try:
             while len(rest) and self.error is None:
@@ -205,7 +205,7 @@ class Sink(io.RawIOBase):
         return len(data)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the length of the file, or note why not."""
+        """Set the length of the file, or store the error."""
         try:
             return self._file.truncate(size)
         except OSError as error:
@@ -213,7 +213,7 @@ class Sink(io.RawIOBase):
             return 0
 
     def begin_sync(self) -> None:
-        """Have the disk store the bytes written so far, in a thread, unless it is still busy with that."""
+        """Sync the bytes written so far to disk, in a thread, unless an earlier sync is still running."""
         if self._syncing is None or not self._syncing.is_alive():
             self._syncing = threading.Thread(target=self._sync, name="vsacli-syncing")
             self._syncing.start()
@@ -225,7 +225,7 @@ class Sink(io.RawIOBase):
             self.error = self.error or error
 
     def close(self) -> None:
-        """Close the file, or note an error that the file system reports only now."""
+        """Close the file; store an error that the file system reports only now."""
         if self._syncing is not None:
             self._syncing.join()
         try:
@@ -236,7 +236,7 @@ class Sink(io.RawIOBase):
 
 
 def chunk_rows(samples: int, row_bytes: int) -> int:
-    """Return the samples in a chunk: equal chunks, as few as `CHUNK_BYTES` allows."""
+    """Return the samples of a chunk: chunks of equal size, as few as `CHUNK_BYTES` allows."""
     most = max(1, CHUNK_BYTES // row_bytes)
     chunks = -(-samples // most)
     return -(-samples // chunks)
@@ -246,8 +246,8 @@ class ChunkFiller:
     """Appends samples to a dataset, chunk by chunk.
 
     Args:
-        dataset: its first axis is time, and its chunks are as wide as its rows; it has no filter but gzip.
-        hand_over: as `NewFile.do`.
+        dataset: dataset whose first axis is time, with chunks as wide as its rows, and no filter but gzip.
+        hand_over: function such as `NewFile.do`.
     """
 
     def __init__(self, dataset: h5py.Dataset, hand_over: Callable[[Callable[[], None], int], None]) -> None:
@@ -258,10 +258,10 @@ class ChunkFiller:
         self._values: AnyArray = np.empty(0)
 
     def append(self, values: AnyArray) -> None:
-        """Copy samples, (samples, ...), whatever their order in memory.
+        """Copy samples, (samples, ...), of any memory layout.
 
         Raises:
-            FloatingPointError: a finite value is infinite in the type of the dataset.
+            FloatingPointError: a finite value overflows the type of the dataset.
         """
         rows = self._shape[0]
         while len(values):
@@ -276,10 +276,10 @@ class ChunkFiller:
                 self._pass_on()
 
     def finish(self) -> None:
-        """Hand over the rest; the dataset ends with the samples there are."""
+        """Hand over the last chunk, and shorten the dataset to the samples written."""
         self._hand_over(partial(self._shorten, self._start + self._filled), 0)
         if self._filled:
-            self._values[self._filled :] = 0  # what no reader sees
+            self._values[self._filled :] = 0  # beyond the shortened dataset
             self._pass_on()
 
     def _pass_on(self) -> None:
@@ -292,7 +292,7 @@ class ChunkFiller:
             self._dataset.resize(samples, axis=0)
 
     def _write(self, start: int, values: AnyArray) -> None:
-        """Write a chunk past the library's cache."""
+        """Write a chunk, bypassing the library's cache."""
         content = values if self._level is None else zlib.compress(values.data, self._level)
-        with phil:  # which h5py takes in every call, but in this one only from version 3.16 on
+        with phil:  # h5py's lock, which this call takes only since version 3.16
             self._dataset.id.write_direct_chunk((start, *(0 for _ in values.shape[1:])), content)

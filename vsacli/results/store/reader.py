@@ -1,7 +1,7 @@
-"""Reading result files, and simulation files, which have the same layout.
+"""Reading of result files, and of simulation files, which have the same layout.
 
-`StoredFile` opens any HDF5 file of this tool, `StoredResult` reads samples, limits and geometry, and
-`open_stored` opens a result or a simulation, whichever a file is. Everything is checked before it is used.
+`StoredFile` opens any HDF5 file of this program, `StoredResult` reads samples, limits and geometry, and
+`open_stored` opens a result or a simulation, depending on the file. Content is checked before it is used.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from vsacli.results.store.schema import (
 from vsacli.robot.joint import DenavitHartenberg, Pose, existing
 
 OF_JOINTS = "inputs/robot/joints/{}"
-"""Group of a number of all joints: path in the robot file with underscores for dots."""
+"""Dataset of a parameter of all joints: path in the robot file with underscores in place of dots."""
 
 BLOCK_SAMPLES = 8192
-"""Samples that are read at a time to see whether they can be."""
+"""Number of samples read at a time to check a file."""
 
 MADE_BY = ("created", "generated_by", "command_line", "versions", "Conventions")
 """Root attributes of every file."""
 
 COMPUTED_BY = ("engine", "compiler", "threads")
-"""Root attributes of files that a run has written: all of them, or none."""
+"""Root attributes of files written by a run: all of them, or none."""
 
 
 OURS = "vsacli-"
@@ -67,7 +67,7 @@ RANGES = {
     "stiffness": "limits_stiffness",
     "damping": "damper_range",
 }
-"""Lower and upper bound of a variable of joints, by its name."""
+"""Datasets with the lower and upper bound of joint variables, by variable."""
 
 SIZES = {
     "phi": "actuator_spring_max_deflection",
@@ -76,24 +76,24 @@ SIZES = {
     "current": "actuator_motor_max_current",
     "voltage": "actuator_motor_max_voltage",
 }
-"""Largest size of a variable of motors, by its name."""
+"""Datasets with the largest magnitude of motor variables, by variable."""
 
 ACHIEVED = {**{actual(name): name for name in ACTUAL}, **{measured(name): name for name in MEASURED}}
-"""Variables that only simulations have; bounded as the commanded ones."""
+"""Variables that only simulations have, with the commanded variables whose bounds apply."""
 
 DH = ("a", "alpha", "d", "theta")
-"""The numbers of a Denavit-Hartenberg row, in the order of its fields."""
+"""Parameters of a Denavit-Hartenberg row, in the order of its fields."""
 
 
 class StoredRow(NamedTuple):
-    """The part of a joint that says where frames lie."""
+    """The kinematic part of a joint."""
 
     dh: DenavitHartenberg
     is_revolute: bool
 
 
 class StoredGeometry(NamedTuple):
-    """A chain, which `vsacli.robot.kinematics` accepts in place of a robot."""
+    """A kinematic chain, which `vsacli.robot.kinematics` accepts in place of a robot."""
 
     base: Pose
     tool: Pose
@@ -101,13 +101,13 @@ class StoredGeometry(NamedTuple):
 
     @classmethod
     def of(cls, joint_types: Sequence[str], rows: FloatArray, base: FloatArray, tool: FloatArray) -> Self:
-        """Return the chain of numbers as they are stored.
+        """Return the chain of stored numbers.
 
         Args:
             joint_types: "revolute" or "prismatic", base to tip.
             rows: Denavit-Hartenberg rows, (joints, 4), in the order of `DH`.
-            base: `xyz` and `rpy` of the pose, (2, 3).
-            tool: the same.
+            base: `xyz` and `rpy` of the base pose, (2, 3).
+            tool: `xyz` and `rpy` of the tool pose, (2, 3).
         """
         joints = (
             StoredRow(DenavitHartenberg(**dict(zip(DH, row, strict=True))), joint_type == "revolute")
@@ -125,11 +125,11 @@ class StoredFile:
     """An open file; a context manager that closes it.
 
     Args:
-        path: of the file, as given.
-        file: the same, open.
+        path: path of the file, as given.
+        file: open file.
 
     Attributes:
-        path: as given.
+        path: path as given.
     """
 
     def __init__(self, path: str | Path, file: CheckedFile) -> None:
@@ -138,7 +138,7 @@ class StoredFile:
         self._checked: dict[str, h5py.Dataset] = {}
 
     def _dataset(self, name: str) -> h5py.Dataset:
-        """Return a dataset, which is checked when it is first asked for."""
+        """Return a dataset, checked at its first use."""
         if name not in self._checked:
             self._checked[name] = bounded(own_dataset(self._file, name))
         return self._checked[name]
@@ -147,7 +147,7 @@ class StoredFile:
         return tuple(map(one_line, self._dataset(name).asstr()[rows]))
 
     def inputs(self) -> list[StoredInput]:
-        """Return the files that were read, with their content, as far as it was stored.
+        """Return the input files of the run, with their content if it was stored.
 
         Raises:
             InputError: the file is damaged.
@@ -170,22 +170,22 @@ class StoredFile:
 
 
 class StoredResult(StoredFile):
-    """An open result file; a context manager that closes it. A subclass reads another format.
+    """An open result file; a context manager that closes it. Subclasses read other formats.
 
     Attributes:
-        kind: name of such files in sentences.
+        kind: name of such files in messages.
         command: command that writes such files.
-        path: the file, as given.
-        attributes: the root attributes, e.g. `created`, `command_line`, `versions`.
+        path: path as given.
+        attributes: root attributes, e.g. `created`, `command_line`, `versions`.
         robot_name, trajectory_name, verdict: as in the report.
-        complete: False if the run was ended at an infeasible step.
-        joint_names, joint_types: base to tip; "revolute" or "prismatic".
+        complete: False if the run ended early at an infeasible sample.
+        joint_names, joint_types: names and types ("revolute" or "prismatic"), base to tip.
         actuators: kind of the actuator of each joint.
-        gear_ratio: (joints, 2), of the motors; NaN where the robot file gives none.
-        variables: names of the variables the file holds, in declared order, without `time`.
-        samples: number of steps stored.
-        report_json: the report of the run, as in `--json`.
-        precision: in which values are stored, "double" or "single"; they are read as double.
+        gear_ratio: gear ratios of the motors, (joints, 2); NaN where the robot file gives none.
+        variables: names of the stored variables, in declared order, without `time`.
+        samples: number of stored samples.
+        report_json: report of the run, as printed by `--json`.
+        precision: precision of the stored values, "double" or "single"; they are read as double.
     """
 
     format = FORMAT
@@ -200,7 +200,8 @@ class StoredResult(StoredFile):
         """Open a file.
 
         Raises:
-            InputError: there is no such file, or it is not a complete file of the format this version reads.
+            InputError: the file does not exist, or is not a complete file of the format that this version
+                reads.
             StorageError: the operating system refuses to read it, or another program is writing it.
         """
         return open_one_of(path, cls)
@@ -227,7 +228,7 @@ class StoredResult(StoredFile):
         self._whole: set[str] = set()
 
     def motor_constant(self, name: str) -> FloatArray:
-        """Return a number of the motors as they act on their joints, (joints, 2); NaN where there is none.
+        """Return a parameter of the motors on the joint side, (joints, 2); NaN where there is none.
 
         Raises:
             InputError: the file is damaged.
@@ -236,7 +237,7 @@ class StoredResult(StoredFile):
             return self._of_motors(f"actuator_motor_{name}")
 
     def _of_motors(self, name: str) -> FloatArray:
-        """Return the stored values, without second axis if no joint has two motors."""
+        """Return values of motors, (joints, 2); stored without second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
         if OF_JOINTS.format(name) in self._file:
             stored = self._dataset(OF_JOINTS.format(name))
@@ -260,7 +261,7 @@ class StoredResult(StoredFile):
         return bounds
 
     def geometry(self) -> StoredGeometry:
-        """Return the part of the robot that says where its frames lie.
+        """Return the kinematic chain of the robot.
 
         Raises:
             InputError: the file is damaged.
@@ -274,7 +275,7 @@ class StoredResult(StoredFile):
             return StoredGeometry.of(self.joint_types, np.stack(rows, axis=-1), *poses)
 
     def has(self, variable: Variable) -> bool:
-        """Return whether runs of its robot have a variable, as far as that depends on the robot file."""
+        """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
         if variable.requires in MOTOR_CONSTANTS:
             return not np.isnan(self.motor_constant(variable.requires)).all()
         return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
@@ -286,22 +287,22 @@ class StoredResult(StoredFile):
         return cast("dict[str, Any]", shown(content))
 
     def _samples(self) -> int:
-        """Return how many there are, if joints and times fit together."""
+        """Return the number of samples; refuse a file whose joints and times do not match."""
         shape = self._dataset("time").shape
         if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
             raise ValueError("joints and times do not fit together")
         return int(shape[0])
 
     def whole_span(self) -> tuple[float, float]:
-        """Return first and last time of the run, also of an excerpt of it, s; see `time`."""
+        """Return first and last time of the whole run, s, also for an excerpt of it."""
         return float(self.time[0]), float(self.time[-1])
 
     @cached_property
     def time(self) -> FloatArray:
-        """Times, (samples,), s; finite, and each later than the one before.
+        """Times, (samples,), s; finite and ascending.
 
         Raises:
-            InputError: they are not, or are damaged otherwise.
+            InputError: the times are invalid or damaged.
         """
         with reporting_damage(self.path, "time"):
             values: FloatArray = self._dataset("time")[...]
@@ -312,7 +313,7 @@ class StoredResult(StoredFile):
         """Read samples start..stop-1 of a variable, (samples, joints) or (samples, joints, 2), in its units.
 
         Raises:
-            InputError: there is no such variable, the file does not hold it, or it is damaged there.
+            InputError: the variable is unknown, not stored, or damaged there.
         """
         select_variables([name], self.declared)
         if name == "time":
@@ -326,7 +327,7 @@ class StoredResult(StoredFile):
         return values
 
     def rounded(self, name: str, values: AnyArray) -> FloatArray | FlagArray:
-        """Return values of a variable as a file of this one's precision gives them back."""
+        """Return values of a variable, rounded as by storage in the precision of this file."""
         variable = self.declared[name]
         with np.errstate(over="ignore"):
             stored = values.astype(storage_type(variable, self.precision))
@@ -334,7 +335,7 @@ class StoredResult(StoredFile):
         return read
 
     def _check_layout(self, name: str) -> None:
-        """Refuse a variable that does not fit the others, so that it can be read piece by piece."""
+        """Refuse a variable whose shape or type does not fit the file, so that it can be read in parts."""
         if name in self._whole:
             return
         dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name], self.precision)
@@ -344,10 +345,10 @@ class StoredResult(StoredFile):
         self._whole.add(name)
 
     def check(self) -> None:
-        """Read everything once, which opening a file does not.
+        """Read everything once, which is not done when a file is opened.
 
         Raises:
-            InputError: something is damaged.
+            InputError: any content is damaged.
         """
         for name in ("time", *self.variables):
             for start in range(0, self.samples, BLOCK_SAMPLES):
@@ -362,7 +363,7 @@ class StoredResult(StoredFile):
                     check_present(self._file[name].attrs, [SCALES], name)
 
     def existing(self, variable: Variable) -> BoolArray:
-        """Return which columns of a variable of joints there are, (joints, 1 or 2)."""
+        """Return a mask of the existing columns of a joint variable, (joints, 1 or 2)."""
         if variable.requires in OF_ANY_ROBOT or variable.name not in self.variables:
             return np.array(existing(variable, self.actuators))
         with reporting_damage(self.path):
@@ -370,7 +371,7 @@ class StoredResult(StoredFile):
             return stored.reshape(len(self.actuators), -1)
 
     def provenance(self) -> dict[str, Any]:
-        """Return who made the file, when, with which versions, and path and SHA-256 of each input.
+        """Return creation time, command, versions, and path and SHA-256 of each input.
 
         Raises:
             InputError: the file is damaged.
@@ -410,7 +411,7 @@ _Stored = TypeVar("_Stored", bound=StoredResult)
 
 
 def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
-    """Open a file of one of these kinds, whichever it is.
+    """Open a file of one of these kinds, determined by its format.
 
     Raises:
         InputError, StorageError: as `StoredResult.open`.
@@ -474,5 +475,5 @@ def other_version(found: str, read: str, command: str) -> str:
 
 
 def open_stored(path: str | Path) -> StoredResult:
-    """Open a result or a simulation file, whichever it is; see `StoredResult.open`."""
+    """Open a result or a simulation file, determined by its format; see `StoredResult.open`."""
     return open_one_of(path, StoredResult, StoredSimulation)

@@ -1,4 +1,4 @@
-"""Layout of the result file, as far as the declarations of its variables do not say."""
+"""Layout of the result file, in addition to the declarations of its variables."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ FORMAT, SIMULATION, SENSITIVITY = "vsacli-result/2", "vsacli-simulation/2", "vsa
 """Formats of files in the layout of results."""
 
 EXISTING = "existing"
-"""Attribute of a variable that depends on devices of the joints: 1 at each column that a joint has."""
+"""Attribute of variables that depend on devices of the joints: 1 for each column that a joint has."""
 
 TEXT = h5py.string_dtype("utf-8")
 
 DOUBLE = "double"
 FLOATS: dict[str, np.dtype[Any]] = {DOUBLE: np.dtype("<f8"), "single": np.dtype("<f4")}
-"""Types of values by the precision in which a file stores them."""
+"""Storage types of values by precision."""
 
 PRECISION = "precision"
-"""Root attribute of files that do not store values in double precision."""
+"""Root attribute of files that are not stored in double precision."""
 
 
 def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[str, str]:
-    """`units`; if the robot's joints differ in it, or forces and moments do, one more attribute for each."""
+    """Return `units`; if joints differ in it, or forces and moments, also an attribute for each unit."""
     if isinstance(quantity, WrenchQuantity):
         return {
             "units": "see wrench_axis",
@@ -47,7 +47,7 @@ def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[st
 
 
 def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dict[str, Any]:
-    """HDF5 attributes of a variable: units, long_name, equation, and CF's for coordinates and flags."""
+    """Return HDF5 attributes of a variable: units, long_name, equation, CF's for coordinates and flags."""
     attributes: dict[str, Any] = unit_attributes(variable.quantity, joint_types)
     attributes |= {"long_name": variable.long_name, "equation": variable.equation}
     if "joint" in variable.dims:
@@ -59,18 +59,18 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
 
 
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
-    """Little-endian type of a variable in a file of some precision; times are always double."""
+    """Return the little-endian type of a variable in a file of some precision; times are always double."""
     if variable.name == "flags":
         return np.dtype("<u4")
     return FLOATS[precision if variable.dims else DOUBLE]
 
 
 def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
-    """Lengths of the axes after time."""
+    """Return the lengths of the axes after time."""
     lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
     return tuple(lengths[dim] for dim in variable.dims)
 
 
 def storable(text: str) -> str:
-    """Text as HDF5 can hold it: bytes that are not UTF-8 (in a path, say) and NUL become escapes."""
+    """Return a text that HDF5 can store: bytes that are not UTF-8 (e.g. in a path) and NUL are escaped."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("\0", "\\0")

@@ -1,4 +1,4 @@
-"""The table of a study: a row for each run, in HDF5 that opens in xarray; its writer and its reader."""
+"""The table of a study: a row for each run, as HDF5 that xarray can open; its writer and its reader."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ TEXTS = {
 
 
 ROWS_AT_ONCE = 8192
-"""Rows that are written together, or as many as have this number of samples over time."""
+"""Number of rows written together, or of their samples over time."""
 
 
 def rows_at_once(steps: int) -> int:
@@ -44,23 +44,23 @@ def rows_at_once(steps: int) -> int:
 
 
 class Column(Protocol):
-    """A column of a study: name, dimensions after `run`, unit, and a few words."""
+    """A column of a study: name, dimensions after `run`, unit, and short description."""
 
     @property
     def name(self) -> str:
-        """Return the name in the table."""
+        """Name in the table."""
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """After `run`: joint, or joint and motor, after step if it is over time."""
+        """Dimensions after `run`: joint, or joint and motor; preceded by step if the column is over time."""
 
     @property
     def quantity(self) -> Quantity:
-        """Return the unit."""
+        """Quantity with its unit."""
 
     @property
     def long_name(self) -> str:
-        """A few words."""
+        """Short description."""
 
 
 class Parameter(NamedTuple):
@@ -72,17 +72,17 @@ class Parameter(NamedTuple):
 
 
 class Head(NamedTuple):
-    """The head of a table, in addition to its rows.
+    """Everything in a table except its rows.
 
     Attributes:
-        study, robot: names.
-        fingerprint: of the whole study, which its parts have in common.
-        runs: how many the study has; the table may have some of them.
-        joint_names, joint_types: base to tip.
-        parameters: paths that vary, with units.
-        columns: stored for each run.
-        steps: how many steps columns over time have, at most.
-        sources: files that were read, by the thing they describe.
+        study, robot: names of the study and of the robot.
+        fingerprint: digest of the whole study, common to all its parts.
+        runs: number of runs of the study; the table may contain a part of them.
+        joint_names, joint_types: names and types of the joints, base to tip.
+        parameters: varying parameters, with units.
+        columns: columns stored for each run.
+        steps: maximum number of samples of columns over time.
+        sources: input files by the object that they describe.
         provenance: further root attributes: engine, method, command line.
     """
 
@@ -110,9 +110,9 @@ class StudyWriter(NewFile):
     """Context manager that writes the table of a study, which is complete after `finish`.
 
     Args:
-        file: where it is staged.
-        head: of the table.
-        rows: how many it will have.
+        file: staged file to write.
+        head: head of the table.
+        rows: number of rows.
     """
 
     def __init__(self, file: Staged, head: Head, rows: int) -> None:
@@ -221,17 +221,17 @@ def _texts(values: Any) -> bool:
 
 
 PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
-"""Root attributes that say how a table was computed."""
+"""Root attributes on the computation of a table."""
 
 OF_COLUMNS = ("units", "long_name", "coordinates", SCALES)
 
 
 ALL = slice(None)
-"""Every row."""
+"""Slice of all rows."""
 
 
 class StoredColumn(NamedTuple):
-    """A column as of `Column`."""
+    """A `Column` as read from a table."""
 
     name: str
     dims: tuple[str, ...]
@@ -240,26 +240,26 @@ class StoredColumn(NamedTuple):
 
 
 class StoredStudy(StoredFile):
-    """An open table of a study; a context manager that closes it.
+    """An open study table; a context manager that closes it.
 
     Attributes:
-        path: the file, as given.
-        attributes: the root attributes.
-        study_name, robot_name: as in the files.
-        joint_names, joint_types: base to tip.
-        parameters: paths that vary.
-        columns: names.
-        rows: how many runs it has.
-        steps: how many steps columns over time have; 0 if there are none.
-        runs: how many the study has.
-        fingerprint: of the whole study.
+        path: path as given.
+        attributes: root attributes.
+        study_name, robot_name: names as in the input files.
+        joint_names, joint_types: names and types of the joints, base to tip.
+        parameters: paths of the varying parameters.
+        columns: names of the columns.
+        rows: number of runs in the table.
+        steps: number of samples of columns over time; 0 if there are none.
+        runs: number of runs of the study.
+        fingerprint: digest of the whole study.
     """
 
     def __init__(self, path: str | Path) -> None:
         """Open a table.
 
         Raises:
-            InputError: there is no such file, or it is no complete table of a study.
+            InputError: the file does not exist, or is not a complete study table.
             StorageError: the operating system refuses to read it.
         """
         super().__init__(path, CheckedFile(path))
@@ -294,29 +294,29 @@ class StoredStudy(StoredFile):
                 raise ValueError(f"{name} has not {self.rows} rows")
 
     def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
-        """Texts of rows, or the labels of a dimension.
+        """Return the texts of rows, or the labels of a dimension.
 
         Raises:
-            InputError: they are damaged.
+            InputError: the texts are damaged.
         """
         with reporting_damage(self.path, name):
             return self._labels(name, rows)
 
     def read(self, name: str, rows: slice = ALL) -> AnyArray:
-        """Return a column of numbers, (rows, ...), or the numbers of the runs.
+        """Return a numeric column, (rows, ...), or the numbers of the runs.
 
         Raises:
-            InputError: it is damaged, or not there.
+            InputError: the column is damaged or missing.
         """
         with reporting_damage(self.path, name):
             values: AnyArray = self._dataset(name)[rows]
         return values
 
     def column(self, name: str) -> StoredColumn:
-        """Return the column of this name.
+        """Return the column with this name.
 
         Raises:
-            InputError: it is damaged, or not there.
+            InputError: the column is damaged or missing.
         """
         with reporting_damage(self.path, name):
             dataset = self._dataset(name)
@@ -332,7 +332,7 @@ class StoredStudy(StoredFile):
         return (steps, *shape[1:]) if name in self.columns and "step" in self.column(name).dims else shape
 
     def unit(self, name: str) -> str:
-        """Return the unit of a column or parameter; that of revolute joints if they differ."""
+        """Return the unit of a column or parameter; the unit at revolute joints if units differ."""
         with reporting_damage(self.path, name):
             attributes = self._dataset(name).attrs
             return str(attributes.get("units_revolute", attributes.get("units", "")))
@@ -342,10 +342,10 @@ class StoredStudy(StoredFile):
         return bool(self._dataset(path).dtype.kind != "f")
 
     def provenance(self) -> dict[str, str]:
-        """Return how it was computed: method, seed, engine and command line.
+        """Return the attributes on the computation: method, seed, engine and command line.
 
         Raises:
-            InputError: some of it is missing.
+            InputError: an attribute is missing.
         """
         with reporting_damage(self.path):
             check_present(self.attributes, (*PROVENANCE, "created", "generated_by", "Conventions"))
@@ -355,7 +355,7 @@ class StoredStudy(StoredFile):
         """Read everything once.
 
         Raises:
-            InputError: something is damaged.
+            InputError: any content is damaged.
         """
         for name in (*TEXTS, *filter(self.parameter_is_text, self.parameters)):
             self.texts(name)

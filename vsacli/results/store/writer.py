@@ -1,4 +1,4 @@
-"""Writing the result file, block by block."""
+"""Writing of the result file, block by block."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Samples(Protocol):
-    """Consecutive steps: times, and an array for each variable under its name."""
+    """Consecutive samples: times, and an array for each variable as an attribute."""
 
     @property
     def time(self) -> FloatArray:
@@ -38,16 +38,16 @@ class ResultWriter(NewFile):
     A subclass writes another format: other variables in the same layout.
 
     Args:
-        file: where it is staged.
-        robot: the robot of the run, stored as resolved arrays.
-        trajectory: gives the name, the number of samples, and the files that were read.
-        variables: names of the variables to store, all there are by default; the coordinates always are.
-        provenance: how it is computed, for the record: attributes of the file, such as `command_line`.
-        precision: in which values are stored, "double" or "single"; times are always double.
+        file: staged file to write.
+        robot: robot of the run, stored as resolved arrays.
+        trajectory: source of the name, the number of samples, and the input files.
+        variables: names of the variables to store, by default all; coordinates are always stored.
+        provenance: attributes of the file on the computation, such as `command_line`.
+        precision: precision of the stored values, "double" or "single"; times are always double.
 
     Raises:
-        InputError: a name in `variables` is none, or of what the trajectory or the robot does not have; there
-            is no such precision.
+        InputError: a name in `variables` is unknown, or the trajectory or the robot does not have the
+            variable; or the precision is unknown.
     """
 
     _format = FORMAT
@@ -75,11 +75,11 @@ class ResultWriter(NewFile):
         self._fillers: dict[str, ChunkFiller] = {}
 
     def write(self, block: Samples) -> None:
-        """Append a copy of a block of steps, which of a long file is written later, in a thread.
+        """Append a copy of a block of samples; in a long file it is written later, in a thread.
 
         Raises:
-            StorageError: the disk is full or fails, perhaps over an earlier block; a value is too large for
-                single precision.
+            StorageError: the disk is full or fails, perhaps for an earlier block; or a value overflows single
+                precision.
         """
         with self.used():
             for name, filler in self._fillers.items():
@@ -90,10 +90,10 @@ class ResultWriter(NewFile):
                     raise self._too_large(name, values, block.time) from None
 
     def finish(self, report: Mapping[str, Any]) -> None:
-        """Store the report; the file holds the steps written so far.
+        """Store the report; the file contains the samples written so far.
 
         Args:
-            report: the report as JSON-ready data; `verdict` and `complete` also become root attributes.
+            report: report as JSON values; `verdict` and `complete` also become root attributes.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -131,7 +131,7 @@ class ResultWriter(NewFile):
         return values
 
     def _too_large(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
-        """Return the error on values that single precision does not hold."""
+        """Return the error for values that overflow single precision."""
         with np.errstate(over="ignore"):
             lost = np.isfinite(values) & np.isinf(values.astype(np.float32))
         at = tuple(np.argwhere(lost)[0])
@@ -158,7 +158,7 @@ class ResultWriter(NewFile):
     def _selected(
         self, names: Iterable[str] | None, robot: Robot, trajectory: Trajectory
     ) -> tuple[Variable, ...]:
-        """Return the variables of these names, or all that a run of the robot along the trajectory has."""
+        """Return the variables with these names, or all that a run of robot and trajectory has."""
         absent = {**self._absent(trajectory), **_not_given(robot, self._declared)}
         if names is None:
             return select_variables((name for name in self._declared if name not in absent), self._declared)
@@ -182,7 +182,7 @@ class ResultWriter(NewFile):
 
 
 def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
-    """Return the variables missing for a robot, each with the key that its file lacks."""
+    """Return the variables that the robot does not have, each with the missing key of its file."""
     return {
         name: f"no joint of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()
