@@ -17,8 +17,7 @@ class CommandedJoints:
 
     Attributes:
         types: joint types by joint name, from the base to the tip.
-        exempt: joints that a signal does not command, by signal key; each joint name with the reason, a
-            clause.
+        exempt: joints that a signal does not command, by signal key; each name with the reason, a clause.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
     """
 

@@ -44,8 +44,7 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
 
     Args:
         path: path of the file.
-        changes: values that override those at paths of the file, e.g. `{"joints.*.link.mass": 2}`; stored in
-            results.
+        changes: values that override those at paths, e.g. `{"joints.*.link.mass": 2}`; stored in results.
 
     Raises:
         InputError: the file has problems; lists each with its line.

@@ -76,12 +76,11 @@ class Robot:
         Args:
             path: keys of the robot file joined by dots; an entry of a list is given by its name or index, `*`
                 stands for all entries. Or a mapping of such paths to values, which are replaced in turn.
-            value: any value that the file could have there: a number, a text such as "90 deg", a list or a
+            value: any value that a file may have there: a number, a text such as "90 deg", a list or a
                 mapping.
 
         Raises:
-            InputError: the path does not exist (the message lists what does), or the value is not valid
-                there.
+            InputError: the path does not exist (the message lists existing ones), or the value is invalid.
         """
         from vsacli.documents import paths
 
@@ -149,9 +148,9 @@ class Robot:
 
 
 def check_robot(value: object) -> None:
-    """Raise an error that explains how to get a robot if an argument is none.
+    """Check that an argument is a robot.
 
     Raises:
-        TypeError: the value is not a `Robot`.
+        TypeError: it is not a `Robot`; the message says how to get one.
     """
     check_type("robot", value, Robot, "load_robot({}) reads one; it is the first argument")

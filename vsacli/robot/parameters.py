@@ -108,8 +108,7 @@ def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
 def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
     """Return a robot with other values of some parameters, which may be scalars of any kind.
 
-    The records on the paths are made without their checks, so the robot cannot be checked or written to a
-    file.
+    Records on the paths are made without their checks, so the robot cannot be checked or written to a file.
     """
     places = [(parameter.path, value) for parameter, value in zip(chosen, values, strict=True)]
     other: Robot = _with_numbers(robot, places)

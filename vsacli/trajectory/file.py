@@ -158,7 +158,7 @@ def load_trajectory(
     Args:
         path: path of the file.
         robot: robot that executes the trajectory.
-        changes: values that override those at paths of a YAML file, e.g. `{"duration": 2}`; stored in
+        changes: values that override those of a YAML file, by path, e.g. `{"duration": 2}`; stored in
             results.
         progress: function that opens a progress bar over the samples of all components of a recorded signal,
             e.g. `lambda samples: tqdm(total=samples)`; fitting splines to millions of samples takes seconds.

@@ -202,7 +202,7 @@ def _above_lowest(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measu
         laws = getattr(joint.actuator, "spring", ())
         each_linear = bool(laws) and all(
             law.polynomial is not None for law in laws
-        )  # which has a stiffness at rest
+        )  # polynomial laws have a linear part
         if each_linear == linear:
             yield measured._replace(size=ratio(measured.size, found.lower))
 

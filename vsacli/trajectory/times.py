@@ -151,7 +151,7 @@ class ResampledTimes:
         rate: requested sample rate, 1/s.
 
     Raises:
-    InputError: the rate is not possible.
+        InputError: the rate is not possible.
     """
 
     first: float

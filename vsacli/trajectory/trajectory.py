@@ -37,12 +37,10 @@ class Trajectory:
         times: sample times.
         position: profile of the motion. All profiles count time from the first sample: stamps since 1970 are
             rounded to 2.4e-7 s, too coarse for knots, integrators and finite differences.
-        commanded: profiles of signals by their keys in `COMMANDED`, e.g. `stiffness`; NaN for joints without
-            this command.
+        commanded: profiles of signals by their keys in `COMMANDED`, e.g. `stiffness`; NaN if not commanded.
         wrench: profile of the wrench of the environment; None without one.
         name: name for reports and for the result file.
-        located_warnings: warnings about times and profiles, with the line if they concern a value of the
-            file.
+        located_warnings: warnings about times and profiles, with the line of a value in the file if known.
         warnings: texts of `located_warnings`.
         notes: notes on the interpretation of times and profiles, where that is not obvious.
         sources: files that the trajectory was read from.
@@ -90,7 +88,7 @@ class Trajectory:
         return f"Trajectory {self.name}: {size}{pushed}"
 
     def _repr_html_(self) -> str:
-        from html import escape  # for notebooks alone
+        from html import escape  # needed only in notebooks
 
         return f"<p>{escape(repr(self))}</p>"
 

@@ -20,8 +20,7 @@ class Cost:
     """Operations of one call if every branch is entered and every loop runs to its bound.
 
     Attributes:
-        operations: number of additions, products, comparisons etc.; a call of a math.h function counts as
-            one.
+        operations: number of additions, products, comparisons etc.; a call of math.h counts as one.
         functions: number of calls of math.h functions, including `fabs` and `sqrt`.
         loops: number of loops; one inside another counts once.
     """

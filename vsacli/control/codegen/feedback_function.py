@@ -41,8 +41,7 @@ def feedback_linearization_function(robot: Robot, frame: str | None = None) -> F
         frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without a wrench.
 
     Raises:
-        InputError: the robot mixes rigid joints with others, or has a damped transmission; there is no such
-            law.
+        InputError: the robot mixes rigid joints with others, or has a damped transmission; no law exists.
     """
     law = _Law(robot, frame)
     return Function(

@@ -164,8 +164,7 @@ class ClosedLoop:
         packing: layout of the state in a vector.
         slip: direction in which a motor with sharp friction slides, 0 while it sticks, NaN for other motors,
             (motors,); None if no motor has sharp friction.
-        held: torques commanded in any state until the controller acts again; None if it acts at every
-            instant.
+        held: torques commanded in any state until the controller acts again; None if it acts all the time.
     """
 
     def __init__(self, robot: Robot, controller: Controller, reference: Reference) -> None:

@@ -40,8 +40,7 @@ def dop853_with_stages() -> Any:
 
     Its constructor has a further argument, `stages`, a function like `Equations.stages`. If this returns
     None, SciPy evaluates one stage after the other. SciPy has no hook for that, so the code of its
-    `_step_impl` is run with another `rk_step` among its globals. If a future SciPy has no such name, only
-    speed is lost.
+    `_step_impl` is run with another `rk_step` among its globals. Without this name, only speed is lost.
     """
     from scipy.integrate import DOP853
 

@@ -141,8 +141,8 @@ class RecordedEquations(Equations):
 
     A backend is made when the earlier ones have taken about as long as making it takes. So a run never takes
     much more than twice the time of the best choice, however long it becomes. The change depends on the
-    number of evaluations, not on measured time, so that a run can be repeated to the last bit unless the
-    cache has new code.
+    number of evaluations, not on measured time, so that a run is repeatable to the last bit unless the cache
+    has new code.
 
     Args:
         loop: robot under its controller.

@@ -28,8 +28,7 @@ def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
 
     Masses, centers of mass, inertia tensors, dampings, dry friction, motor inertias and the constants of
     springs and mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]. A tensor is scaled
-    as a whole, so that it remains physically possible. Geometry, gravity, limits and measured tables are
-    unchanged.
+    as a whole, so that it remains possible. Geometry, gravity, limits and measured tables are unchanged.
 
     Args:
         robot: true robot.
