@@ -63,7 +63,6 @@ class Robot:
         return html_table(f"Robot {self.name}", self._joint_rows())
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
-        """Return a table row for each joint, after a header."""
         joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
         return [("joint", "type", "actuator"), *joints]
 

@@ -303,7 +303,6 @@ def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recor
 
 
 def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
-    """Return times and profiles slowed down by a factor."""
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}

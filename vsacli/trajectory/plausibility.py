@@ -157,7 +157,6 @@ def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
 
 
 def _velocities(checked: CheckedTrajectory, *, revolute: bool) -> Iterator[Measured]:
-    """Yield the largest velocity of the joints of a type."""
     if checked.moved is not None:
         sizes = np.where(checked.revolute == revolute, np.abs(checked.moved[1]).max(axis=1), 0.0)
         yield from checked.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")

@@ -130,7 +130,6 @@ class _Law:
         return values
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
-        """Return the arrays of each argument by name."""
         sizes = RowLayout({name: (structure.layout.size,) for name, structure in self.arguments})
         entries = sizes.arrays(np.concatenate(rows))
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)

@@ -26,7 +26,6 @@ def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
 
 
 def _meaning(parameter: Parameter) -> str:
-    """Return path, unit, and the condition on the value in robot files."""
     unit = parameter.unit if parameter.unit != "1" else "no unit"
     return ", ".join(filter(None, (str(parameter), unit, parameter.requirement)))
 

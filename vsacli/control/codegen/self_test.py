@@ -111,7 +111,6 @@ class Reference:
 
     @property
     def _largest_stiffness(self) -> float:
-        """Largest commanded stiffness."""
         return float(np.nanmax(self._inputs["command"]["stiffness"]))
 
     def _drawn(self, scale: float) -> FloatArray:
@@ -234,7 +233,6 @@ def check_single_precision(robot: Robot, functions: Sequence[Function], referenc
 
 
 def _differences(functions: Sequence[Function], reference: Reference) -> Iterator[_Difference]:
-    """Yield the largest difference in each array."""
     for function in functions:
         single, double = reference.single_results(function), reference.results(function)
         for array in function.result.arrays:

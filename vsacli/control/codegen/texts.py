@@ -138,7 +138,6 @@ def self_test_text(
 
 
 def _vector(declared: str, structure: Structure, values: Arrays) -> str:
-    """Return a C constant with the values of a structure in all cases."""
     cases = (
         ", ".join(
             f".{array.name} = {_initializer(values[array.name][case], array.bits)}"
@@ -156,7 +155,6 @@ def _initializer(values: FloatArray, bits: bool) -> str:
 
 
 def _test(prefix: str, function: Function, reference: Reference) -> str:
-    """Return the C function that compares all entries of a result."""
     own, result = function.name, f"{prefix}_{function.result.name}"
     given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
     comparisons = "\n".join(_comparisons(function, reference))

@@ -72,7 +72,6 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
 
 
 def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
-    """Record a function of a time and a state vector."""
     tape = Tape(MOST_RECORDED)
 
     def inputs(count: int) -> Any:

@@ -159,7 +159,6 @@ class SimulationReport(Stored):
             )
 
     def _effort(self) -> Iterator[str]:
-        """Yield a sentence on the methods and the effort of the integration."""
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)

@@ -117,7 +117,6 @@ def _link(parent: Element, joint: Joint, radius: float) -> Element:
 
 
 def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> None:
-    """Draw a rod along the link, or a sphere if it has no length."""
     if math.hypot(*origin) > radius:
         draw_rod(body, origin, radius, LINK_COLOUR)
     else:

@@ -230,7 +230,6 @@ def _drive_directly(body: Element, joint: Joint, rotors: Sequence[Rotor]) -> Non
 
 
 def _actuate(actuators: Element, rotor: Rotor) -> None:
-    """Add the torque of a motor as an actuator."""
     actuator = element(actuators, "motor", name=f"{rotor.name}.torque", joint=rotor.name)
     most = rotor.motor.max_torque
     if math.isfinite(most):

@@ -105,7 +105,6 @@ def forces_text(robot: Robot) -> str | None:
 
 
 def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
-    """Yield each dry friction, with a phrase that names its location."""
     if joint.friction is not None:
         yield f"joint {joint.name}: its friction", joint.friction
     for number, motor in enumerate(joint.actuator.motors, 1):

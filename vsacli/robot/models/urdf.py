@@ -115,7 +115,6 @@ def _add_drive(moving: Element, joint: Joint) -> None:
 
 
 def _left_out(robot: Robot) -> Iterator[str]:
-    """Yield sentences on parts that URDF cannot express."""
     yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
     if robot.gravity != STANDARD_GRAVITY:
         gravity = ", ".join(f"{each:g}" for each in robot.gravity)

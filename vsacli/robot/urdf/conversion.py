@@ -134,7 +134,6 @@ class Conversion:
 
 
 def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
-    """Yield sentences on joints held at zero, and on joints held elsewhere."""
     at_zero = [joint.urdf.name for joint in joints if joint.position == 0]
     elsewhere = [str(joint) for joint in joints if joint.position != 0]
     if at_zero:

@@ -187,7 +187,6 @@ def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], 
 
 
 def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
-    """Check that no joint follows itself."""
     for joint in joints.values():
         if joint.name in _leaders(joint, joints):
             message = "follows itself: the <mimic> of joints form a circle"

@@ -89,7 +89,6 @@ def _origin_of(field: str, conversion: Conversion, index: int) -> str:
 
 
 def _known(joint: UrdfJoint) -> Iterator[str]:
-    """Yield phrases on the effort limit and the gear of a joint in the URDF."""
     if joint.limit.effort:
         yield f"an effort limit of {_number(joint.limit.effort)} {joint.unit(TORQUE)} (joint side)"
     if joint.gear_ratio:

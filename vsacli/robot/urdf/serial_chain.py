@@ -282,7 +282,6 @@ def _check_joints(
 
 
 def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
-    """Raise an error for incomplete inertial data of links that move."""
     problems = Problems(urdf.file)
     for link in (link for links in carried for link in links):
         if link.flaw is not None:
@@ -313,7 +312,6 @@ def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
 
 
 def _beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
-    """Return joints that could move on side branches."""
     names = {link.name for links in carried for link in links}
     moving = {joint.name for joint in path.moving}
     candidates = (joint for joint in urdf.joints.values() if joint.child in names and not joint.is_fixed)

@@ -145,7 +145,6 @@ class Declaration(ABC):
         check_fields(self, *self._problems())
 
     def _problems(self) -> Iterator[FieldProblem]:
-        """Yield the problems of the record beyond its fields."""
         return iter(())
 
 

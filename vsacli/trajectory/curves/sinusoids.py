@@ -144,7 +144,6 @@ class Sinusoids(ClosedForm):
         return replace(self, offset=added(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
-        """Return the sum without the offset."""
         first, last = self.span
         turns = self.cycles * ((time - first) / (last - first))
         rows = np.zeros((self.signal.orders, self.components, len(time)))

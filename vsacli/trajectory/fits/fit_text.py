@@ -83,7 +83,6 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
 
 
 def _remedy(part: Part) -> str:
-    """Return a clause on how to determine the highest derivative of a component."""
     if part.noise is not None:
         return (
             f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"

@@ -288,7 +288,6 @@ def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
 
 
 def _mains(frequencies: FloatArray) -> BoolArray:
-    """Return the mask of multiples of a mains frequency."""
     near = np.zeros(len(frequencies), dtype=bool)
     for mains in MAINS:
         harmonic = mains * np.round(frequencies / mains)

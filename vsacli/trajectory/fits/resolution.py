@@ -338,7 +338,6 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
 
 
 def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
-    """Return the root mean square of the residual of a model."""
     some = slice(None, None, 1 + len(time) // PROBES)
     return _rms(row[some] - model.spline(time[some])[:, 0])
 

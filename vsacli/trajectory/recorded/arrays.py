@@ -46,7 +46,6 @@ def profiles_of_arrays(
 def _recorded(
     signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
 ) -> Iterator[Samples]:
-    """Yield the samples of a signal if it is given."""
     if values is not None:
         yield samples_of_arrays(signal, times, values, *derivatives)
     elif any(given is not None for given in derivatives):

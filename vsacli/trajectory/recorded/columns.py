@@ -160,7 +160,6 @@ def _layout(
 
 
 def _columns(pattern: str, joints: CommandedJoints) -> Naming:
-    """Return the columns of each signal for the joints that it commands."""
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1)
@@ -206,7 +205,6 @@ def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
 
 
 def _remedy(file: str) -> str:
-    """Return advice on columns with other names."""
     return (
         f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
         f" ignore: {REST} there leaves out those without use"

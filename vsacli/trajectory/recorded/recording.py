@@ -171,7 +171,6 @@ def _check_filled(table: Table) -> None:
 
 
 def _understood(table: Table) -> Iterator[str]:
-    """Yield clauses on ignored parts of the file, and on shifted times."""
     if table.first_stamp is not None:
         yield f"times count from its first stamp, {table.first_stamp}"
     if table.kept is not None:
