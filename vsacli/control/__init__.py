@@ -1,4 +1,4 @@
-"""Gains, feedback linearization, simulation, and C for controllers."""
+"""Control: gains, feedback linearization, simulation, and C code for controllers."""
 
 from typing import TYPE_CHECKING
 

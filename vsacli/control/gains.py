@@ -1,4 +1,4 @@
-"""The linear control (32), its gains from the poles of (33), and the integrals it may act on."""
+"""The linear control (32), its gains from the poles of (33), and optional integral action."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def linear_control(
     integral_gain: FloatArray,
     integral: FloatArray,
 ) -> FloatArray:
-    """Linear control (32a) or (32b): v = d^r desired + K_{r-1} e^(r-1) + ... + K_0 e + K_I integral(e).
+    """Compute (32a) or (32b): v = d^r desired + K_{r-1} e^(r-1) + ... + K_0 e + K_I integral(e).
 
     The error is e = desired - actual.
 
     Args:
-        desired: the commanded signal and its derivatives up to order r, each ([samples,] joints).
-        actual: the same as it is, up to order r - 1.
-        gains: K_0, ..., K_{r-1}, (joints, r) or (1, r).
-        integral_gain: K_I, (joints,) or (1,).
-        integral: of the error.
+        desired: commanded signal and its derivatives up to order r, each ([samples,] joints).
+        actual: actual signal and its derivatives up to order r - 1, each ([samples,] joints).
+        gains: gains K_0, ..., K_{r-1}, (joints, r) or (1, r).
+        integral_gain: gain K_I, (joints,) or (1,).
+        integral: time integral of the error, ([samples,] joints).
     """
     control = desired[-1] + integral_gain * integral
     for wanted, found, gain in zip(desired, actual, gains.T, strict=False):
@@ -48,13 +48,13 @@ def linear_control(
 
 
 POSITION_ORDER = 4
-"""Degree of (33a): q is decoupled at its fourth derivative."""
+"""Order of (33a): motor torques act on the fourth derivative of q."""
 
 RIGID_ORDER = 2
-"""The same for a robot without springs, (3)."""
+"""Order of the position error of a robot without springs, (3)."""
 
 STIFFNESS_ORDER = 2
-"""Degree of (33b)."""
+"""Order of (33b)."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +62,15 @@ class Gains:
     """Coefficients of the error dynamics e^(r) + ... + K1 e' + K0 e + KI integral(e) = 0 of each joint.
 
     Attributes:
-        position: K0, K1, ... of (33a), (joints, r) or (1, r) for all joints alike, 1/s^(r-k). The order r is
-            4, or 2 for a robot without springs.
-        stiffness: K_sigma0, K_sigma1 of (33b), (joints, 2) or (1, 2).
-        position_integral: KI of the position, (joints,) or (1,), 1/s^(r+1); 0 for no integral action.
-        stiffness_integral: KI of the stiffness, as above, 1/s^3.
-        sources: the files that they were read from.
+        position: gains K0, K1, ... of (33a), (joints, r), or (1, r) for the same in all joints, 1/s^(r-k).
+            The order r is 4, or 2 for a robot without springs.
+        stiffness: gains K_sigma0, K_sigma1 of (33b), (joints, 2) or (1, 2), 1/s^(2-k).
+        position_integral: gain KI of the position, (joints,) or (1,), 1/s^(r+1); 0 for no integral action.
+        stiffness_integral: gain KI of the stiffness, (joints,) or (1,), 1/s^3; 0 for no integral action.
+        sources: files that the poles were read from.
 
     Raises:
-        InputError: a polynomial that is not Hurwitz.
+        InputError: a polynomial is not Hurwitz.
     """
 
     position: FloatArray
@@ -88,16 +88,16 @@ class Gains:
 
     @classmethod
     def from_poles(cls, position: npt.ArrayLike, stiffness: npt.ArrayLike = (-1.0, -1.0)) -> Gains:
-        """Gains that give the errors these poles; one more pole than the order asks for integral action.
+        """Return gains that give the errors these poles; one pole more than the order adds integral action.
 
         Args:
             position: poles of the position error, 1/s: 4 (2 for a robot without springs), or 5 (3) with
-                integral action; (poles,) for all joints alike, or (joints, poles).
-            stiffness: poles of the stiffness error, 2, or 3 with integral action; without effect at joints
-                whose stiffness is not commanded.
+                integral action; (poles,) for the same in all joints, or (joints, poles).
+            stiffness: poles of the stiffness error, 1/s: 2, or 3 with integral action; without effect at
+                joints whose stiffness is not commanded.
 
         Raises:
-            InputError: another number of poles, an unstable one, or a complex one without its conjugate.
+            InputError: the number of poles is wrong, or a pole is unstable or complex without its conjugate.
         """
         position_gains, position_integral = _coefficients("position", position, {2, 3, 4, 5})
         stiffness_gains, stiffness_integral = _coefficients("stiffness", stiffness, {2, 3})
@@ -105,7 +105,7 @@ class Gains:
 
     @property
     def order(self) -> int:
-        """The order r of the position error."""
+        """Order r of the position error."""
         return int(self.position.shape[1])
 
     @property
@@ -114,10 +114,10 @@ class Gains:
         return bool(np.any(self.position_integral) or np.any(self.stiffness_integral))
 
     def check_fit(self, joints: int, order: int) -> None:
-        """Refuse gains of another robot.
+        """Raise an error if the gains do not fit a robot.
 
         Raises:
-            InputError: they are not of `joints` joints, or not of this order.
+            InputError: the number of joints or the order of the position error differs.
         """
         if self.order != order:
             raise InputError.one(
@@ -131,7 +131,7 @@ class Gains:
 
 
 def _coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[FloatArray, FloatArray]:
-    """Rows K0, K1, ..., and KI of each."""
+    """Return rows K0, K1, ..., and the KI of each row."""
     table = np.atleast_2d(np.asarray(poles, dtype=np.complex128))
     if table.ndim != 2 or table.shape[1] not in counts:
         expected = ", ".join(map(str, sorted(counts)))
@@ -146,7 +146,7 @@ def _coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[Fl
 
 
 def check_stable(name: str, pole: complex) -> None:
-    """Refuse a pole that makes an error grow, or last.
+    """Raise an error if a pole is unstable.
 
     Raises:
         InputError: its real part is not negative.

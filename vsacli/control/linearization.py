@@ -1,7 +1,8 @@
-"""Feedback linearization of joints with springs, III-C and IV-C: (32)-(35), (60), (69)-(74).
+"""Feedback linearization, sections III-C and IV-C of the paper: (32)-(35), (60), (69)-(74).
 
 The decoupling matrices relate motor torques to the highest derivatives of position and stiffness; the control
-law inverts them in the measured state, without root finding.
+law inverts them in the measured state, without root finding. Robots without springs have the computed torque
+(3) instead. `FeedbackLinearization` selects the law for a robot.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from vsacli.trajectory.motion import Motion
 
 
 class LinkMotion(NamedTuple):
-    """The motion of the links at a state, each ([samples,] joints).
+    """Elastic torque, motion of the links, and stiffness at a state, each ([samples,] joints).
 
     The stiffness of an elastic joint is that of its spring.
     """
@@ -39,9 +40,9 @@ class LinkMotion(NamedTuple):
 
 
 class Decoupling:
-    """The law for a robot all of whose motors act through springs.
+    """The control law for a robot all of whose motors act through springs.
 
-    States are without the entries of absent motors, as in `Plant`.
+    States have no entries for absent motors, as in `Plant`.
     """
 
     def __init__(self, plant: Plant, gains: Gains) -> None:
@@ -58,10 +59,10 @@ class Decoupling:
         integral: Integral,
         slip: FloatArray | None = None,
     ) -> FloatArray:
-        """Motor torques, (..., motors); NaN at a joint whose A is singular.
+        """Return motor torques, (..., motors); NaN at a joint whose A is singular.
 
-        Friction is compensated by the velocities of the motors; where it is sharp by their direction `slip`,
-        (motors,), if that is given, and not at all at rest.
+        Friction is compensated by the velocities of the motors. Sharp friction is compensated by the
+        direction `slip`, (motors,), if given, and not at all at rest.
         """
         drivetrain = self._plant.drivetrain
         springs = drivetrain.state(q, theta, dq, dtheta)
@@ -96,7 +97,7 @@ class Decoupling:
         wrench: Wrench | None,
         commanded: Mapping[str, FloatArray] = MappingProxyType({}),
     ) -> LinkMotion:
-        """Return the motion of the links at a state, under a wrench and commanded damping."""
+        """Return the motion of the links at a state, under a wrench and with commanded damping."""
         return self._link_motion(q, dq, self._plant.drivetrain.state(q, theta, dq, dtheta), wrench, commanded)
 
     def _link_motion(
@@ -118,7 +119,7 @@ class Decoupling:
 
 
 class ComputedTorque:
-    """The law for a robot all of whose motors move their links directly."""
+    """The control law for a robot all of whose motors move their links directly."""
 
     def __init__(self, plant: Plant, gains: Gains) -> None:
         self._plant = plant
@@ -134,7 +135,7 @@ class ComputedTorque:
         integral: Integral,
         slip: FloatArray | None = None,
     ) -> FloatArray:
-        """Motor torques, (..., motors): tau = (M + B) v + n + Dm q' + friction, `slip` as of `Decoupling`."""
+        """Return (M + B) v + n + Dm q' + friction, (..., motors); for `slip` see `Decoupling.torque`."""
         v_q = linear_control(
             (reference.q, reference.dq, reference.ddq),
             (q, dq),
@@ -150,25 +151,25 @@ class ComputedTorque:
 def feedback_linearization(
     robot: Robot, state: State, reference: Motion, gains: Gains, integral: Integral | None = None
 ) -> FloatArray:
-    """Motor torques that make the errors obey the linear dynamics (33), as long as A is regular.
+    """Return the motor torques that make the errors obey the linear dynamics (33), as long as A is regular.
 
-    A control loop keeps a `FeedbackLinearization`, which prepares the robot once. Dry friction of motors is
-    added at their velocities; of a motor that rests it is not known where it has no width, and left out.
+    In a control loop use a `FeedbackLinearization`, which prepares the robot only once. Dry friction of
+    motors is added at their velocities. Friction without a width is undefined at rest, and left out there.
 
     Args:
-        robot: either all of its joints have springs, of any kinds mixed at will, or none
-            has, which gives the computed torque (3).
+        robot: robot. Either all of its joints have springs, of any kinds, or none has; the latter gives the
+            computed torque (3).
         state: measured state, at one instant or over samples.
         reference: commanded motion and stiffness, arrays ([samples,] joints), and the wrench that acts.
-        gains: of the linear control (32).
-        integral: of the errors, if the gains ask for integral action; zero if None.
+        gains: gains of the linear control (32).
+        integral: time integrals of the errors, for gains with integral action; zero if None.
 
     Returns:
         tau_motor, ([samples,] joints, 2), N m (N), joint side of the gear; NaN where there is no motor, and
         at a joint whose A is singular.
 
     Raises:
-        InputError: the robot mixes rigid joints with others, the gains are not for it, or shapes do not fit.
+        InputError: the robot mixes rigid joints with others, the gains do not fit it, or shapes are wrong.
         TypeError: an argument is of another type.
     """
     check_type("reference", reference, Motion, "trajectory.at(time) gives one")
@@ -177,11 +178,11 @@ def feedback_linearization(
 
 
 class FeedbackLinearization:
-    """The control law for a robot, gains, and the frame of the wrench that acts on it (None if none does).
+    """The control law for a robot, gains, and the frame of the wrench that acts on it (None without one).
 
     Attributes:
-        plant: the model that the law believes in.
-        law: of the torques of `plant`'s motors.
+        plant: model of the robot that the law uses.
+        law: law for the torques of the motors of `plant`.
     """
 
     def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:
@@ -192,7 +193,7 @@ class FeedbackLinearization:
         self.law = control_law(self.plant, gains)
 
     def __call__(self, state: State, reference: Motion, integral: Integral | None = None) -> FloatArray:
-        """Motor torques, ([samples,] joints, 2); see `feedback_linearization`."""
+        """Return motor torques, ([samples,] joints, 2), N m (N); see `feedback_linearization`."""
         unpacked = self.plant.unpacked(state)
         zero = np.zeros_like(unpacked[0])
         torque = self.law.torque(*unpacked, reference, integral or Integral(zero, zero))
@@ -200,10 +201,10 @@ class FeedbackLinearization:
 
 
 def position_order(robot: Robot, plant: Plant) -> int:
-    """Order of the error dynamics (33a) of a robot's position.
+    """Return the order of the error dynamics (33a) of a robot's position.
 
     Raises:
-        InputError: the robot mixes rigid joints with others, or a transmission is damped: there is none.
+        InputError: the robot mixes rigid joints with others, or has a damped transmission; no law exists.
     """
     sprung = plant.drivetrain.sprung
     damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
@@ -218,7 +219,7 @@ def position_order(robot: Robot, plant: Plant) -> int:
 
 
 def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
-    """Return the law for a robot all of whose joints, or none, have springs."""
+    """Return the law for a robot whose joints all have springs, or none has."""
     return Decoupling(plant, gains) if plant.drivetrain.sprung.all() else ComputedTorque(plant, gains)
 
 

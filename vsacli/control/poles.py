@@ -1,4 +1,4 @@
-"""Poles as people write them: in one line for all joints, or in a file joint by joint."""
+"""Gains from poles written by users: in one line for all joints, or in a file joint by joint."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vsacli.robot.model import Robot
 
 FORMAT = "vsacli-poles/1"
 DEFAULT = "-20"
-"""Poles of both errors unless given, 1/s: settled within half a second."""
+"""Default of all poles, 1/s: errors settle within half a second."""
 
 Poles = tuple[complex, ...]
 
@@ -52,10 +52,10 @@ class PolesFile:
 
 
 def parse_poles(written: str) -> Poles:
-    """Poles written as numbers between commas, e.g. `-20, -21, -10+5j, -10-5j`.
+    """Parse poles separated by commas, e.g. `-20, -21, -10+5j, -10-5j`.
 
     Raises:
-        InputError: something else.
+        InputError: the text is something else.
     """
     try:
         return tuple(complex(re.sub(r"\s", "", word)) for word in written.split(","))
@@ -64,19 +64,19 @@ def parse_poles(written: str) -> Poles:
 
 
 def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bool) -> Gains:
-    """Gains that give all joints the same poles.
+    """Return gains that give all joints the same poles.
 
     Raises:
-        InputError: poles that cannot be used, or another number of them than the robot needs.
+        InputError: poles are invalid, or their number is not the one that the robot needs.
     """
     return _gains(robot, [parse_poles(position)], [parse_poles(stiffness)], integral)
 
 
 def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) -> Gains:
-    """Gains from a file with the poles of each joint.
+    """Return gains from a file with the poles of each joint.
 
     Raises:
-        InputError: with every problem of the file.
+        InputError: the file has problems.
     """
     document, source = read_document(path, PolesFile, FORMAT)
     given = {joint.name: joint for joint in document.joints}
@@ -106,7 +106,7 @@ def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], 
 
 
 def _counted(name: str, poles: Poles, order: int, integral: bool) -> Poles:
-    """Return as many poles as the error has states; a single one repeated."""
+    """Return one pole for each state of the error; a single one is repeated."""
     count = order + integral
     if len(poles) == 1:
         return poles * count

@@ -1,4 +1,4 @@
-"""The chain of joints and links, its file, and its making from a URDF."""
+"""The robot: its chain of joints and links, its file, its kinematics, and import from URDF."""
 
 from typing import TYPE_CHECKING
 

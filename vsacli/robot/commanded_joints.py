@@ -1,4 +1,4 @@
-"""The joints of a robot as a trajectory sees them: which signals can command each."""
+"""The signals that can command each joint of a robot, as far as a trajectory needs to know them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class CommandedJoints:
     """The joints that a trajectory commands.
 
     Attributes:
-        types: name and type of each, from the base to the tip.
-        exempt: for each signal by key the joints that do not take it, each with the reason, a clause.
-        rigid: whether all are rigid, so that torques do not depend on jerk and snap.
+        types: joint types by joint name, from the base to the tip.
+        exempt: joints that a signal does not command, by signal key; each name with the reason, a clause.
+        rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
     """
 
     types: Mapping[str, str]
@@ -39,27 +39,27 @@ class CommandedJoints:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the joints."""
         return tuple(self.types)
 
     @property
     def taken(self) -> frozenset[str]:
-        """Keys of the signals that any joint takes."""
+        """Keys of the signals that command at least one joint."""
         return frozenset(key for key, exempt in self.exempt.items() if len(exempt) < len(self.types))
 
     @property
     def untaken_devices(self) -> tuple[Signal, ...]:
-        """Signals of devices that no joint has."""
+        """Signals of devices that are on no joint."""
         return tuple(each for each in COMMANDED.values() if each.device and each.key not in self.taken)
 
     def taking(self, signal: Signal) -> dict[int, str]:
-        """Return the joints that take a signal, by index."""
+        """Return the names of the joints that a signal commands, by index."""
         exempt = self.exempt.get(signal.key, {})
         return {index: name for index, name in enumerate(self.types) if name not in exempt}
 
 
 def takers(signal: Signal, joint: str = "joint") -> str:
-    """Return words for the joints that take a signal, from the word for one or several."""
+    """Return a phrase for the joints that a signal commands, built on the word "joint" or "joints"."""
     if signal.device is not None:
         return f"{joint} with a {signal.device}"
     kinds = (kind for kind, actuator in ACTUATORS.items() if signal.key in actuator.commanded)

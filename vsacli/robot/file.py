@@ -1,4 +1,4 @@
-"""Robot files: `vsacli-robot/1`."""
+"""Robot files, format `vsacli-robot/1`: reading, and conversion to a `Robot` with standard DH rows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORMAT = "vsacli-robot/1"
 
 @dataclass(frozen=True)
 class RobotFile(Robot):
-    """The content of a robot file: rows and link frames are of the convention that it names."""
+    """The content of a robot file, with rows and link frames in the DH convention that it names."""
 
     convention: str = choice(
         ("standard", "modified"),
@@ -30,7 +30,7 @@ class RobotFile(Robot):
     )
 
     def robot(self) -> Robot:
-        """Return the robot, with standard rows and link frames whatever the convention of the file."""
+        """Return the robot with standard rows and link frames, converted if the file has modified ones."""
         robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
         if self.convention == "standard":
             return robot
@@ -43,11 +43,11 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
     """Read a robot from a YAML file.
 
     Args:
-        path: of the file.
-        changes: other values by paths into the file, e.g. `{"joints.*.link.mass": 2}`; results remember them.
+        path: path of the file.
+        changes: values that override those at paths, e.g. `{"joints.*.link.mass": 2}`; stored in results.
 
     Raises:
-        InputError: with every problem of the file, each with its line.
+        InputError: the file has problems; lists each with its line.
         TypeError: path is of another type.
     """
     check_path(path, "load_robot(path)")
@@ -55,17 +55,17 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
 
 
 class ReadRobot(NamedTuple):
-    """A robot file that was read, and what it says."""
+    """A robot file that was read: its content, and its source for error messages."""
 
     document: RobotFile
     source: Source
 
     def robot(self, changes: Changes = MappingProxyType({})) -> Robot:
-        """Return the robot, with changes.
+        """Return the robot with changes.
 
         Raises:
-            ChangeError: one cannot be made.
-            InputError: modified rows have no standard ones.
+            ChangeError: a change cannot be made.
+            InputError: the modified rows cannot be converted to standard ones.
         """
         document, source = changed(self.document, self.source, changes)
         try:
@@ -80,13 +80,13 @@ def read_robot(path: str | os.PathLike[str]) -> ReadRobot:
     """Read a robot file.
 
     Raises:
-        InputError: with every problem of the file, each with its line.
+        InputError: the file has problems; lists each with its line.
     """
     return ReadRobot(*read_document(path, RobotFile, FORMAT))
 
 
 def text_to_change(robot: Robot) -> tuple[str, Path]:
-    """Return the text of the file that a robot was read from, and the folder in which it stands.
+    """Return the text of the file that a robot was read from, and the folder of this file.
 
     Raises:
         InputError: the robot was not read from a file, or its text was too large to keep.

@@ -34,7 +34,7 @@ from vsacli.documents.fields import (
 UNBOUNDED = (-math.inf, math.inf)
 NO_MASS, NO_INERTIA = "its mass is zero", "its inertia is zero"
 INERTIA_ROUNDING = 1e-12
-"""Relative size below which a negative eigenvalue of an inertia tensor is rounding of its entries."""
+"""Relative size below which a negative eigenvalue of an inertia tensor counts as rounding of its entries."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class DenavitHartenberg:
 
 @dataclass(frozen=True)
 class Pose:
-    """The pose of a frame in another, as the `origin` of URDF: position, then fixed-axis rotations."""
+    """The pose of a frame in another one: position, then fixed-axis rotations, like `origin` in URDF."""
 
     xyz: tuple[float, float, float] = vector(
         3, units.LENGTH, "position of its origin", default=(0.0, 0.0, 0.0)
@@ -74,7 +74,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Inertia:
-    """Central inertia tensor; entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
+    """Central inertia tensor, with the entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
 
     xx: float = number(units.INERTIA, "moment about the x axis")
     yy: float = number(units.INERTIA, "moment about the y axis")
@@ -99,11 +99,11 @@ class Inertia:
 
     @property
     def principal_moments(self) -> FloatArray:
-        """Eigenvalues, ascending."""
+        """Eigenvalues of the tensor, ascending, kg m^2."""
         return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
 
     def warnings(self) -> Iterator[str]:
-        """Yield warnings of values that are hardly meant."""
+        """Yield warnings about implausible values."""
         low, middle, high = self.principal_moments
         if high == 0:
             yield NO_INERTIA
@@ -125,7 +125,7 @@ class Link:
         check_fields(self)
 
     def warnings(self) -> Iterator[str]:
-        """Yield warnings of values that are hardly meant."""
+        """Yield warnings about implausible values."""
         if self.mass == 0:
             yield NO_MASS
         yield from self.inertia.warnings()
@@ -133,7 +133,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Limits:
-    """Ranges of the commanded motion; steps beyond are computed and flagged."""
+    """Limits of the commanded motion; samples beyond them are computed and flagged."""
 
     position: tuple[float, float] = interval(units.POSITION, "range of the joint position", default=UNBOUNDED)
     velocity: tuple[float, float] = interval(units.VELOCITY, "range of the joint velocity", default=UNBOUNDED)
@@ -185,11 +185,11 @@ class Joint:
 
     @property
     def actuator_type(self) -> str:
-        """The key of its actuator in `ACTUATORS`."""
+        """Key of the actuator's class in `ACTUATORS`."""
         return ACTUATORS.name_of(type(self.actuator))
 
     def damper_at(self, location: str) -> Damper | None:
-        """Return its damper if that is there."""
+        """Return the damper if it has this location, else None."""
         return self.damper if self.damper is not None and self.damper.location == location else None
 
     @property
@@ -199,7 +199,7 @@ class Joint:
 
     @property
     def commanded(self) -> tuple[str, ...]:
-        """Keys of the signals that a trajectory commands besides its motion."""
+        """Keys of the signals that a trajectory commands in addition to the motion."""
         devices = (
             signal.key
             for signal in COMMANDED.values()
@@ -208,13 +208,13 @@ class Joint:
         return (*self.actuator.commanded, *devices)
 
     def uncommanded(self, signal: Signal) -> str:
-        """Why a trajectory does not command a signal, a clause."""
+        """Return the reason why a trajectory does not command a signal, as a clause."""
         if signal.device is not None:
             return f"it has no {signal.device}"
         return self.actuator.uncommanded.get(signal.key, f"its actuator takes no {signal.key}")
 
     def has(self, variable: Variable) -> list[bool]:
-        """Return which columns of a result variable it has: of motors 1 and 2, or of the joint."""
+        """Return a mask of the columns that a result variable has: of motors 1 and 2, or of the joint."""
         if variable.requires in OF_ANY_ROBOT:
             return self.actuator.has(variable)
         of_kind = self.actuator.has(variable._replace(requires=None))
@@ -226,11 +226,11 @@ class Joint:
 
     @property
     def has_friction(self) -> bool:
-        """Whether it or one of its motors has dry friction."""
+        """Whether the joint or one of its motors has dry friction."""
         return any((self.friction, *(motor.friction for motor in self.actuator.motors)))
 
     def _friction_problems(self) -> Iterator[FieldProblem]:
-        """Yield the problems of friction that cannot be differentiated twice in the elastic torque."""
+        """Yield problems of friction that is not twice differentiable as a part of the elastic torque."""
         if self.friction is None:
             return
         backward, forward = self.friction.coulomb
@@ -253,7 +253,7 @@ class Joint:
             yield FieldProblem(("friction", "coulomb"), reason)
 
     def warnings(self, *, massless: bool = False) -> Iterator[str]:
-        """Yield warnings on link and springs; on no link if none has a mass."""
+        """Yield warnings about link and springs; without those on zero mass and inertia if `massless`."""
         said = (NO_MASS, NO_INERTIA) if massless else ()
         of_link = (warning for warning in self.link.warnings() if warning not in said)
         yield from (f"link of joint {self.name}: {warning}" for warning in of_link)
@@ -261,9 +261,9 @@ class Joint:
 
 
 def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
-    """Return which columns of a variable exist, for each joint by its kind of actuator.
+    """Return a mask of the columns of a variable that exist, for each joint by its kind of actuator.
 
-    A kind that is not known may have them all.
+    All columns count as existing for an unknown kind.
     """
     every = [True] * (2 if "motor" in variable.dims else 1)
     return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]

@@ -1,4 +1,4 @@
-"""Forward kinematics of the frames of a robot, and the Jacobian."""
+"""Forward kinematics of the frames of a robot by standard Denavit-Hartenberg rows, and its Jacobian."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Row(Protocol):
 
     @property
     def is_revolute(self) -> bool:
-        """Whether its variable is an angle."""
+        """Whether the joint variable is an angle."""
 
 
 class Geometry(Protocol):
@@ -35,11 +35,11 @@ class Geometry(Protocol):
 
     @property
     def base(self) -> Pose:
-        """DH frame 0 in the base frame."""
+        """Pose of DH frame 0 in the base frame."""
 
     @property
     def tool(self) -> Pose:
-        """End effector in the last DH frame."""
+        """Pose of the end effector in the last DH frame."""
 
     @property
     def joints(self) -> Sequence[Row]:
@@ -47,23 +47,23 @@ class Geometry(Protocol):
 
 
 class Frame(NamedTuple):
-    """A frame in another one: axes as columns, ([samples,] 3, 3), and origin, ([samples,] 3) m."""
+    """A frame in another one: axes as columns, ([samples,] 3, 3), and origin, ([samples,] 3), m."""
 
     axes: FloatArray
     origin: FloatArray
 
     def point(self, local: tuple[float, float, float]) -> FloatArray:
-        """Return a point given in this frame, (samples, 3)."""
+        """Return a point of this frame in the outer frame, (samples, 3), m."""
         return np.asarray(self.axes @ np.array(local) + self.origin)
 
     def holding(self, inner: Frame) -> Frame:
-        """Return a frame that is given in this one."""
+        """Return a frame that is given in this one as a frame of the outer one."""
         origin = (self.axes @ inner.origin[..., None])[..., 0] + self.origin
         return Frame(self.axes @ inner.axes, origin)
 
 
 def frames(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
-    """Frames 0 to N at positions q, (samples, joints)."""
+    """Yield frames 0 to N in DH frame 0, at joint positions q, (samples, joints)."""
     frame = Frame(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     yield frame
     for joint, variable in zip(robot.joints, q.T, strict=True):
@@ -72,7 +72,7 @@ def frames(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
 
 
 def _link_frame(joint: Row, variable: FloatArray) -> Frame:
-    """Frame i in frame i-1: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
+    """Return frame i in frame i-1: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     dh, zero = joint.dh, np.zeros_like(variable)
     theta, d = (dh.theta + variable, dh.d + zero) if joint.is_revolute else (dh.theta + zero, dh.d + variable)
     c, s, ca, sa = np.cos(theta), np.sin(theta), math.cos(dh.alpha), math.sin(dh.alpha)
@@ -81,10 +81,10 @@ def _link_frame(joint: Row, variable: FloatArray) -> Frame:
 
 
 def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
-    """Poses of the link frames (DH frames 1 to N) and of the end effector, in the base frame.
+    """Return the poses of the link frames (DH frames 1 to N) and of the end effector, in the base frame.
 
     Args:
-        robot: the robot, its base and tool poses included.
+        robot: robot with its base and tool poses.
         q: joint positions, ([samples,] joints), rad (m).
 
     Returns:
@@ -106,14 +106,14 @@ def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
 
 
 def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatArray:
-    """Geometric Jacobian of the end effector: its velocity and angular velocity by joint velocities.
+    """Return the geometric Jacobian: velocity and angular velocity of the end effector per joint velocity.
 
     The power of a `Wrench` w in the same frame is w^T J q', so that it changes tau_e by -J^T w.
 
     Args:
-        robot: the robot, its base and tool poses included.
+        robot: robot with its base and tool poses.
         q: joint positions, ([samples,] joints), rad (m).
-        frame: along whose axes the components are, "end_effector" or "base", as of a `Wrench`.
+        frame: frame along whose axes the components are, "end_effector" or "base", as of a `Wrench`.
 
     Returns:
         J, ([samples,] 6, joints): velocity of the tool frame's origin, then angular velocity, in the order of
@@ -139,7 +139,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatAr
 
 
 def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
-    """Frames 0 to N and that of the end effector in the base frame, at positions q, (samples, joints)."""
+    """Yield frames 0 to N and the end effector's in the base frame, at positions q, (samples, joints)."""
     base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
     for frame in frames(robot, q):
         last = base.holding(frame)
@@ -152,13 +152,13 @@ def _constant_frame(pose: Pose) -> Frame:
 
 
 def tip_position(robot: Robot, q: FloatArray) -> FloatArray:
-    """Origin of the end effector's frame in DH frame 0, (samples, 3) m, at q of (samples, joints)."""
+    """Return the origin of the tool frame in DH frame 0, (samples, 3), m, at q, (samples, joints)."""
     *_, last = frames(robot, q)
     return last.point(robot.tool.xyz)
 
 
 def rotation_matrix(pose: Pose) -> Matrix:
-    """Rz(yaw) Ry(pitch) Rx(roll), with exact zeros and ones at right angles."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll), with exact zeros and ones at right angles."""
     (cr, cp, cy), (sr, sp, sy) = (
         [trigonometric(function, angle) for angle in pose.rpy] for function in ("cos", "sin")
     )
@@ -170,5 +170,5 @@ def rotation_matrix(pose: Pose) -> Matrix:
 
 
 def base_gravity(robot: Robot) -> Vector:
-    """Gravity acceleration in DH frame 0, m/s^2."""
+    """Return the gravity acceleration in DH frame 0, m/s^2."""
     return rotation_matrix(robot.base).transposed().times(Vector(*map(exact, robot.gravity)))

@@ -63,23 +63,23 @@ class Robot:
         return html_table(f"Robot {self.name}", self._joint_rows())
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
-        """Return a line for each joint, below a header."""
         joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
         return [("joint", "type", "actuator"), *joints]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
-        """Return a robot with another value at a path into it; this one stays as it is.
+        """Return a robot with another value at a path; the original is unchanged.
 
-        `robot.replace("joints.elbow.link.mass", 2.5)`, or several at once:
+        Examples: `robot.replace("joints.elbow.link.mass", 2.5)`, or several at once:
         `robot.replace({"joints.*.damping": 0, "gravity.2": -1.62})`. The new robot is checked as a whole.
 
         Args:
-            path: words of the robot file joined by dots; an entry of a list goes by its name or index, `*`
-                stands for all. Or a mapping of such paths to values, which are replaced in turn.
-            value: what the file could hold there: a number, a text such as "90 deg", a list or a mapping.
+            path: keys of the robot file joined by dots; an entry of a list is given by its name or index, `*`
+                stands for all entries. Or a mapping of such paths to values, which are replaced in turn.
+            value: any value that a file may have there: a number, a text such as "90 deg", a list or a
+                mapping.
 
         Raises:
-            InputError: the path leads nowhere, saying what there is; or the value cannot stand there.
+            InputError: the path does not exist (the message lists existing ones), or the value is invalid.
         """
         from vsacli.documents import paths
 
@@ -95,7 +95,7 @@ class Robot:
 
     @property
     def joint_types(self) -> tuple[str, ...]:
-        """The type of each joint, "revolute" or "prismatic"."""
+        """Type of each joint, "revolute" or "prismatic"."""
         return tuple(joint.type for joint in self.joints)
 
     @property
@@ -104,7 +104,7 @@ class Robot:
         return tuple(joint.actuator for joint in self.joints)
 
     def has(self, variable: Variable) -> bool:
-        """Return whether results of the robot hold a variable of joints."""
+        """Return whether results of the robot contain a variable of joints."""
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT
@@ -112,18 +112,18 @@ class Robot:
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """The signals of joints that results hold besides the motion; some joints may not take them."""
+        """Commanded signals in results, in addition to the motion; each commands at least one joint."""
         return tuple(each for each in COMMANDED.values() if self.has(VARIABLES[each.key]))
 
     @property
     def spring_sources(self) -> tuple[Source, ...]:
-        """Files that springs were read from, each once."""
+        """Files that springs were read from, without duplicates."""
         sources = (source for joint in self.joints for source in joint.actuator.sources)
         return tuple(dict.fromkeys(sources))
 
     @property
     def checked(self) -> CheckedRobot:
-        """The robot as the rules of plausibility see it."""
+        """The robot's data that plausibility rules need."""
         from vsacli.documents.record_values import numbers
         from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
@@ -131,12 +131,12 @@ class Robot:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on values that are hardly meant."""
+        """Sentences about implausible values."""
         return tuple(map(str, self.located_warnings))
 
     @property
     def located_warnings(self) -> tuple[Problem, ...]:
-        """The warnings; those on a number of the robot file with its line."""
+        """Warnings about implausible values, with the line if they concern a number of the robot file."""
         from vsacli.robot.plausibility import implausible
 
         massless = not any(joint.link.mass for joint in self.joints)
@@ -147,9 +147,9 @@ class Robot:
 
 
 def check_robot(value: object) -> None:
-    """Refuse an argument that is no robot.
+    """Check that an argument is a robot.
 
     Raises:
-        TypeError: saying how to get one.
+        TypeError: it is not a `Robot`; the message says how to get one.
     """
     check_type("robot", value, Robot, "load_robot({}) reads one; it is the first argument")

@@ -1,12 +1,12 @@
-"""Modified Denavit-Hartenberg rows to standard ones, by moving frames: never by relabelling rows.
+"""Conversion of modified Denavit-Hartenberg rows to standard ones, by moving frames, not by relabeling rows.
 
 Row i of the modified convention, a_{i-1}, alpha_{i-1}, d_i, theta_i, leads from frame i-1 to frame i by
 Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i), and frame i has its z axis along joint i (J. J. Craig,
 Introduction to Robotics, 3rd ed., 2005, eq. (3.6); W. Khalil, J. Kleinfinger, ICRA 1986).
 
-Regrouped, Rz(theta_i) Tz(d_i) is followed by Tx(a_i) Rx(alpha_i) of the next row: a standard row. What comes
-before the first belongs to the base, and standard frame i is modified frame i moved along and turned about
-their common x axis by a_i and alpha_i; nothing for the last one.
+Regrouped, Rz(theta_i) Tz(d_i) is followed by Tx(a_i) Rx(alpha_i) of the next row: a standard row. The
+transform before the first Rz belongs to the base. Standard frame i is modified frame i, translated along and
+rotated about their common x axis by a_i and alpha_i; the last frame is unchanged.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from vsacli.robot.kinematics import rotation_matrix
 from vsacli.robot.model import Robot
 
 AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
-"""Stands for the row that would follow the last one: nothing moves its frame."""
+"""Row in place of the one after the last, so that the last frame is unchanged."""
 
 
 def as_standard(robot: Robot) -> Robot:
-    """Return the robot with standard DH rows and link frames for one with modified ones.
+    """Convert a robot with modified DH rows and link frames to standard ones.
 
     Zeros and right angles stay exact.
 
@@ -40,12 +40,12 @@ def as_standard(robot: Robot) -> Robot:
 
 
 def modified_link(joint: Joint) -> Link:
-    """Return the link of a standard joint in its modified frame, as a file of that convention has it."""
+    """Return the link of a standard joint in its modified frame, as in a file of that convention."""
     return _moved_link(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
 
 
 def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
-    """Return the pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
+    """Return the pose followed by Rx(alpha) Tx(a); alpha adds to the roll, which is about the same axis."""
     shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))
     x, y, z = (float(start + step) for start, step in zip(base.xyz, shift, strict=True))
     roll, pitch, yaw = base.rpy
@@ -58,14 +58,14 @@ def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHarte
 
 
 def _moved_link(link: Link, row: DenavitHartenberg) -> Link:
-    """Return the link seen from the frame that Tx(a) Rx(alpha) leads to."""
+    """Return the link expressed in the frame at Tx(a) Rx(alpha)."""
     c, s = trigonometric("cos", row.alpha), trigonometric("sin", row.alpha)
     x, (y, z) = link.com[0] - row.a, _turned(c, s, *link.com[1:])
     return Link(mass=link.mass, com=(x, y, z), inertia=_turned_inertia(link.inertia, c, s))
 
 
 def _turned(c: Scalar, s: Scalar, y: float, z: float) -> tuple[float, float]:
-    """Components y and z in axes turned about x by the angle of this cosine and sine."""
+    """Return components y and z in axes rotated about x by the angle with this cosine and sine."""
     return float(add(mul(c, y), mul(s, z))), float(sub(mul(c, z), mul(s, y)))
 
 

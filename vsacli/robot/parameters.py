@@ -1,4 +1,4 @@
-"""The numbers of a robot that results depend on, and robots with others in their place, of any kind."""
+"""Parameters of a robot, by path, and robots with other values or scalars (duals, symbols) in their place."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from vsacli.robot.model import Robot
 JOINTS = "joints"
 
 LIMITS, LARGEST, OF_DAMPER = "limits", "max_", ("damper", "range")
-"""Words of paths to numbers that bound results and change none: those under `limits`, the range of a damper,
-and those that begin by `max_`."""
+"""Words of paths to numbers that bound results but change none, and so are no parameters: those under
+`limits`, the range of a damper, and names that begin with `max_`."""
 
 _Record = TypeVar("_Record")
 
 
 class Parameter(NamedTuple):
-    """A number of a robot.
+    """A number of a robot on which results depend.
 
     Attributes:
-        path: to it, from the robot.
-        quantity: what it measures.
-        value: in SI units.
-        requirement: what the robot file demands of it, e.g. "positive"; "" if it may be any number.
-        joint: index of its joint; None if it is of the whole robot.
-        joint_type: of that joint, "" if there is none.
+        path: path of the number in the robot.
+        quantity: physical quantity.
+        value: value in SI units.
+        requirement: condition on its value in a robot file, e.g. "positive"; "" if it may be any number.
+        joint: index of its joint; None if it belongs to the whole robot.
+        joint_type: type of that joint; "" without one.
     """
 
     path: NumberPath
@@ -49,30 +49,30 @@ class Parameter(NamedTuple):
 
     @property
     def by_index(self) -> tuple[str, ...]:
-        """The words of the path, with entries of lists by their index."""
+        """Words of the path, with entries of lists by their index."""
         return tuple(str(step.number) if isinstance(step, Entry) else step for step in self.path)
 
     @property
     def part(self) -> str:
-        """Part of a joint it belongs to, e.g. `dh`; of the robot, `gravity`, `base` or `tool`."""
+        """Part of its joint, e.g. `dh`, or of the robot: `gravity`, `base` or `tool`."""
         return str(self.path[0] if self.joint is None else self.path[2])
 
     @property
     def unit(self) -> str:
-        """SI unit."""
+        """SI unit of the value."""
         return self.quantity.unit(self.joint_type)
 
 
 def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, ...]:
-    """Return the numbers of a robot that results depend on.
+    """Return the parameters of a robot.
 
     Args:
-        robot: the robot.
-        patterns: only those whose path fits one of these, e.g. `joints.*.actuator.spring.*`; all if empty.
-            An entry of a list goes by its name or by its index.
+        robot: robot.
+        patterns: patterns of paths, e.g. `joints.*.actuator.spring.*`, of which a parameter must match one;
+            empty for all parameters. An entry of a list is given by its name or index.
 
     Raises:
-        InputError: a pattern fits none.
+        InputError: a pattern matches no parameter.
     """
     found = [_parameter(robot, number) for number in numbers(robot) if _matters(number.path)]
     chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
@@ -101,14 +101,14 @@ def _parameter(robot: Robot, number: Number) -> Parameter:
 
 
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
-    """Return a robot that carries derivatives by some of its parameters (see `with_numbers`)."""
+    """Return a robot that carries derivatives with respect to some of its parameters; see `with_numbers`."""
     return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
 
 
 def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    """Return a robot with other values of some of its numbers, scalars of any kind.
+    """Return a robot with other values of some parameters, which may be scalars of any kind.
 
-    It is none to be checked or written: records on the way to those numbers are made without their checks.
+    Records on the paths are made without their checks, so the robot cannot be checked or written to a file.
     """
     places = [(parameter.path, value) for parameter, value in zip(chosen, values, strict=True)]
     other: Robot = _with_numbers(robot, places)
@@ -119,7 +119,7 @@ def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> 
     """Return a record or list with other numbers at some paths."""
     inside: dict[str | int, list[tuple[NumberPath, Scalar]]] = {}
     for path, scalar in places:
-        if not path:  # of a pair of numbers that are one, both
+        if not path:  # a pair of equal numbers is one parameter; set both
             return (scalar,) * len(content) if isinstance(content, tuple) else scalar
         word = path[0].number if isinstance(path[0], Entry) else path[0]
         inside.setdefault(word, []).append((path[1:], scalar))
@@ -134,7 +134,7 @@ def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> 
 def _in_list(
     entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Scalar]]]
 ) -> tuple[Any, ...]:
-    """Return a list with an entry replaced; without a number a path changes both sides of equal pairs."""
+    """Return a list with entries replaced; a path without an index changes both sides of an equal pair."""
     both = [
         ((word, *path), scalar)
         for word, deeper in inside.items()
@@ -150,7 +150,7 @@ def _in_list(
 
 
 def apart(joint: Joint) -> Joint:
-    """Return the joint with an actuator that is no other's, as one may be of several robots."""
+    """Return the joint with its own copy of the actuator, which several robots may share."""
     return _remade(joint, {"actuator": _remade(joint.actuator, {})})
 
 

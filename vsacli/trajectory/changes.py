@@ -1,4 +1,4 @@
-"""Changes that are given together, to a robot and to its trajectory."""
+"""Changes by path, divided into those of the robot file and those of the trajectory file."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from vsacli.trajectory.file import OF_ANY_ROBOT
 
 
 class Divided(NamedTuple):
-    """Changes by the file that they are made to."""
+    """Changes of the robot file and of the trajectory file."""
 
     robot: Changes
     trajectory: Changes
 
 
 def divided(changes: Changes) -> Divided:
-    """Changes by the file whose key the path begins with; no key but those that are kept is one of both.
+    """Divide changes by the file that has the first key of their path.
+
+    No key occurs in both files, except the ones in `KEPT`, which cannot be changed.
 
     Raises:
-        ChangeError: neither file has such a key, or it is one that is kept.
+        ChangeError: neither file has such a key, or the key is in `KEPT`.
     """
     robot, trajectory = declared(RobotFile), declared(OF_ANY_ROBOT)
     found = Divided({}, {})

@@ -1,4 +1,4 @@
-"""Devices of the joints along a trajectory: commanded, or at their uncommanded value."""
+"""Dampers of the joints along a trajectory: commanded, or at their minimum damping."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 SEEN = 1000
-"""Times at which damping is looked at, beside all breakpoints and its dips: whether there is any."""
+"""Times at which the damping is evaluated, in addition to all breakpoints and local minima."""
 
 NEWTON_STEPS = 4
-"""Newton steps from a thousandth of the motion to the bottom of a dip."""
+"""Newton steps from a sample, a thousandth of the motion away at most, to a local minimum."""
 
 VANISHING = 1e-12
-"""Share of the largest damping that counts as zero: the rounding of a dip to zero."""
+"""Share of the largest damping below which a minimum counts as zero: rounding."""
 
 
 def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
@@ -60,7 +60,7 @@ def _damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[Float
 
 
 def _dips(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
-    """Return where the damping is smallest between the times, by Newton's method on its rate."""
+    """Return the times of local minima of the damping, by Newton's method on its rate."""
     before = np.flatnonzero(np.diff(np.sign(_damping(trajectory, time, joint)[1])) > 0)
     dips = time[before]
     for _ in range(NEWTON_STEPS):
@@ -70,7 +70,7 @@ def _dips(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
 
 
 def _check_damping(joint: Joint, time: FloatArray, damping: FloatArray) -> None:
-    """Refuse a damping that vanishes on the way."""
+    """Raise an error if the damping vanishes somewhere, but not everywhere."""
     least = damping.argmin()
     if damping[least] <= VANISHING * damping.max() and damping.any():
         raise InputError.one(

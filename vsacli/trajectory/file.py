@@ -67,36 +67,36 @@ class TrajectoryFile:
     )
 
     untaken: ClassVar[tuple[Signal, ...]] = ()
-    """Signals of devices that no joint of the robot has."""
+    """Signals of devices that are on no joint of the robot."""
 
     def __post_init__(self) -> None:
         check_fields(self, *self._time_problems(), *self._device_problems())
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
-        """Declaration of each signal, where there is one."""
+        """Declarations of the signals that have one."""
         signals = (POSITION, *COMMANDED.values(), WRENCH)
         found = {signal: getattr(self, signal.key) for signal in signals}
         return {signal: declaration for signal, declaration in found.items() if declaration is not None}
 
     @property
     def recorded(self) -> dict[Signal, Recorded]:
-        """The signals that are recorded."""
+        """Declarations of the recorded signals."""
         return {signal: each for signal, each in self.declared.items() if isinstance(each, Recorded)}
 
     @property
     def formulas(self) -> dict[Signal, Formula]:
-        """The signals that are not recorded."""
+        """Declarations of the signals that are not recorded."""
         return {signal: each for signal, each in self.declared.items() if isinstance(each, Formula)}
 
     @property
     def lasts(self) -> float | None:
-        """The duration, s, as given or as it follows from a formula; None if it follows from nothing here."""
+        """Duration, s, as given or as it follows from a formula; None if undetermined."""
         durations = (self.duration, *(formula.lasts for formula in self.formulas.values()))
         return next((duration for duration in durations if duration is not None), None)
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """Yield why the formulas cannot last this long, in s."""
+        """Yield the problems of formulas that cannot last this long, in s."""
         for signal, formula in self.formulas.items():
             yield from (problem.inside(signal.key) for problem in formula.problems_over(duration))
 
@@ -124,13 +124,12 @@ class TrajectoryFile:
 
 @cache
 def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
-    """Return the record with the required fields of a trajectory.
+    """Return the class of trajectory files for joints that need these signals.
 
     Args:
-        taken: keys of the signals that some joint takes, which must be there unless they are of a device;
-            others may be absent.
+        taken: keys of the signals that command some joint. They are required, except those of devices.
         rigid: whether all joints are rigid.
-        untaken: signals of devices that no joint has, which must be absent.
+        untaken: signals of devices that are on no joint. They must be absent.
     """
     fields = {POSITION.key: value(declared_as(Use(POSITION, rigid)), POSITION.meaning)}
     for key, signal in COMMANDED.items():
@@ -144,7 +143,7 @@ def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] =
 
 
 OF_ANY_ROBOT = content(frozenset(), rigid=True)
-"""The content for an unknown robot: accepted if some robot would accept it."""
+"""Class of trajectory files for an unknown robot: accepts a file that some robot accepts."""
 
 
 def load_trajectory(
@@ -157,14 +156,15 @@ def load_trajectory(
     """Read a trajectory for a robot from a YAML file, or from a CSV file with position and stiffness.
 
     Args:
-        path: of the file.
-        robot: that is to move.
-        changes: other values by paths into a YAML file, e.g. `{"duration": 2}`; results remember them.
-        progress: opens a bar over the samples of all components of a recorded signal while splines are
-            fitted to them, which takes seconds for millions; `lambda samples: tqdm(total=samples)` is one.
+        path: path of the file.
+        robot: robot that executes the trajectory.
+        changes: values that override those of a YAML file, by path, e.g. `{"duration": 2}`; stored in
+            results.
+        progress: function that opens a progress bar over the samples of all components of a recorded signal,
+            e.g. `lambda samples: tqdm(total=samples)`; fitting splines to millions of samples takes seconds.
 
     Raises:
-        InputError: with every problem of the file, each with its line.
+        InputError: the file has problems; lists each with its line.
         TypeError: path or robot is of another type.
     """
     check_path(path, "load_trajectory(path, robot)")
@@ -176,7 +176,7 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
     """Read a YAML trajectory file for joints.
 
     Raises:
-        InputError: with every problem of the file, each with its line.
+        InputError: the file has problems; lists each with its line.
     """
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     return read_document(path, cls, FORMAT, joints.types, joints.exempt)
@@ -188,18 +188,18 @@ def declared_trajectory(
     changes: Changes = MappingProxyType({}),
     progress: Progress = unseen,
 ) -> Trajectory:
-    """Return a trajectory as in its file, without uncommanded devices, which depend on the robot.
+    """Return a trajectory as declared in its file, without signals of uncommanded devices.
 
-    But for its warnings, it is the same for all robots with the same `CommandedJoints`.
+    Except for its warnings, it is the same for all robots with the same `CommandedJoints`.
 
     Args:
-        path: as of `load_trajectory`.
-        robot: as above.
-        changes: as above.
-        progress: as above.
+        path: see `load_trajectory`.
+        robot: see `load_trajectory`.
+        changes: see `load_trajectory`.
+        progress: see `load_trajectory`.
 
     Raises:
-        InputError: as above.
+        InputError: the file has problems; lists each with its line.
     """
     joints = CommandedJoints.of(robot)
     if is_table(path):
@@ -232,10 +232,11 @@ def declared_trajectory(
 
 
 def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | None:
-    """Return the samples per second that changes give to a table, in which nothing else can be set.
+    """Return the sample rate, 1/s, that changes give to a table; nothing else of a table can be changed.
 
     Raises:
-        ChangeError: something else is set, or the rate is none.
+        InputError: something else is changed.
+        ChangeError: the rate is not valid.
     """
     if changes.keys() - {"rate"}:
         reason = (
@@ -262,7 +263,7 @@ def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
 def _read_recordings(
     document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
 ) -> list[Recording]:
-    """Return each CSV file once, for the signals that are wanted from it; all with the times of the first."""
+    """Read each CSV file once, for all signals declared from it; check that all files have equal times."""
     if not document.recorded:
         return []
     from vsacli.documents.column_mapping import ColumnMapping
@@ -295,14 +296,13 @@ def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str)
 
 
 def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
-    """Return the profiles by the keys of their signals, over times as declared."""
+    """Return the profiles by signal key, at the declared pace."""
     first, last = times.span
     formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 
 def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
-    """Return all of it passed more slowly."""
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
@@ -313,7 +313,7 @@ def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
 
 
 def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_names: Sequence[str]) -> None:
-    """Refuse formulas that cannot last as long as the recording; the file alone does not show it."""
+    """Raise an error if formulas cannot last as long as the recording, whose duration is not in the file."""
     first, last = times.span
     problems = list(document.problems_over(last - first))
     if problems:

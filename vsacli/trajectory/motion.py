@@ -1,4 +1,4 @@
-"""Commanded motion of a block of samples, from any trajectory."""
+"""Commanded motion over a block of samples."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Motion:
         time: (samples,) in s.
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
         commanded: signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples, joints);
-            NaN for a joint that is not commanded so.
-        wrench: of the environment on the end effector, if there is one.
+            NaN for a joint without this command.
+        wrench: wrench of the environment on the end effector; None without one.
     """
 
     time: FloatArray
@@ -33,14 +33,14 @@ class Motion:
 
     @classmethod
     def of(cls, time: FloatArray, arrays: Mapping[str, FloatArray], wrench: Wrench | None = None) -> Motion:
-        """Return the motion from arrays of the joints by names of result variables; others are ignored."""
+        """Return the motion from arrays by the names of result variables; other arrays are ignored."""
         q, dq, ddq, d3q, d4q = (arrays[name] for name in POSITION.names)
         commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         return cls(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
 
     @property
     def of_joints(self) -> dict[str, FloatArray]:
-        """The arrays of the joints by the names of result variables."""
+        """Arrays of the joints by the names of result variables."""
         return {**{name: getattr(self, name) for name in POSITION.names}, **self.commanded}
 
     def variables(self) -> dict[str, FloatArray]:
@@ -51,7 +51,7 @@ class Motion:
         return arrays
 
     def mapped(self, time: FloatArray, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
-        """Return the motion at other times: a function applied to each array and its order of derivation."""
+        """Return the motion at other times, with each array replaced by `function(array, order)`."""
         orders = orders_of_derivation()
         arrays = {name: function(array, orders[name]) for name, array in self.of_joints.items()}
         return Motion.of(time, arrays, self.wrench and self.wrench.mapped(function))

@@ -1,4 +1,4 @@
-"""Rules on a trajectory, for the robot that is to execute it: positions, durations, stiffness, wrench."""
+"""Plausibility rules of a trajectory file, given the robot: positions, durations, stiffness, wrench."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
 
 INSTANTS = 1001
-"""Times, evenly spread, at which the motion is looked at; sums of sinusoids are the fastest to change."""
+"""Evenly spread times at which the motion is evaluated; sums of sinusoids change fastest."""
 
 LONG = 100.0
-"""s; shorter motions may be as slow as they like."""
+"""Duration, s; shorter motions may be arbitrarily slow."""
 
 COMMON_FORCE, COMMON_MOMENT = 100.0, 10.0
-"""N, N m; up to these, wrenches may be large beside the robot, as of fingers that grip."""
+"""Force, N, and moment, N m; smaller ones may be large relative to the robot, e.g. of gripping fingers."""
 
 LOWEST_SHARE = 0.2
-"""A smaller share of the lowest stiffness at rest is no soft wish but another unit."""
+"""Share of the minimum stiffness at rest; a smaller command has probably another unit."""
 
 AMPLITUDES = frozenset(("sine", "cosine"))
-"""Keys of amplitudes about a stiffness, which are no stiffness."""
+"""Keys of amplitudes about a mean stiffness, which are not stiffnesses themselves."""
 
 PER_SECOND = "per second"
 UNITS_OF_TIME = (
@@ -62,24 +62,24 @@ SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs"
 RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 FAST = ("fast motions of revolute joints", "fast motions of prismatic joints")
-"""Rules, also of the robot, that explain findings of others."""
+"""Names of rules, some of them of the robot, whose findings explain those of other rules."""
 
 
 def implausible(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
-    """Return the findings of the rules, with the lines of the trajectory file."""
+    """Return the findings of the rules, each with its line of the trajectory file."""
     known = strange_of_robot(checked.robot.checked, checked.robot.sources)
     return findings(TRAJECTORY_RULES, checked, Written(source), known)
 
 
 @dataclass(frozen=True)
 class CheckedTrajectory:
-    """A trajectory as the rules of plausibility see it.
+    """A trajectory file with the data that plausibility rules need.
 
     Attributes:
-        robot: that is to execute it.
-        numbers: all of the file.
-        times: the steps.
-        motion: the position over time if it is given by a formula; recorded ones are looked at elsewhere.
+        robot: robot that executes the trajectory.
+        numbers: all numbers of the file.
+        times: sample times.
+        motion: profile of the position if a formula gives it; None if recorded, which is checked elsewhere.
     """
 
     robot: Robot
@@ -89,7 +89,7 @@ class CheckedTrajectory:
 
     @cached_property
     def sizes(self) -> BodySizes:
-        """Sizes of the robot."""
+        """Body sizes of the robot."""
         return BodySizes(self.robot.joints)
 
     @cached_property
@@ -99,17 +99,17 @@ class CheckedTrajectory:
 
     @cached_property
     def corridors(self) -> list[Corridor | None]:
-        """Attainable stiffness of each joint at rest; None if it takes none."""
+        """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
         return [corridor(joint) for joint in self.robot.joints]
 
     @property
     def revolute(self) -> BoolArray:
-        """Joints that are revolute, (joints,)."""
+        """Mask of the revolute joints, (joints,)."""
         return np.array([joint.is_revolute for joint in self.robot.joints])
 
     @property
     def travels(self) -> FloatArray:
-        """A common way of each joint, (joints,): 1 rad, or the reach of the robot, m."""
+        """Usual travel of each joint, (joints,): 1 rad, or the reach of the robot, m."""
         return np.where(self.revolute, 1.0, self.sizes.extent or math.nan)
 
     @property
@@ -119,7 +119,7 @@ class CheckedTrajectory:
         return last - first
 
     def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
-        """Yield the numbers that measure this, each with its joint and with its magnitude as size."""
+        """Yield the numbers with this quantity, with magnitude as size, and the index of the joint."""
         for path, measured, value, _ in self.numbers:
             if measured == quantity and isinstance(path[-1], Entry):
                 joint = path[-1].number
@@ -127,7 +127,7 @@ class CheckedTrajectory:
                 yield Measured(path, value, unit, abs(value)), joint
 
     def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
-        """Yield the time or frequency that the timing follows from, with the largest size."""
+        """Yield the time or frequency that sets the timing, with the largest size of all joints."""
         of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
         given = [each for each in of_motion if each.path[-1] == "frequency"]
         given = given or [each for each in of_motion if each.quantity == units.TIME]
@@ -140,7 +140,7 @@ class CheckedTrajectory:
 
 
 def _positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
-    """Positions in a unit, in turns or reaches of the robot, but for those within the limits of the joint."""
+    """Yield positions in a unit, in turns or reaches of the robot, except those within joint limits."""
     for measured, joint in checked.of_joints(units.POSITION):
         low, high = checked.robot.joints[joint].limits.position
         if measured.unit == unit and not -math.inf < low <= measured.value <= high < math.inf:
@@ -149,7 +149,7 @@ def _positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
 
 
 def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
-    """Mean velocity of the joint that moves most, prismatic ones in reaches of the robot."""
+    """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot."""
     if checked.moved is not None and checked.duration > LONG:
         way = np.abs(np.diff(checked.moved[0])).sum(axis=1) / checked.travels
         if way.any():
@@ -157,7 +157,6 @@ def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
 
 
 def _velocities(checked: CheckedTrajectory, *, revolute: bool) -> Iterator[Measured]:
-    """Yield the largest of joints of a type."""
     if checked.moved is not None:
         sizes = np.where(checked.revolute == revolute, np.abs(checked.moved[1]).max(axis=1), 0.0)
         yield from checked.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")
@@ -171,14 +170,14 @@ def _accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[M
 
 
 def _rate(checked: CheckedTrajectory, periods: float) -> Iterator[Measured]:
-    """Yield the samples in a number of seconds."""
+    """Yield the number of samples in `periods` seconds."""
     for path, quantity, value, _ in checked.numbers:
         if quantity == units.RATE and path == ("rate",):
             yield Measured(path, value, PER_SECOND, value * periods)
 
 
 def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
-    """Components over the weight of the robot, moments over that at its reach."""
+    """Yield force components relative to the robot's weight, or moments relative to weight times reach."""
     scale = checked.sizes.weight * (1.0 if forces else checked.sizes.extent)
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
@@ -188,7 +187,7 @@ def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]
 
 
 def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, Corridor]]:
-    """Yield every stiffness but amplitudes, with its joint, and the stiffness of the springs at rest."""
+    """Yield every stiffness except amplitudes, with its joint and the attainable range at rest."""
     for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
         found = checked.corridors[number]
         if found is not None and AMPLITUDES.isdisjoint(measured.path):
@@ -197,12 +196,12 @@ def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, Co
 
 
 def _above_lowest(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:
-    """Over the lowest, at joints whose springs all have a linear part, or at the others."""
+    """Yield stiffness over its minimum, at joints whose springs all have a linear part, or at the others."""
     for measured, joint, found in _commanded(checked):
         laws = getattr(joint.actuator, "spring", ())
         each_linear = bool(laws) and all(
             law.polynomial is not None for law in laws
-        )  # which has a stiffness at rest
+        )  # polynomial laws have a linear part
         if each_linear == linear:
             yield measured._replace(size=ratio(measured.size, found.lower))
 

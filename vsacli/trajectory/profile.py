@@ -1,4 +1,4 @@
-"""A signal over time: the interface of profiles, and the wrench in its frame."""
+"""Signals over time: the interface of profiles, and the profile of a wrench with its frame."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 
 class Profile(Protocol):
-    """A function of time with one component a joint or axis, and its first derivatives."""
+    """A function of time with one component per joint or axis, and its first derivatives."""
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Doubts about the values."""
+        """Warnings about implausible values."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -34,36 +34,36 @@ class Profile(Protocol):
 
     @property
     def known_between(self) -> bool:
-        """Whether `at` has the values at the steps, too; where these are given they are known there alone."""
+        """Whether `at` also gives the values at samples; False if these are given and known only there."""
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """Return the same at the steps start..stop-1, whose times are `time`; given columns pass through."""
+        """Return the same at samples start..stop-1, whose times are `time`; given columns pass through."""
 
     def stretched(self, factor: float) -> Profile:
-        """Return the same profile, slower by a factor, from the same first time on."""
+        """Return the profile slowed down by a factor, with the same first time."""
 
     @property
     def estimate(self) -> SampledProfile | None:
-        """The same if any number at the steps comes from a fit of recorded samples, else None."""
+        """This profile if any value at the samples comes from a fit of recorded samples, else None."""
 
 
 @dataclass(frozen=True)
 class Continued:
-    """A profile at other samples than its own, where it has the values of any other time."""
+    """A profile evaluated at other samples than its own, by `at` throughout."""
 
     profile: Profile
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
         return self.profile.components
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Doubts about the values."""
+        """Warnings about implausible values."""
         return self.profile.warnings
 
     @property
@@ -78,24 +78,24 @@ class Continued:
 
     @property
     def known_between(self) -> bool:
-        """True: steps are nothing special."""
+        """True, since samples are evaluated like any other time."""
         return True
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         return self.profile.at(time)
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """Return the same at steps, whose times are `time`."""
+        """Return the same at samples, whose times are `time`."""
         return self.profile.at(time)
 
     def stretched(self, factor: float) -> Continued:
-        """Return the same profile, slower by a factor, from the same first time on."""
+        """Return the profile slowed down by a factor, with the same first time."""
         return Continued(self.profile.stretched(factor))
 
     @property
     def estimate(self) -> SampledProfile | None:
-        """The same if any number at the steps comes from a fit of recorded samples, else None."""
+        """The original profile if any value at its samples comes from a fit, else None."""
         return self.profile.estimate
 
 
@@ -105,7 +105,7 @@ class WrenchProfile:
 
     Attributes:
         profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.
-        frame: along whose axes these are, "end_effector" or "base".
+        frame: frame along whose axes the components are, "end_effector" or "base".
     """
 
     profile: Profile

@@ -1,4 +1,4 @@
-"""The times of a trajectory's steps: a uniform grid, or as recorded."""
+"""Sample times of a trajectory: a uniform grid, recorded times, or a uniform grid over recorded times."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from vsacli.base.errors import InputError
 _Time = TypeVar("_Time", float, FloatArray)
 
 MAX_STEPS = 1_000_000_000
-"""More steps than this are taken for a mistake in duration or rate."""
+"""Largest number of intervals; more are considered a mistake in duration or rate."""
 
 
 class Times(Protocol):
-    """The times of the steps, both ends included."""
+    """Sample times, both ends included."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -30,16 +30,16 @@ class Times(Protocol):
 
     @property
     def samples(self) -> int:
-        """Number of steps, both ends included."""
+        """Number of samples, both ends included."""
 
     def block(self, start: int, stop: int) -> FloatArray:
-        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the times of samples start..stop-1; like a slice, clipped at the last sample."""
 
     def from_zero(self) -> Times:
         """Return the same times, counted from the first."""
 
     def stretched(self, factor: float) -> Times:
-        """Return the times of the same motion, slower by a factor."""
+        """Return the times of the motion slowed down by a factor."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class UniformTimes:
     """Times t_k = k duration/n with n = round(duration rate), the last one exactly the duration.
 
     Attributes:
-        duration: s.
-        rate: steps per second that are asked for.
+        duration: duration, s.
+        rate: requested sample rate, 1/s.
     """
 
     duration: float
@@ -87,18 +87,18 @@ class UniformTimes:
 
     @property
     def samples(self) -> int:
-        """Number of steps, both ends included."""
+        """Number of samples, both ends included."""
         return self.steps + 1
 
     def block(self, start: int, stop: int) -> FloatArray:
-        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the times of samples start..stop-1; like a slice, clipped at the last sample."""
         time = np.arange(start, min(stop, self.samples)) * self.duration / self.steps
         if stop >= self.samples > start:
             time[-1] = self.duration
         return time
 
     def from_zero(self) -> UniformTimes:
-        """They are."""
+        """See `Times.from_zero`; uniform times begin at zero."""
         return self
 
     def stretched(self, factor: float) -> UniformTimes:
@@ -108,11 +108,11 @@ class UniformTimes:
 
 @dataclass(frozen=True, eq=False)
 class RecordedTimes:
-    """Times that are given one by one.
+    """Times given sample by sample.
 
     Attributes:
-        time: (samples,) in s; see `time_problems` for their conditions.
-        notes: how they were understood, where that is not obvious.
+        time: times, (samples,), s; see `time_problems` for their conditions.
+        notes: notes on their interpretation, where that is not obvious.
     """
 
     time: FloatArray = field(repr=False)
@@ -125,11 +125,11 @@ class RecordedTimes:
 
     @property
     def samples(self) -> int:
-        """Number of steps, both ends included."""
+        """Number of samples, both ends included."""
         return len(self.time)
 
     def block(self, start: int, stop: int) -> FloatArray:
-        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the times of samples start..stop-1; like a slice, clipped at the last sample."""
         return self.time[start:stop]
 
     def from_zero(self) -> RecordedTimes:
@@ -137,18 +137,18 @@ class RecordedTimes:
         return RecordedTimes(self.time - self.time[0], self.notes)
 
     def stretched(self, factor: float) -> RecordedTimes:
-        """Return as many samples, further apart."""
+        """Return the same number of samples, further apart."""
         return RecordedTimes(stretch(self.time, self.time[0], factor), self.notes)
 
 
 @dataclass(frozen=True)
 class ResampledTimes:
-    """Equally spaced times over the span of a recording; like declared ones they keep their rate.
+    """Equally spaced times over the span of a recording; they keep their rate when stretched.
 
     Attributes:
         first: first time, s.
         last: last time, s.
-        rate: steps per second that are asked for.
+        rate: requested sample rate, 1/s.
 
     Raises:
         InputError: the rate is not possible.
@@ -177,11 +177,11 @@ class ResampledTimes:
 
     @property
     def samples(self) -> int:
-        """Number of steps, both ends included."""
+        """Number of samples, both ends included."""
         return self._elapsed.samples
 
     def block(self, start: int, stop: int) -> FloatArray:
-        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the times of samples start..stop-1; like a slice, clipped at the last sample."""
         time = self.first + self._elapsed.block(start, stop)
         if stop >= self.samples > start:
             time[-1] = self.last
@@ -197,5 +197,8 @@ class ResampledTimes:
 
 
 def stretch(time: _Time, first: float, factor: float) -> _Time:
-    """Times in s, seen from the first one, multiplied by a factor; the one rule for steps and profiles."""
+    """Return times, s, with their distances from `first` multiplied by a factor.
+
+    Sample times and profiles share this rule.
+    """
     return first + factor * (time - first)

@@ -1,4 +1,4 @@
-"""The trajectory a robot is asked to execute: motion, commanded signals and wrench at any of its steps."""
+"""The trajectory of a robot: motion, commanded signals and wrench, at its samples and between them."""
 
 from __future__ import annotations
 
@@ -27,25 +27,23 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
 
 NARROWEST_PIECE = 1e-9
-"""Share of the duration; pieces below arise where knots of two splines coincide but for rounding."""
+"""Share of the duration; narrower pieces arise where knots of two splines differ only by rounding."""
 
 
 class Trajectory:
     """Motion and commanded signals of all joints, and the wrench at the end effector, over the same times.
 
     Attributes:
-        times: the steps.
-        position: the motion at them and between them. All profiles count from the first step: stamps since
-            1970 are rounded to 2.4e-7 s, too coarse for knots, integrators and differences.
-        commanded: signals of `COMMANDED` by their keys, e.g. `stiffness`; NaN for a joint for which none is
-            chosen.
-        wrench: of the environment; None without one.
-        name: used in reports and for the name of the result file.
-        located_warnings: doubts about times and profiles; those on a number of the file with
-            its line.
-        warnings: the same as texts.
-        notes: how they were understood, where that is not obvious.
-        sources: the files it was read from.
+        times: sample times.
+        position: profile of the motion. All profiles count time from the first sample: stamps since 1970 are
+            rounded to 2.4e-7 s, too coarse for knots, integrators and finite differences.
+        commanded: profiles of signals by their keys in `COMMANDED`, e.g. `stiffness`; NaN if not commanded.
+        wrench: profile of the wrench of the environment; None without one.
+        name: name for reports and for the result file.
+        located_warnings: warnings about times and profiles, with the line of a value in the file if known.
+        warnings: texts of `located_warnings`.
+        notes: notes on the interpretation of times and profiles, where that is not obvious.
+        sources: files that the trajectory was read from.
     """
 
     def __init__(
@@ -60,12 +58,12 @@ class Trajectory:
         notes: Iterable[str] = (),
         sources: Iterable[Source] = (),
     ) -> None:
-        """Join profiles that have the same joints, and go from zero to the duration.
+        """Join profiles of the same joints, which go from zero to the duration.
 
-        A signal that is not among `commanded` is chosen for no joint; that of a device is left out.
+        A signal missing from `commanded` becomes NaN for all joints; one of a device is left out.
 
         Raises:
-            InputError: they have not.
+            InputError: the numbers of joints or the spans differ.
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
         self.commanded = {
@@ -90,7 +88,7 @@ class Trajectory:
         return f"Trajectory {self.name}: {size}{pushed}"
 
     def _repr_html_(self) -> str:
-        from html import escape  # for notebooks alone
+        from html import escape  # needed only in notebooks
 
         return f"<p>{escape(repr(self))}</p>"
 
@@ -114,7 +112,7 @@ class Trajectory:
                 )
 
     def _nothing(self, signal: Signal) -> Constant:
-        """Return the profile of a signal that is chosen for no joint."""
+        """Return the profile of a signal that commands no joint."""
         return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
@@ -136,37 +134,37 @@ class Trajectory:
         name: str = "samples",
         **commanded: ArrayLike | None,
     ) -> Trajectory:
-        """Return a trajectory through samples, with given derivatives as they are.
+        """Return a trajectory through samples; derivatives that are given are used unchanged.
 
-        Those that are not come from splines: degree 7 (C6) for q, degree 5 (C4) for the stiffness and the
-        wrench. Between the samples `at` evaluates these splines; where all derivatives are given and follow
-        from one another, the function through all that is given.
+        Missing derivatives come from splines: degree 7 (C6) for q, degree 5 (C4) for the stiffness and the
+        wrench. Between the samples `at` evaluates these splines, or, if all derivatives are given and
+        consistent with each other, the function through the given values and derivatives.
 
         Args:
-            time: (samples,) in s, strictly increasing, at least 8.
+            time: times, (samples,), s, strictly increasing, at least 8.
             q: position, (samples, joints), rad (m), as are its derivatives per s^k.
-            stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k. Only
-                that of joints that take one counts; others may have NaN, and None will do if there are none.
+            stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k.
+                Joints without commanded stiffness may have NaN; None if no joint has a commanded stiffness.
             dq: first derivative of q.
             ddq: second derivative of q.
             d3q: third derivative of q.
             d4q: fourth derivative of q.
-            wrench: of the environment on the end effector, (samples, 6): force and moment about the
-                origin of the tool frame, N and N m, as are its derivatives per s^k; None if nothing.
+            wrench: wrench of the environment on the end effector, (samples, 6): force and moment about the
+                origin of the tool frame, N and N m, as are its derivatives per s^k; None without one.
             dwrench: first derivative of its components.
             ddwrench: second derivative of its components.
-            wrench_frame: along whose axes the components are, "end_effector" or "base".
-            fit: the splines, "interpolate": through the samples, or "lsq": near noisy ones by least squares,
-                with knots by generalised cross-validation, or "smooth": a smoothing spline for noise of any
-                colour; with both the values are those of the spline too. By default what the noise of each
-                column asks for, see `vsacli.trajectory.fits.fit_samples`.
-            name: used in reports and for the name of the result file.
+            wrench_frame: frame along whose axes the components are, "end_effector" or "base".
+            fit: kind of spline: "interpolate" goes through the samples; "lsq" fits noisy samples by least
+                squares, with knots by generalized cross-validation; "smooth" is a smoothing spline for noise
+                of any color. With the last two the values at samples are also those of the spline. By default
+                it is chosen by the noise of each column, see `vsacli.trajectory.fits.fit_samples`.
+            name: name for reports and for the result file.
             **commanded: derivatives of the stiffness, `dstiffness` and `ddstiffness`; further signals of
-                `COMMANDED` and their derivatives, as above.
+                `COMMANDED` and their derivatives, (samples, joints).
 
         Raises:
-            TypeError: there is no such signal.
-            InputError: `fit` is no such word; or naming each array that does not fit, by index.
+            TypeError: a signal does not exist.
+            InputError: `fit` is unknown, or arrays have wrong shapes or values; names each, with the index.
         """
         from vsacli.trajectory.recorded.arrays import profiles_of_arrays
 
@@ -185,14 +183,14 @@ class Trajectory:
         return self.position.components
 
     def chosen(self, key: str) -> BoolArray:
-        """Return the joints for which a signal is chosen, by its key; (joints,)."""
+        """Return the mask, (joints,), of the joints that the signal with this key commands."""
         if key not in self.commanded:
             return np.zeros(self.joints, dtype=bool)
         chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
         return chosen
 
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
-        """Return the same with a constant as a further signal, NaN for joints that do not take it."""
+        """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
         same = copy(self)
         constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
         same.commanded = {**self.commanded, signal.key: constant}
@@ -201,29 +199,29 @@ class Trajectory:
 
     @property
     def samples(self) -> int:
-        """Number of steps, both ends included."""
+        """Number of samples, both ends included."""
         return self.times.samples
 
     @property
     def start(self) -> float:
-        """Time of the first step, s."""
+        """Time of the first sample, s."""
         return self.times.span[0]
 
     @property
     def duration(self) -> float:
-        """Time from the first step to the last, s."""
+        """Time from the first sample to the last, s."""
         first, last = self.times.span
         return last - first
 
     def block(self, start: int, stop: int) -> Motion:
-        """Return the steps start..stop-1; like a slice, it ends where the steps end."""
+        """Return the motion at samples start..stop-1; like a slice, clipped at the last sample."""
         time = self.times.block(start, stop)
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
-        """Return the smooth functions at any times of the span, (samples,) or ().
+        """Return the motion at any times of the span, (samples,) or (), from smooth functions.
 
-        Given derivatives count where all are given and follow from one another.
+        Derivatives that were given are used only if all are given and consistent with each other.
         """
         times = np.asarray(time, dtype=np.float64)
         elapsed = np.atleast_1d(times) - self.start
@@ -249,29 +247,29 @@ class Trajectory:
 
     @property
     def estimates(self) -> dict[Signal, SampledProfile]:
-        """The signals of which any number at the steps comes from a fit of recorded samples."""
+        """Profiles of the signals of which any value at the samples comes from a fit of recorded samples."""
         found = ((signal, profile.estimate) for signal, profile in self.profiles())
         return {signal: estimate for signal, estimate in found if estimate is not None}
 
     @property
     def uncertain(self) -> tuple[str, ...]:
-        """The variables of a run along it that have a standard deviation.
+        """Result variables that have a standard deviation; empty without fits of recorded samples.
 
-        Those that come from fits of recorded samples, and all that is computed, if there are any.
+        They are the variables that such fits estimate, and all that are computed from them.
         """
         estimated = {name for estimate in self.estimates.values() for name in estimate.estimated}
         given = {name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names}
         return tuple(name for name in UNCERTAIN if estimated and (name in estimated or name not in given))
 
     def stretched(self, factor: float) -> Trajectory:
-        """Return all profiles slower by a factor; steps at a uniform rate keep their rate."""
+        """Return the trajectory slowed down by a factor; a uniform sample rate is kept."""
         return self.changed(lambda _, profile: profile.stretched(factor), self.times.stretched(factor))
 
     def changed(self, change: Callable[[Signal, Profile], Profile], times: Times) -> Trajectory:
-        """Return the trajectory with each profile changed, and with other steps.
+        """Return the trajectory with `change` applied to each profile, and with other sample times.
 
         Raises:
-            InputError: profiles and steps no longer span the same time.
+            InputError: profiles and sample times no longer have the same span.
         """
         wrench = self.wrench
         return Trajectory(
@@ -284,7 +282,7 @@ class Trajectory:
         )
 
     def sampled(self, times: Times) -> Trajectory:
-        """Return the same functions at other steps, from its first time on and not beyond its last."""
+        """Return the same functions at other sample times, from the first time on and not beyond the last."""
         same = copy(self)
         same.times = times
         same.position = Continued(self.position)
@@ -293,30 +291,30 @@ class Trajectory:
         return same
 
     def from_zero(self) -> Trajectory:
-        """Return the same from time zero on, for what needs times between the steps as exact as can be."""
+        """Return the trajectory with time zero at its first sample, where times are rounded least."""
         same = copy(self)
         same.times = self.times.from_zero()
         return same
 
     @property
     def known_between(self) -> bool:
-        """Whether `at` continues the steps; it does not where derivatives are given at the samples."""
+        """Whether `at` agrees with the samples; False if derivatives are given there alone."""
         return all(profile.known_between for _, profile in self.profiles())
 
     @property
     def breakpoints(self) -> FloatArray:
-        """Ascending times between which all its functions are analytic; the first and last are its span."""
+        """Ascending times between which all profiles are analytic; the first and last are the span."""
         times = np.sort(np.concatenate([profile.breakpoints for _, profile in self.profiles()]))
         distinct: FloatArray = times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
         return self.start + distinct
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """`count` times all over the span at which the derivatives can be checked by finite differences.
+        """Return `count` times over the span at which derivatives can be checked by finite differences.
 
         Returns:
-            Times (count,), respaced evenly within the pieces of the functions that evenly spread times fall
-            into, and for each the distance to the nearest end of its piece, within which all is analytic.
-            Pieces too narrow for differences are passed over.
+            Times (count,), and the distance of each to the nearest end of its piece, within which all
+            profiles are analytic. Each piece gets as many times as evenly spread ones fall into it, respaced
+            evenly within the piece. Pieces too narrow for differences are skipped.
         """
         ends = self.breakpoints
         wide = np.diff(ends) > NARROWEST_PIECE * self.duration
@@ -333,10 +331,10 @@ class Trajectory:
 def _by_signal(
     of_joints: Mapping[str, ArrayLike | None],
 ) -> dict[Signal, tuple[ArrayLike | None, ...]]:
-    """Commanded signals with their derivatives, from arrays by name.
+    """Return commanded signals with their derivatives, from arrays by name.
 
     Raises:
-        TypeError: there is no such signal.
+        TypeError: a signal does not exist.
     """
     unknown = of_joints.keys() - set(commanded_names())
     if unknown:

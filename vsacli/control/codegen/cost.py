@@ -1,4 +1,4 @@
-"""Worst-case cost of a generated function: operations and constants, counted in its program."""
+"""Worst-case cost of a generated function: operations and constant tables, counted in its program."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Cost:
     """Operations of one call if every branch is entered and every loop runs to its bound.
 
     Attributes:
-        operations: additions, products, comparisons and the like; a function of math.h is one.
-        functions: how many of them are functions of math.h, `fabs` and `sqrt` among them.
-        loops: how many loops there are, those inside others counted once.
+        operations: number of additions, products, comparisons etc.; a call of math.h counts as one.
+        functions: number of calls of math.h functions, including `fabs` and `sqrt`.
+        loops: number of loops; one inside another counts once.
     """
 
     operations: int
@@ -41,7 +41,7 @@ def worst_cost(program: Program) -> Cost:
 
 
 def table_bytes(programs: Iterable[Program], precision: str) -> int:
-    """Memory of all constant tables, those of which calls are given rows among them."""
+    """Return the bytes of all constant tables, including those whose rows are passed to calls."""
     programs = list(programs)
     tables = Tables(programs, scalar_dialect(precision).array_type)
     of_calls = sum(_bytes_of_calls(program, precision) for program in programs)
@@ -49,7 +49,7 @@ def table_bytes(programs: Iterable[Program], precision: str) -> int:
 
 
 def _bytes_of_calls(program: Program, precision: str) -> int:
-    """Return the bytes of constants passed to calls, and of the places of their inputs and outputs."""
+    """Return the bytes of constants passed to calls, and of the indices of their inputs and outputs."""
     calls = [symbol.operands for symbol in program.operations if symbol.operation == "call"]
     places = sum(len(call.numbers) for call, *_ in calls)
     places += sum(isinstance(operand, Symbol) for _, *given in calls for operand in given)

@@ -1,4 +1,4 @@
-"""The generated controller: feedback linearization from the measured state."""
+"""The generated controller: feedback linearization (32)-(35), (60), (69)-(74) from the measured state."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 Arrays = Mapping[str, Any]
-"""Arrays of numbers or of symbols by name."""
+"""Arrays of numbers or symbols, by name."""
 
 
 class _Gains(NamedTuple):
-    """Gains that are known only when the controller runs; as `vsacli.control.gains.Gains`."""
+    """Gains that are known only when the controller runs; fields as of `vsacli.control.gains.Gains`."""
 
     position: Any
     stiffness: Any
@@ -34,10 +34,14 @@ class _Gains(NamedTuple):
 
 
 def feedback_linearization_function(robot: Robot, frame: str | None = None) -> Function:
-    """(32)-(35), (60), (69)-(74), under a wrench along the axes of a frame of `WRENCH_FRAMES` if given one.
+    """Return the function of feedback linearization, (32)-(35), (60), (69)-(74).
+
+    Args:
+        robot: robot.
+        frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without a wrench.
 
     Raises:
-        InputError: the robot mixes rigid joints with others, for which there is no such law.
+        InputError: the robot mixes rigid joints with others, or has a damped transmission; no law exists.
     """
     law = _Law(robot, frame)
     return Function(
@@ -57,10 +61,10 @@ def feedback_linearization_function(robot: Robot, frame: str | None = None) -> F
 
 
 class _Law:
-    """The control law on rows of all its arguments.
+    """The control law as a function of rows of all its arguments.
 
     Attributes:
-        arguments: of the function.
+        arguments: arguments of the generated function.
     """
 
     def __init__(self, robot: Robot, frame: str | None) -> None:
@@ -98,7 +102,7 @@ class _Law:
         )
 
     def __call__(self, rows: Rows) -> list[Any]:
-        """Rows of the torques of the motors, then of the flags."""
+        """Return the rows of the motor torques, then those of the flags."""
         state, reference, gains, integral, *wrench = self._unpacked(rows)
         drivetrain = self._plant.drivetrain
         law: Any = control_law(self._plant, cast("Gains", _Gains(**gains)))
@@ -119,20 +123,19 @@ class _Law:
         return [*tau_motor.ravel(), *flags]
 
     def _of_joints(self, of_motors: Any) -> Any:
-        """(joints, 2) from (motors,), NaN where there is no motor."""
+        """Return (joints, 2) from (motors,), NaN where there is no motor."""
         present = self._plant.drivetrain.present
         values = np.full_like(of_motors, np.nan, shape=present.shape)
         values[present] = of_motors
         return values
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
-        """Return the arrays of each argument by name."""
         sizes = RowLayout({name: (structure.layout.size,) for name, structure in self.arguments})
         entries = sizes.arrays(np.concatenate(rows))
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 
     def _flags(self, index: int, values: Arrays, singular: Any) -> Any:
-        """Return the flags of a joint: no torque, or a limit broken by state or torque."""
+        """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
         joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
         there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
         flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))

@@ -14,10 +14,10 @@ from vsacli.compute.tracing import Kind, Program, trace_by_size
 Rows = Sequence[Any]
 
 MOST_WRITTEN_OUT = 20_000
-"""Operations of the longest functions that call no others: gcc takes 8 s for it."""
+"""Largest number of operations of a function without calls: gcc compiles it in 8 s."""
 
 MOST_OF_CALLS = 50_000
-"""Calls, their results, and operations between them, of the other functions: gcc takes a minute at most."""
+"""Largest number of calls, their results and operations between them: gcc takes a minute at most."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Array:
     """An array of a structure.
 
     Attributes:
-        name: as in C.
-        shape: of the array.
-        meaning: a few words, with its unit.
-        bits: whether the entries are fields of bits, else numbers.
+        name: name in C.
+        shape: shape of the array.
+        meaning: short description with the unit.
+        bits: whether entries are bit fields; numbers otherwise.
     """
 
     name: str
@@ -48,10 +48,10 @@ class Structure:
     """A struct of arrays.
 
     Attributes:
-        name: as in C, without the prefix of the robot.
-        meaning: a few words.
-        arrays: its members.
-        nominal: values of its entries, of which a constant is made; empty if there are none.
+        name: name in C, without the robot's prefix.
+        meaning: short description.
+        arrays: members.
+        nominal: nominal values of the entries, written as a constant; empty for none.
     """
 
     name: str
@@ -66,21 +66,21 @@ class Structure:
 
     @property
     def layout(self) -> RowLayout:
-        """Places of the entries of each array among all entries."""
+        """Layout of the entries of each array among all entries."""
         return RowLayout({array.name: array.shape for array in self.arrays})
 
 
 Arguments = tuple[tuple[str, Structure], ...]
-"""Structures that a function reads, by the names of the arguments."""
+"""Names and structures of the arguments of a function."""
 
 
 def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
-    """Rows of all entries of the arguments by the names of their arrays, which differ."""
+    """Return the rows of all arguments by array name; names must differ between arguments."""
     return RowLayout({array.name: array.shape for _, each in arguments for array in each.arrays}).unpack(rows)
 
 
 def structures(functions: Sequence[Function]) -> list[Structure]:
-    """Return each structure that functions use, once."""
+    """Return the structures that functions use, without duplicates."""
     used = (each for function in functions for each in (*dict(function.arguments).values(), function.result))
     return list(dict.fromkeys(used))
 
@@ -90,12 +90,12 @@ class Function:
     """A function to generate.
 
     Attributes:
-        name: as in C, without the prefix of the robot.
-        meaning: for the header.
-        arguments: structures that it reads, by the names of the arguments.
-        result: structure that it fills.
-        compute: from rows of samples of all entries of the arguments to rows of the entries of the result,
-            whose bits, of all joints together, the function returns.
+        name: name in C, without the robot's prefix.
+        meaning: description for the header.
+        arguments: names and structures of the arguments.
+        result: structure that the function fills.
+        compute: function from rows of all entries of the arguments to rows of the entries of the result. The
+            C function returns the bits of the result, combined over all joints.
     """
 
     name: str
@@ -106,10 +106,10 @@ class Function:
 
     @cached_property
     def program(self) -> Program:
-        """Return the program of the function for one sample.
+        """Program of the function for one sample.
 
         Raises:
-            NotImplementedError: it has no evaluation in a bounded number of operations, or one of too many.
+            NotImplementedError: no program with a bounded number of operations exists, or it is too long.
         """
         kinds = [Kind.REAL] * sum(structure.layout.size for _, structure in self.arguments)
         try:

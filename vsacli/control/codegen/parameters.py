@@ -1,4 +1,4 @@
-"""Numbers of the robot that generated functions take as an argument, where others have them in their code."""
+"""Robot parameters as an argument of generated functions, instead of constants in their code."""
 
 from __future__ import annotations
 
@@ -13,31 +13,30 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, with_numbers
 
 Maker = Callable[[Robot, str | None], Function]
-"""Makes a function of a robot, and of the frame of a wrench."""
+"""Factory of a generated function, called with a robot and the frame of a wrench (None without one)."""
 
 PARAMETERS = "parameters"
 
 
 def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
-    """Return the argument: a member for each number, by its path."""
+    """Return the structure of the argument, with a member for each parameter, named by its path."""
     meaning = "Numbers of the robot, by their paths in its file; the functions do not check them."
     arrays = (Array("_".join(each.by_index), (), _meaning(each)) for each in chosen)
     return Structure(PARAMETERS, meaning, tuple(arrays), tuple(each.value for each in chosen))
 
 
 def _meaning(parameter: Parameter) -> str:
-    """Path and unit, and the condition on the number in robot files."""
     unit = parameter.unit if parameter.unit != "1" else "no unit"
     return ", ".join(filter(None, (str(parameter), unit, parameter.requirement)))
 
 
 def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> Function:
-    """Return a function that takes some numbers of the robot, unless it depends on none of them.
+    """Return the function with chosen parameters as an argument, or without if it depends on none of them.
 
-    What makes it is called again where these are symbols, so that there is no second text of anything.
+    `make` is called again with symbols for the parameters, so that one implementation serves both cases.
 
     Raises:
-        NotImplementedError: a condition depends on one of them.
+        NotImplementedError: a condition in the code depends on one of the parameters.
     """
     plain = make(robot, frame)
     if not chosen:
@@ -54,17 +53,17 @@ def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequen
 
 
 def _reads(program: Program, last: int) -> bool:
-    """Return whether a program reads one of its last inputs."""
+    """Return whether a program reads any of its last inputs."""
     operands = {operand for each in program.operations for operand in each.operands} | {*program.outputs}
     return any(isinstance(each, Symbol) and each in operands for each in program.inputs[-last:])
 
 
 def check_parameters(robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> None:
-    """Refuse numbers by whose values code is chosen, or tables are made.
+    """Raise an error for parameters whose values select code or enter precomputed tables.
 
     Raises:
-        InputError: naming them.
-        NotImplementedError: there is no code of the robot, whatever its parameters.
+        InputError: such parameters are chosen; names each.
+        NotImplementedError: no code can be generated for the robot, even without parameters.
     """
     _ = inverse_dynamics_function(robot, frame).program
     refused = [each for each in chosen if not _may_vary(robot, frame, each)]

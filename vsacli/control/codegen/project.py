@@ -1,4 +1,4 @@
-"""Everything that `vsacli codegen` writes: header, source, self-test, build files, README."""
+"""The files that `vsacli codegen` writes: header, source, self-test, Python binding, build files, README."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Project(NamedTuple):
 
     Attributes:
         files: texts by file name.
-        omitted: the functions that there are not, with the reason; a sentence each.
-        warnings: doubts about the robot, a sentence each; the files repeat them.
+        omitted: sentences that name the functions that could not be generated, with the reason.
+        warnings: warnings about the robot, a sentence each; the files repeat them.
     """
 
     files: dict[str, str]
@@ -60,21 +60,20 @@ def generate(
     *,
     loops: bool = True,
 ) -> Project:
-    """C99 for a robot: link torques, inverse dynamics, feedback linearization.
+    """Generate C99 code for a robot: link torques, inverse dynamics, feedback linearization.
 
     Args:
-        robot: the robot.
+        robot: robot.
         precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
-        wrench: frame, one of `vsacli.base.wrench.WRENCH_FRAMES`, along whose axes the functions take a wrench
-            at the end effector; None if they take none.
-        patterns: numbers of the robot whose paths fit one of these, as of `vsacli.robot.parameters`, are
-            arguments of the functions.
-        loops: whether there may be some; without them a call takes the same operations whatever goes in.
+        wrench: frame of a wrench at the end effector that the functions take as an argument, one of
+            `vsacli.base.wrench.WRENCH_FRAMES`; None for no such argument.
+        patterns: patterns of paths as in `vsacli.robot.parameters`; matching parameters become arguments.
+        loops: whether loops are allowed; without them every call executes the same operations.
 
     Raises:
-        InputError: something of the robot has no evaluation in a bounded number of operations, or too many;
-            or none without loops; single precision misses the values of the self-test; a pattern fits no
-            number, or one that cannot be an argument.
+        InputError: part of the robot has no evaluation in a bounded number of operations, or too many, or
+            none without loops; single precision fails the self-test; a pattern matches no parameter, or one
+            that cannot be an argument.
     """
     prefix = prefix_of(robot)
     joints = "1 joint" if len(robot.joints) == 1 else f"{len(robot.joints)} joints"
@@ -107,19 +106,19 @@ def generate(
 def _functions(
     robot: Robot, wrench: str | None, chosen: Sequence[Parameter]
 ) -> tuple[list[Function], list[str]]:
-    """Return the possible functions, and the reasons for missing ones.
+    """Return the functions that can be generated, and the reasons for missing ones.
 
-    The last one grows with the third power of the number of joints, so it is looked at if the others were not
-    too long.
+    Feedback linearization grows with the third power of the number of joints, so it is tried last, after the
+    others have turned out not to be too long.
 
     Raises:
-        InputError: some of the chosen numbers cannot be arguments of these.
-        NotImplementedError: not even the first two.
+        InputError: some chosen parameters cannot be arguments.
+        NotImplementedError: link torques or inverse dynamics cannot be generated.
     """
 
     def made(make: Maker) -> Function:
         function = with_parameters(make, robot, wrench, chosen)
-        _ = function.program  # raises what keeps it from being generated
+        _ = function.program  # raises NotImplementedError if it cannot be generated
         return function
 
     try:
@@ -140,10 +139,10 @@ def _functions(
 
 
 def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
-    """Refuse joints that take loops.
+    """Raise an error if the code contains loops.
 
     Raises:
-        InputError: naming them.
+        InputError: joints need loops; names them.
     """
     if not any(worst_cost(function.program).loops for function in functions):
         return
@@ -158,16 +157,16 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
 
 
 def prefix_of(robot: Robot) -> str:
-    """Return the prefix of names in C: the robot's name in lower case, in letters that C allows."""
+    """Return the prefix of names in C: the robot's name in lower case, with other characters replaced."""
     name = re.sub(r"\W+", "_", robot.name.lower(), flags=re.ASCII).strip("_")
     return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
 
 
 def write(project: Project, folder: str | Path, outputs: Outputs) -> None:
-    """Write the files into a folder, which is made if need be.
+    """Write the files into a folder, which is created if necessary.
 
     Raises:
-        StorageError: as `Outputs.folder` and `Outputs.file`.
+        StorageError: see `Outputs.folder` and `Outputs.file`.
     """
     outputs.folder(folder)
     for name, text in project.files.items():

@@ -1,4 +1,4 @@
-"""The functions that are generated for a robot: link torques and inverse dynamics."""
+"""Generated functions without feedback: link torques (36)-(60) and inverse dynamics (36)-(74)."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ DRIVE_NAMES = (
     "stiffness_lower",
     "stiffness_upper",
 )
-"""Variables that the generated inverse dynamics gives, beside margins and flags."""
+"""Variables that the generated inverse dynamics returns, in addition to margins and flags."""
 
 
 def motion_structure(robot: Robot) -> Structure:
-    """Position and its derivatives; damping between the links, if there is any."""
+    """Return the structure of position and derivatives, with damping between the links if there is any."""
     names = tuple(LinkTorques(robot).arguments.shapes)
     return Structure("motion", "Motion of the joints.", _arrays(robot, names))
 
 
 def command_structure(robot: Robot) -> Structure:
-    """Motion and stiffness."""
+    """Return the structure of commanded motion and stiffness."""
     meaning = "Commanded motion and stiffness; only antagonistic and serial joints read a stiffness."
     names = (name for signal in (POSITION, *robot.signals) for name in signal.names)
     return Structure("command", meaning, _arrays(robot, tuple(names)))
@@ -55,12 +55,12 @@ def wrench_structure(frame: str) -> Structure:
 
 
 def wrench_argument(frame: str | None) -> tuple[tuple[str, Structure], ...]:
-    """Return the wrench as an argument, if there is one."""
+    """Return the wrench as an argument; empty if `frame` is None."""
     return () if frame is None else (("wrench", wrench_structure(frame)),)
 
 
 def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
-    """(36)-(60), under a wrench along the axes of a frame of `WRENCH_FRAMES` if one is given."""
+    """Return the function of link torques (36)-(60), with a wrench if its frame is given."""
     kernel = LinkTorques(robot, frame)
 
     def compute(rows: Rows) -> Rows:
@@ -81,11 +81,13 @@ def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
 
 
 def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Function:
-    """Return inverse dynamics (36)-(74); internal motions are inputs and, with rates, outputs.
+    """Return the function of inverse dynamics (36)-(74).
+
+    Deflections inside damped transmissions are inputs, and outputs together with their rates.
 
     Args:
-        robot: the robot.
-        frame: along whose axes a wrench is given, one of `WRENCH_FRAMES`; None if there is none.
+        robot: robot.
+        frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without one.
     """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
     kernel = InverseDynamics(robot, frame, internal=damped, driven=True)
@@ -133,7 +135,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
 
 
 def internal_structure(robot: Robot) -> Structure:
-    """Return the structure of motions inside damped transmissions: a state kept by the caller."""
+    """Return the structure of deflections inside damped transmissions, a state that the caller integrates."""
     meaning = (
         "State inside transmissions with a damper, whose damping must be positive; other joints do not "
         "count. Start it where the springs carry the joint alone."
@@ -147,7 +149,7 @@ def _internal_array(robot: Robot, name: str, meaning: str) -> Array:
 
 
 def _inside(robot: Robot, computed: Mapping[str, Sequence[Scalar]], name: str) -> Iterator[Scalar]:
-    """Deflections, or their rates; of a motor that sets the springs its own position."""
+    """Yield deflections or their rates; for a motor that sets the springs, its own position or velocity."""
     of_motor = {"phi": "theta", "dphi": "dtheta"}[name]
     for index, joint in enumerate(robot.joints):
         for side, there in enumerate(joint.actuator.has(VARIABLES["phi"])):

@@ -1,4 +1,4 @@
-"""Traced programs as C99 for one sample at a time."""
+"""C99 code of traced programs, for one sample at a time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from vsacli.control.codegen.interface import Function, Structure, structures
 PRECISIONS = REAL_TYPES
 
 WIDTH = 110
-"""Characters of a line, at most, but for comments behind code."""
+"""Largest number of characters in a line, except for comments after code."""
 
 HELPERS = {
     "maximum": "{type} maximum({type} a, {type} b) {{ return a >= b || a != a ? a : b; }}",
@@ -47,16 +47,16 @@ static inline int search(const {type} *nodes, int count, {type} x)
     return low;
 }}""",
 }
-"""Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
+"""Functions beyond math.h; maximum and minimum return NaN if either argument is NaN."""
 
 
 def _holds_float(value: float) -> bool:
-    """Return whether single precision has all digits of a number that is not below its range."""
+    """Return whether single precision represents a number exactly, and does not underflow."""
     return math.isnan(value) or (single(value) == value and float(np.float32(value)) == value)
 
 
 def _holds_integer(largest: int) -> Callable[[float], bool]:
-    """Return whether a whole number of this many values has all digits; minus zero is none."""
+    """Return the test whether a value is an integer of at most this magnitude; minus zero fails it."""
     return lambda value: abs(value) <= largest and value == int(value) and str(value) != "-0.0"
 
 
@@ -65,10 +65,10 @@ _SMALLER_TYPES = {
     "short": _holds_integer(32767),
     "float": _holds_float,
 }
-"""Types of constants, and which values they hold."""
+"""Types smaller than the precision, each with the test whether it represents a value exactly."""
 
 BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
-"""Bytes of an entry of each type."""
+"""Size of each type in bytes."""
 
 
 def scalar_dialect(precision: str) -> Dialect:
@@ -81,7 +81,7 @@ def scalar_dialect(precision: str) -> Dialect:
     suffix = "f" if precision == "float" else ""
 
     def array_type(values: tuple[float, ...], searched: bool) -> str:
-        """Return the smallest type that holds all digits, or as many as the precision has."""
+        """Return the smallest type that represents all values exactly, else the precision's."""
         smaller = () if searched else _SMALLER_TYPES.items()
         return next((name for name, holds in smaller if all(map(holds, values))), precision)
 
@@ -120,7 +120,7 @@ def scalar_dialect(precision: str) -> Dialect:
 
 
 def _double_literal(number: float) -> str:
-    """Return a constant; NAN and INFINITY of math.h are floats."""
+    """Return a constant as a double; NAN and INFINITY of math.h are floats."""
     return digits(number).replace("INFINITY", "HUGE_VAL").replace("NAN", "(double)NAN")
 
 
@@ -132,7 +132,7 @@ def _single_literal(number: float) -> str:
 
 
 def definitions(prefix: str, functions: Sequence[Function], precision: str) -> Iterator[str]:
-    """Yield all that the source file defines: constants, helpers, subroutines, then the functions."""
+    """Yield the definitions of the source file: constants, tables, helpers, subroutines, functions."""
     dialect = scalar_dialect(precision)
     programs = [function.program for function in functions]
     tables = Tables(programs, dialect.array_type)
@@ -152,7 +152,7 @@ def definitions(prefix: str, functions: Sequence[Function], precision: str) -> I
 
 
 def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
-    """Return the nominal values of a structure."""
+    """Return the definition of the constant with the nominal values of a structure."""
     values = zip(structure.entries, structure.nominal, strict=True)
     members = (f"    .{entry} = {dialect.real(value)},\n" for entry, value in values)
     name = f"{prefix}_{structure.name} {prefix}_nominal_{structure.name}"
@@ -160,13 +160,13 @@ def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
 
 
 def helper_text(name: str, precision: str) -> str:
-    """Return a function of `HELPERS`."""
+    """Return the definition of a function of `HELPERS`."""
     text = HELPERS[name].format(type=precision)
     return text if text.startswith("/*") else f"static inline {text}"
 
 
 def signature(prefix: str, function: Function) -> str:
-    """Return the head of a function; each argument in a line of its own if they do not fit into one."""
+    """Return the declarator of a function, with one argument per line if a single line is too long."""
     arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
     result = f"{prefix}_{function.result.name} *{function.result.name}"
     lines = [f"unsigned {prefix}_{function.name}({', '.join([*arguments, result])})"]
@@ -176,7 +176,7 @@ def signature(prefix: str, function: Function) -> str:
 
 
 def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
-    """Lines of C with the blanks in front that their braces ask for."""
+    """Yield lines of C, indented by their braces."""
     for line in lines:
         depth -= line == "}"
         yield "    " * depth + line

@@ -1,4 +1,4 @@
-"""The self-test of generated code: reference values, and refusal of a precision in which it would fail."""
+"""Reference values for the self-test of generated code, and the check whether single precision passes it."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ from vsacli.robot.parameters import Parameter
 from vsacli.trajectory.motion import Motion
 
 CASES = 6
-"""Samples; the last one asks for half of the smallest stiffness that can be reached."""
+"""Number of samples; the last one requires half of the minimum attainable stiffness, so it is infeasible."""
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
-"""Half-widths of the drawn values, SI units; 1 for further signals."""
+"""Half-widths of the ranges of random values, SI units; 1 for other signals."""
 
 MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
-"""Differences of the measured state from the command."""
+"""Largest deviations of the measured state from the command, SI units."""
 
 POLE = -20.0
 
 VARIED, UNLIKE_ZERO = 1.05, 0.01
-"""Factor of numbers that are parameters, and what stands for zero: small, so that stiffness is reachable."""
+"""Factor for varied parameters, and the value in place of zero: small, so that stiffness stays attainable."""
 
 Arrays = dict[str, FloatArray]
-"""Arrays (cases, ...) by name."""
+"""Arrays, (cases, ...), by name."""
 
 
 class Comparison(NamedTuple):
-    """The comparison of an array in the self-test.
+    """The rule by which the self-test compares an array.
 
     Attributes:
-        scale: of relative differences; 0 if there may be none, as of flags.
-        bound: values beyond count as this one.
+        scale: value by which differences are divided; 0 if values must be equal, as flags must.
+        bound: value to which larger ones are clipped.
     """
 
     scale: float
@@ -56,7 +56,7 @@ class Reference:
     """Inputs and results of the generated functions of a robot."""
 
     def __init__(self, robot: Robot, chosen: Sequence[Parameter] = ()) -> None:
-        """Take functions with the chosen parameters as an argument, if there are any."""
+        """Draw the inputs; `chosen` are the parameters that the functions have as an argument."""
         self._robot = robot
         self._rng = np.random.default_rng(1)
         self._results: dict[str, Arrays] = {}
@@ -72,14 +72,14 @@ class Reference:
         }
 
     def inputs(self, function: Function) -> list[Arrays]:
-        """Return the arguments of a function, each by the names of its arrays."""
+        """Return the arguments of a function, each as arrays by name."""
         return [
             _gains(structure.arrays[0].shape) if structure.name == "gains" else self._inputs[structure.name]
             for _, structure in function.arguments
         ]
 
     def results(self, function: Function) -> Arrays:
-        """Return the results of a function for these inputs, by the names of the arrays of its result."""
+        """Return the results of a function for these inputs, as arrays by name."""
         if function.name not in self._results:
             with np.errstate(all="ignore"):  # one sample at a time, as on the controller
                 cases = [function.compute(list(entries[:, None])) for entries in self._entries(function)]
@@ -88,12 +88,12 @@ class Reference:
         return self._results[function.name]
 
     def single_results(self, function: Function) -> Arrays:
-        """Return the results that code in single precision has."""
+        """Return the results of a function computed in single precision."""
         rows = in_single_precision(function.program, self._entries(function).T)
         return _result_arrays(function, np.array(rows, dtype=np.float64))
 
     def comparison(self, function: Function, name: str) -> Comparison:
-        """Return the rule by which the self-test compares an array of the results of a function."""
+        """Return the rule by which the self-test compares an array of a function's results."""
         values = self.results(function)[name]
         bound = BOUND * self._largest_stiffness if name == BOUNDED else np.inf
         scale = float(np.abs(np.minimum(values, bound)[np.isfinite(values)]).max(initial=0.0))
@@ -111,7 +111,6 @@ class Reference:
 
     @property
     def _largest_stiffness(self) -> float:
-        """Largest stiffness demanded, of joints of either kind."""
         return float(np.nanmax(self._inputs["command"]["stiffness"]))
 
     def _drawn(self, scale: float) -> FloatArray:
@@ -136,7 +135,7 @@ class Reference:
         return Motion.of(np.arange(float(CASES)), {**arrays, "stiffness": stiffness})
 
     def _internal(self, command: Arrays) -> Arrays:
-        """Away from where the springs carry the joints alone."""
+        """Return internal deflections away from those at which the springs alone carry the joints."""
         deflections = np.zeros((CASES, len(self._robot.joints), 2))
         motion = self._motion(command, command["stiffness"])
         for index, inside in internal_equilibrium(self._robot, motion).items():
@@ -158,7 +157,7 @@ class Reference:
 
 
 def _two_sets(chosen: Sequence[Parameter]) -> Arrays:
-    """Nominal values, and in every other case others that are allowed as well."""
+    """Return nominal parameter values, and other valid ones in every second case."""
     nominal = np.array([each.value for each in chosen])
     other = np.where(nominal == 0, UNLIKE_ZERO, VARIED * nominal)
     of_cases = np.where(np.arange(CASES) % 2, other[:, None], nominal[:, None])
@@ -166,7 +165,7 @@ def _two_sets(chosen: Sequence[Parameter]) -> Arrays:
 
 
 def _gains(shape: Sequence[int]) -> Arrays:
-    """Return all poles at one place, with integral action; the same for each case."""
+    """Return gains that place all poles at `POLE`, with integral action; the same for each case."""
     joints, order = shape
     position, stiffness = (np.poly([POLE] * (count + 1))[:0:-1] for count in (order, STIFFNESS_ORDER))
     return {
@@ -184,27 +183,27 @@ def _result_arrays(function: Function, rows: FloatArray) -> Arrays:
 
 TOLERANCE = {"double": 1e-9, "float": 2e-3}
 """Largest difference from NumPy, relative to the largest value of an array; rounding grows with the condition
-of the mass matrix, and towards singularities."""
+number of the mass matrix, and near singularities."""
 
 BOUNDED, BOUND = "stiffness_upper", 100.0
-"""A result that is compared up to this many times the largest stiffness demanded: what lies beyond decides
-nothing, and where a linkage is stretched it is as inaccurate as its geometry makes it."""
+"""Result that is compared only up to this multiple of the largest commanded stiffness: values beyond have no
+effect on feasibility, and are inaccurate where a linkage is nearly stretched."""
 
 
 SHARE = 0.5
-"""Part of the self-test's tolerance beyond which single precision is refused: the library of a controller may
-round functions otherwise than this machine, and bundled robots take a 400th of the tolerance."""
+"""Share of the self-test's tolerance beyond which single precision is refused: the math library of a
+controller may round differently from this machine's. Bundled robots use a 400th of the tolerance."""
 
 
 class _Difference(NamedTuple):
     """A result that single precision changes.
 
     Attributes:
-        size: difference relative to the largest value of the array; infinite if flags differ or a value is
+        size: difference relative to the largest value of the array; infinite if flags differ or if a value is
             missing in one precision.
         function: name of the function.
-        array: the array.
-        place: indices of the result in it; the joint comes first.
+        array: array with the result.
+        place: indices of the result in the array; the joint comes first.
         single: value in single precision.
         double: value in double precision.
     """
@@ -218,10 +217,10 @@ class _Difference(NamedTuple):
 
 
 def check_single_precision(robot: Robot, functions: Sequence[Function], reference: Reference) -> None:
-    """Refuse a robot whose functions in single precision miss the values of the self-test.
+    """Raise an error if a robot's functions in single precision would fail the self-test.
 
     Raises:
-        InputError: naming the joint and the result that are furthest off.
+        InputError: differences are too large; names the joint and result with the largest one.
     """
     worst = max(_differences(functions, reference), key=lambda each: each.size, default=None)
     allowed = SHARE * TOLERANCE["float"]
@@ -234,7 +233,6 @@ def check_single_precision(robot: Robot, functions: Sequence[Function], referenc
 
 
 def _differences(functions: Sequence[Function], reference: Reference) -> Iterator[_Difference]:
-    """Yield the largest difference in each array."""
     for function in functions:
         single, double = reference.single_results(function), reference.results(function)
         for array in function.result.arrays:
@@ -248,7 +246,7 @@ def _differences(functions: Sequence[Function], reference: Reference) -> Iterato
 
 
 def _sizes(single: FloatArray, double: FloatArray, comparison: Comparison) -> FloatArray:
-    """Differences as the self-test sees them, relative to the scale."""
+    """Return differences relative to the scale, computed as in the self-test."""
     found, expected = (np.minimum(each, comparison.bound) for each in (single, double))
     same = (found == expected) | (np.isnan(found) & np.isnan(expected))
     with np.errstate(all="ignore"):

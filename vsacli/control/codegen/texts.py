@@ -1,8 +1,8 @@
-"""Texts of the generated files: templates, and their values.
+"""Texts of the generated files: templates, and the values inserted into them.
 
-A template in `templates/` is a file as it is written for every robot, with holes such as `@prefix`. Lists
-that depend on the robot, such as members of structures and reference values, are made here; the bodies of
-functions come from `vsacli.control.codegen.scalar`.
+A template in `templates/` has the text that is common to all robots, with placeholders such as `@prefix`.
+Lists that depend on the robot, such as members of structures and reference values, are written here; the
+bodies of functions come from `vsacli.control.codegen.scalar`.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ from vsacli.control.codegen.self_test import CASES, TOLERANCE, Arrays, Reference
 from vsacli.robot.model import Robot
 
 DIGEST = "0xd19e5700u"
-"""Stands in the texts for the digest of all of them until that is known; C that is read before is valid."""
+"""Placeholder for the digest of all texts until it is known; a valid C constant, so that texts compile."""
 
 _STEPS = "As a rule a loop ends after a handful of steps; near double solutions it takes more.\n"
 
 
 class _Template(string.Template):
-    """A text whose holes begin with @: $ has a meaning in Make and CMake, @ in none of the files."""
+    """A template whose placeholders begin with @, since $ has a meaning in Make and CMake."""
 
     delimiter = "@"
 
 
 def filled(template: str, prefix: str, **values: object) -> str:
-    """Return the text of `templates/TEMPLATE.in` with these values in its holes."""
+    """Return the text of `templates/TEMPLATE.in` with values in place of its placeholders."""
     text = files("vsacli.control.codegen.templates").joinpath(f"{template}.in").read_text(encoding="utf-8")
     return _Template(text).substitute(values, prefix=prefix, upper=prefix.upper(), digest=DIGEST)
 
 
 def comment(text: str) -> str:
-    """Return a comment in C, in as many lines as it takes, that no text ends early."""
+    """Return a wrapped C comment; the text cannot end it early."""
     lines = textwrap.wrap(for_comment(text), WIDTH - 6)
     return "/* " + "\n   ".join(lines) + " */"
 
 
 def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precision: str, about: str) -> str:
-    """Return the header file: structures with units, bits, functions. Arguments as of `source_text`."""
+    """Return the header file: structures with units, flags, functions. For arguments see `source_text`."""
     upper = prefix.upper()
     robot_file = "".join(
         "/* Of the file that the robot was read from; results of the same file have it, too. */\n"
@@ -86,7 +86,7 @@ def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
 
 
 def _structure(prefix: str, structure: Structure, precision: str) -> str:
-    """Return the type of a structure in C, and its constant if it has nominal values."""
+    """Return the C type of a structure, and the declaration of its constant if it has nominal values."""
     name = f"{prefix}_{structure.name}"
     lines = [comment(structure.meaning), "typedef struct {"]
     for array in structure.arrays:
@@ -104,10 +104,10 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, abou
     """Return the source file.
 
     Args:
-        prefix: of the names of the robot.
-        functions: defined in it.
+        prefix: prefix of the robot's names in C.
+        functions: functions to define.
         precision: one of `vsacli.control.codegen.scalar.PRECISIONS`.
-        about: text of the comment at its beginning.
+        about: text of the comment at the beginning.
     """
     defined = "\n\n".join(definitions(prefix, functions, precision))
     return filled("robot.c", prefix, head=comment(about), definitions=defined)
@@ -116,7 +116,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, abou
 def self_test_text(
     prefix: str, functions: Sequence[Function], reference: Reference, precision: str, about: str
 ) -> str:
-    """Return the test program; arguments as of `source_text`."""
+    """Return the test program; for arguments see `source_text`."""
     tests: list[str] = []
     for function in functions:
         constants = (*function.arguments, ("expected", function.result))
@@ -138,7 +138,6 @@ def self_test_text(
 
 
 def _vector(declared: str, structure: Structure, values: Arrays) -> str:
-    """Return a constant with the values of a structure in all cases."""
     cases = (
         ", ".join(
             f".{array.name} = {_initializer(values[array.name][case], array.bits)}"
@@ -156,7 +155,6 @@ def _initializer(values: FloatArray, bits: bool) -> str:
 
 
 def _test(prefix: str, function: Function, reference: Reference) -> str:
-    """Return the comparison of all entries of a result in C."""
     own, result = function.name, f"{prefix}_{function.result.name}"
     given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
     comparisons = "\n".join(_comparisons(function, reference))
@@ -185,7 +183,7 @@ def _comparisons(function: Function, reference: Reference) -> Iterator[str]:
 
 
 def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
-    """Return the Python module that calls the functions; arguments as of `source_text`."""
+    """Return the Python module that calls the functions; for arguments see `source_text`."""
     used = structures(functions)
     loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
     called = [_binding(prefix, each) for each in functions]
@@ -210,7 +208,7 @@ def _type(structure: Structure) -> str:
 
 
 def _data_type(structure: Structure, precision: str) -> str:
-    """Return the type of a structure in Python, laid out as C has it."""
+    """Return the NumPy data type of a structure, with the memory layout of C."""
     number = {"double": "np.float64", "float": "np.float32"}[precision]
     members = "".join(
         f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
@@ -220,7 +218,7 @@ def _data_type(structure: Structure, precision: str) -> str:
 
 
 def _binding(prefix: str, function: Function) -> str:
-    """Return a function in Python with the arguments of that in C."""
+    """Return the Python function that calls the C function with the same arguments."""
     meaning = f'"""{function.meaning}"""'
     given = "".join(f", ({name}, {_type(structure)})" for name, structure in function.arguments)
     return f"""def {function.name}({_names(function)}):
@@ -229,7 +227,7 @@ def _binding(prefix: str, function: Function) -> str:
 
 
 def _constant(prefix: str, structure: Structure) -> str:
-    """Return the nominal values of a structure, in Python."""
+    """Return the Python code of the nominal values of a structure."""
     kind, name = _type(structure), f"{prefix}_nominal_{structure.name}"
     return f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
 NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
@@ -238,7 +236,7 @@ NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
 def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
-    """Return the README: how to use the code, and the cost of a call."""
+    """Return the README, with the usage of the code and the cost of a call."""
     loop = next(function for function in functions if function.name == "inverse_dynamics")
     programs = [function.program for function in functions]
     costs = [worst_cost(program) for program in programs]

@@ -1,4 +1,4 @@
-"""Simulation of the full model under a controller: feedforward, or feedback linearization."""
+"""Simulation of the full model under a controller: feedforward or feedback linearization."""
 
 from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.joint_tracking import GoalTolerance

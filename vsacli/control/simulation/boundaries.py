@@ -1,4 +1,4 @@
-"""Boundaries of the states in which a run can go on."""
+"""Boundaries in state space at which a run must end: singularities, and the ends of spring laws."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 
 NEARLY_SINGULAR = 1e-4
-"""Share of its first value to which det A of a joint may fall: near zero, the torques of a linearizing
-controller are without bound."""
+"""Share of its initial value to which det A of a joint may fall: near zero, the torques of a linearizing
+controller are unbounded."""
 
 
 class Boundary(ABC):
-    """A function of time and state that falls below zero where a run must end: an event of `solve_ivp`."""
+    """A boundary at which a run must end, with the distance of a state to it."""
 
     terminal = True
     direction = -1.0
@@ -34,16 +34,16 @@ class Boundary(ABC):
 
     @abstractmethod
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return a number for each of `joints` that must stay positive, at positions of joints and motors."""
+        """Return a number for each of `joints` that is positive inside, at positions of joints and motors."""
 
     def distance(self, vector: FloatArray) -> FloatArray:
-        """Return the smallest distance, at most 1; one that is not defined any more lies beyond."""
+        """Return the smallest distance, at most 1; an undefined one counts as beyond the boundary."""
         distances = self._distances(vector)
         known = np.where(np.isnan(distances), -1.0, np.minimum(distances, 1.0))
         return reduce(np.minimum, np.moveaxis(known, -1, 0))
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
-        """Return the end of a run here."""
+        """Return the end of a run at this time and state."""
         return Ending(time, self.reason, self.flag, int(self.joints[np.argmin(self._distances(vector))]))
 
     def _distances(self, vector: FloatArray) -> FloatArray:
@@ -52,7 +52,7 @@ class Boundary(ABC):
 
 
 class Singularity(Boundary):
-    """The boundary at which the decoupling matrix of a joint becomes singular."""
+    """The boundary at which the decoupling matrix A of a joint becomes singular."""
 
     reason = "its decoupling matrix became singular"
     flag = Flag.SINGULAR
@@ -64,7 +64,7 @@ class Singularity(Boundary):
         self._first_value = self._determinant(phase.q, phase.theta)
 
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Det A as a share of its first value, above `NEARLY_SINGULAR`."""
+        """Return det A as a share of its initial value, minus `NEARLY_SINGULAR`."""
         shares: FloatArray = self._determinant(q, theta) / self._first_value - NEARLY_SINGULAR
         return shares
 
@@ -73,7 +73,7 @@ class Singularity(Boundary):
 
 
 class SpringRange(Boundary):
-    """The boundary at which a spring leaves its domain: a tendon goes slack, a table ends."""
+    """The boundary at which a spring leaves the domain of its law: a tendon goes slack, a table ends."""
 
     reason = "a spring left the range of its law"
     flag = Flag.INFEASIBLE
@@ -84,14 +84,14 @@ class SpringRange(Boundary):
         self.joints = loop.plant.drivetrain.spring_joint
 
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Deflection to the nearer end of the law."""
+        """Return the deflection that is left to the nearer end of the law."""
         phi = self._plant.drivetrain.ranged(q, theta)
         distances: FloatArray = np.minimum(phi - self._lowest, self._highest - phi)
         return distances
 
 
 def boundaries(loop: ClosedLoop, start: FloatArray) -> Iterator[Boundary]:
-    """Yield the boundaries that a robot can reach; `start` is the first state vector."""
+    """Yield the boundaries that a robot can reach; `start` is the initial state vector."""
     drivetrain = loop.plant.drivetrain
     if drivetrain.chosen.size:
         yield Singularity(loop, start)

@@ -1,4 +1,4 @@
-"""A robot under a controller: the law of the motor torques, and the equations of motion of both."""
+"""A robot under a controller: control laws for the motor torques, and the equations of motion of both."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class Phase(NamedTuple):
-    """Full state, ([samples,] joints) and ([samples,] springs), and the integrals of the errors."""
+    """Full state: q, dq ([samples,] joints), theta, dtheta ([samples,] springs), integrals of the errors."""
 
     q: FloatArray
     dq: FloatArray
@@ -35,8 +35,8 @@ class Packing:
     """The layout of a `Phase` in a vector.
 
     Attributes:
-        entries: of the vector.
-        motor_velocities: places of the velocities of all motors, (motors,).
+        entries: number of entries of the vector.
+        motor_velocities: indices of the velocities of all motors, (motors,).
     """
 
     def __init__(self, drivetrain: Drivetrain) -> None:
@@ -49,7 +49,7 @@ class Packing:
         self.motor_velocities = drivetrain.of_all(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """Return the vector of a state at which nothing is integrated yet."""
+        """Return the vector of a state with zero integrals of the errors."""
         nothing = np.zeros_like(q)
         return self.joined(Phase(q, dq, theta, dtheta, Integral(nothing, nothing)))
 
@@ -64,21 +64,21 @@ class Packing:
 
 
 class Controller(Protocol):
-    """A control law as a function of time and of the measured state.
+    """A control law as a function of time and measured state.
 
     Attributes:
-        ending: where it has no more torques to give; None if it always has.
+        ending: end of the run at which its torques become undefined; None if they always exist.
     """
 
     ending: Ending | None
 
     def torque(self, time: float | FloatArray, phase: Phase, slip: FloatArray | None = None) -> FloatArray:
-        """Motor torques, ([samples,] motors).
+        """Return commanded motor torques, ([samples,] motors), N m (N).
 
         Args:
-            time: s.
-            phase: the measured state.
-            slip: direction in which each motor moves, as far as that is known apart from its velocity.
+            time: time, s.
+            phase: measured state.
+            slip: direction in which each motor with sharp friction slides, (motors,); None if unknown.
         """
 
     def error_rates(self, time: float, phase: Phase) -> Integral:
@@ -89,7 +89,7 @@ _NO_TORQUES = "what is commanded from here on cannot be executed, so there are n
 
 
 class Feedforward:
-    """The computed torques of the inverse dynamics, whatever the robot does."""
+    """Feedforward of the torques of the inverse dynamics, independent of the measured state."""
 
     def __init__(self, model: Robot, trajectory: Trajectory) -> None:
         internal = internal_motions(model, trajectory)
@@ -113,7 +113,7 @@ class Feedforward:
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))
 
     def torque(self, time: float | FloatArray, _phase: Phase, _slip: FloatArray | None = None) -> FloatArray:
-        """Motor torques, ([samples,] motors); friction is that of the commanded motion."""
+        """See `Controller.torque`; friction is that of the commanded motion."""
         values: FloatArray = self._table(time)
         if self._friction is None:
             return values
@@ -122,12 +122,12 @@ class Feedforward:
         return smooth + self._friction.torque(velocity)
 
     def error_rates(self, _time: float, phase: Phase) -> Integral:
-        """Nothing is integrated."""
+        """Return zeros, since nothing is integrated."""
         return Integral(np.zeros_like(phase.q), np.zeros_like(phase.q))
 
 
 class LinearizingFeedback:
-    """Feedback linearization of the model along a reference."""
+    """Feedback linearization by a model, along a reference."""
 
     def __init__(self, model: Robot, reference: Reference, gains: Gains) -> None:
         self._feedback = FeedbackLinearization(model, gains, reference.frame)
@@ -136,12 +136,12 @@ class LinearizingFeedback:
         self._integrates = gains.integrates
 
     def torque(self, time: float | FloatArray, phase: Phase, slip: FloatArray | None = None) -> FloatArray:
-        """Motor torques, ([samples,] motors)."""
+        """See `Controller.torque`."""
         reference = self._reference(time)
         return self._feedback.law.torque(*phase[:4], reference, phase.integral, slip)
 
     def error_rates(self, time: float, phase: Phase) -> Integral:
-        """Errors of position, and of stiffness where it can be commanded; zero without integral action."""
+        """Return the errors of position, and of stiffness where commanded; zeros without integral action."""
         if not self._integrates:
             return Integral(np.zeros_like(phase.q), np.zeros_like(phase.q))
         reference, plant = self._reference(time), self._feedback.plant
@@ -155,17 +155,16 @@ class ClosedLoop:
     """A robot whose motors obey a controller.
 
     Args:
-        robot: the robot as it is.
-        controller: law of the torques; a motor gives at most its `max_torque`.
-        reference: gives the wrench that acts, and the damping.
+        robot: true robot.
+        controller: law of the torques; a motor exerts at most its `max_torque`.
+        reference: source of the wrench that acts, and of the damping.
 
     Attributes:
-        plant: the robot's equations of motion.
-        packing: of its state in a vector.
-        slip: where friction of a motor is sharp the direction in which it slides now, 0 while it is held,
-            (motors,), NaN where it is not; None if it is nowhere.
-        held: torques that the motors are asked for whatever the state, until the controller acts again; None
-            if it acts at every instant.
+        plant: equations of motion of the robot.
+        packing: layout of the state in a vector.
+        slip: direction in which a motor with sharp friction slides, 0 while it sticks, NaN for other motors,
+            (motors,); None if no motor has sharp friction.
+        held: torques commanded in any state until the controller acts again; None if it acts all the time.
     """
 
     def __init__(self, robot: Robot, controller: Controller, reference: Reference) -> None:
@@ -177,26 +176,26 @@ class ClosedLoop:
         self.held: Constant | None = None
 
     def demand(self, time: float, vector: FloatArray) -> FloatArray:
-        """Torques that the controller asks of the motors in a state."""
+        """Return the motor torques that are commanded in a state."""
         return self.controller_torque(time, vector) if self.held is None else self.held(time)
 
     def controller_torque(self, time: float, vector: FloatArray) -> FloatArray:
-        """Return the same if the controller acts in that state."""
+        """Return the motor torques that the controller commands if it acts in this state."""
         return self.controller.torque(time, self.packing.unpack(vector), self.slip)
 
     def hold(self, torques: FloatArray) -> None:
-        """Let the motors be asked for these torques until others are held."""
+        """Command these torques until others are held."""
         if self.held is None:
             self.held = Constant(torques)
         self.held.set(torques)
 
     def applied(self, demand: FloatArray) -> FloatArray:
-        """Return the torques that the motors give for those commanded."""
+        """Return the torques that the motors exert: commanded ones, clipped to the largest torque."""
         limit = self.plant.drivetrain.max_torque
         return np.clip(demand, -limit, limit)
 
     def derivative(self, time: float, vector: FloatArray) -> FloatArray:
-        """Time derivatives of state vectors (..., entries) at a time while the controller acts."""
+        """Return the time derivatives of state vectors, (..., entries), while the controller acts."""
         phase = self.packing.unpack(vector)
         ddq, ddtheta, _ = self.response(time, phase, self.demand(time, vector), self.slip)
         integral = self.controller.error_rates(time, phase)

@@ -1,4 +1,4 @@
-"""Compiled equations of motion, and steps of SciPy's DOP853 whose stages they compute together."""
+"""Compiled equations of motion, and a DOP853 of SciPy whose stages they compute in one call."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Stages(NamedTuple):
     """Stages of an explicit Runge-Kutta method.
 
     Attributes:
-        first, last: those to compute.
-        weights: of the rates at the stages before each stage, (stages, stages).
-        times: of the stages in shares of the step, (stages,).
+        first, last: indices of the first and last stage to compute.
+        weights: weights of the rates at the stages before each stage, (stages, stages).
+        times: times of the stages as shares of the step, (stages,).
     """
 
     first: int
@@ -36,15 +36,15 @@ class Stages(NamedTuple):
 
 @cache
 def dop853_with_stages() -> Any:
-    """SciPy's DOP853, its control of steps and errors, where stages are computed by one call.
+    """Return a class with the step and error control of SciPy's DOP853 that computes stages in one call.
 
-    An instance takes a further argument, `stages`, a function as `Equations.stages`: where that gives None,
-    SciPy evaluates one stage after the other. SciPy has no hook for that, so its text of a step is carried
-    out with another `rk_step` among its names; were there none of that name, nothing but time would be lost.
+    Its constructor has a further argument, `stages`, a function like `Equations.stages`. If this returns
+    None, SciPy evaluates one stage after the other. SciPy has no hook for that, so the code of its
+    `_step_impl` is run with another `rk_step` among its globals. Without this name, only speed is lost.
     """
     from scipy.integrate import DOP853
 
-    scipy: Any = DOP853  # whose stubs leave out what it takes to derive a method
+    scipy: Any = DOP853  # its type stubs lack the members that a derived method needs
     weights, times = _tableau(scipy)
     end = scipy.n_stages
     step, dense = Stages(1, end, weights, times), Stages(end + 1, len(times) - 1, weights, times)
@@ -59,21 +59,21 @@ def dop853_with_stages() -> Any:
             self._step_impl = MethodType(FunctionType(text.__code__, names), self)
 
         def _rk_step(self, fun: Any, t: Any, y: Any, f: Any, h: Any, *tableau: Any) -> Any:
-            """Return the state at the end of a trial step, and its rates; leave those of the stages in K."""
+            """Return the state at the end of a trial step, and its rates; store those of the stages in K."""
             self.K[0] = f
             state = self._stages(t, h, y, step, self.K_extended)
             return one_by_one(fun, t, y, f, h, *tableau) if state is None else (state, self.K[-1].copy())
 
         def _dense_output_impl(self) -> Any:
             found = self._stages(self.t_old, self.h_previous, self.y_old, dense, self.K_extended)
-            self.A_EXTRA = scipy.A_EXTRA if found is None else scipy.A_EXTRA[:0]  # what is left to SciPy
+            self.A_EXTRA = scipy.A_EXTRA if found is None else scipy.A_EXTRA[:0]  # stages left to SciPy
             return super()._dense_output_impl()
 
     return WithStages
 
 
 def _tableau(method: Any) -> tuple[FloatArray, FloatArray]:
-    """Weights and times of all stages: of the step, of its end, and of dense output."""
+    """Return weights and times of all stages: of the step, of its end, and of dense output."""
     end = method.n_stages
     weights = np.zeros((end + 1 + len(method.A_EXTRA),) * 2)
     weights[:end, :end], weights[end, :end], weights[end + 1 :] = method.A, method.B, method.A_EXTRA
@@ -97,7 +97,7 @@ _ARGUMENTS: dict[str, list[Any]] = {
         c_void_p,
     ],
 }
-"""Arguments of the functions of loop.c after the loop itself."""
+"""Types of the arguments of the functions in loop.c, after the first one, the loop."""
 
 
 class _Table(Structure):
@@ -121,10 +121,10 @@ class _Loop(Structure):
 
 
 def open_loop(path: Path) -> dict[str, Any]:
-    """Return the functions of a compiled closed loop by name.
+    """Load the functions of a compiled closed loop, by name.
 
     Raises:
-        CompilerError: they cannot be loaded.
+        CompilerError: the functions cannot be loaded.
     """
     try:
         library = ctypes.CDLL(str(path))
@@ -141,14 +141,14 @@ class CompiledLoop:
     """Compiled equations of motion of a closed loop.
 
     Args:
-        functions: as `open_loop` gives them.
-        numbers: of robot and controller, as the code counts them.
-        recording: the compiled one.
+        functions: functions by name, from `open_loop`.
+        numbers: constants of robot and controller, in the order of `loop_code`.
+        recording: recorded loop that was compiled.
     """
 
     def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: Recording) -> None:
         loops = [_Loop.of(numbers, each.tables) for each in recording]
-        self._kept = (numbers, recording, loops)  # what the code has addresses of
+        self._kept = (numbers, recording, loops)  # keeps alive the arrays to which the code has pointers
         rates, torques, distances = map(byref, loops)
         self._derivatives = partial(functions["derivatives"], rates)
         self._stages = partial(functions["stages"], rates)
@@ -158,14 +158,14 @@ class CompiledLoop:
         self._distances = np.empty(len(recording.distances.program.outputs))
 
     def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
-        """Time derivatives of state vectors (..., entries) at a time."""
+        """Return the time derivatives of state vectors, (..., entries), at a time."""
         given = np.ascontiguousarray(vectors)
         rates = np.empty_like(given)
         self._derivatives(time, given.size // given.shape[-1], address(given), address(rates))
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
-        """Return the torques held by a controller, (motors,), that it commands in a state."""
+        """Return the torques, (motors,), that a controller which holds them commands in a state."""
         given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
         self._demand(time, address(given), address(asked))
         return asked
@@ -179,14 +179,15 @@ class CompiledLoop:
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
     ) -> FloatArray:
-        """Stages of an explicit step from a state on; returns the state at the last one.
+        """Compute stages of an explicit step, and return the state at the last one.
 
         Args:
-            time: from which on, s.
-            step: its length, s.
-            vector: the state there.
-            which: those to compute.
-            rates: at the stages, (stages, entries), of which those before are known; contiguous.
+            time: time at the start of the step, s.
+            step: length of the step, s.
+            vector: state at its start.
+            which: stages to compute.
+            rates: rates at the stages, (stages, entries), contiguous; those of earlier stages are read, the
+                computed ones are written.
         """
         given, state = np.ascontiguousarray(vector), np.empty_like(vector)
         self._stages(

@@ -1,4 +1,4 @@
-"""Why a run ends before its time, and how many evaluations of the equations of motion it may take."""
+"""Early ends of a run, and the budget of evaluations of the equations of motion."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ INCOMPLETE = "incomplete"
 
 @dataclass(frozen=True)
 class Ending:
-    """Why a run ended early.
+    """The early end of a run.
 
     Attributes:
-        time: when, s.
-        reason: of the end, as part of a sentence.
-        flag: of the last sample of the joint to blame.
-        joint: its index; None, like the flag, if there is none.
-        verdict: on a run that ends so, unless a flag says it.
+        time: time of the end, s.
+        reason: reason of the end, as part of a sentence.
+        flag: flag set at the last sample of the joint that caused the end; None without such a joint.
+        joint: index of this joint; None without one.
+        verdict: verdict on the run, unless a flag implies one.
     """
 
     time: float
@@ -34,46 +34,46 @@ class Ending:
     verdict: str = DIVERGED
 
     def described(self, joint_names: Sequence[str], first: float) -> str:
-        """Return the end as a sentence; `first` is the stamp of time zero, s."""
+        """Return a sentence on the end; `first` is the stamp of time zero, s."""
         place = "" if self.joint is None else f"{joint_names[self.joint]}: "
         return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}"
 
 
 LEAST_DEFAULT = 200_000
-"""Evaluations: a second for an arm of three joints, half a minute without a program. Runs of the shipped
-files take 20,000 at most."""
+"""Smallest default budget, in evaluations: a second for an arm of three joints, half a minute without a
+recorded program. Runs of the bundled examples take 20,000 at most."""
 
 DEFAULT_PER_STEP = 100
-"""Evaluations for each step of a trajectory, where that is more: sampled control takes 17."""
+"""Default evaluations per sample of a trajectory, if that is more: sampled control takes 17."""
 
 TRIAL = 0.05
-"""Share of the budget after which the pace so far is taken for that of the whole run: a start with fast
-transients takes less, 5000 evaluations with poles of -20/s."""
+"""Share of the budget after which the pace so far is extrapolated to the whole run: fast transients at the
+start take less, 5000 evaluations with poles of -20/s."""
 
 EXPLICIT_SHARE = 0.5
-"""Share of the budget that a run may take explicitly. The implicit method, which takes ten thousands where
-it is called for, gets the rest; half of 100 a step is enough for sampled control."""
+"""Share of the budget for the explicit method. The rest is for the implicit method, which takes tens of
+thousands of evaluations where it is needed; half of 100 per sample is enough for sampled control."""
 
 Derivative = Callable[[float, FloatArray], FloatArray]
-"""Time derivatives (..., entries) of state vectors (..., entries) at a time."""
+"""Function that returns time derivatives, (..., entries), of state vectors, (..., entries), at a time."""
 
 Progress = Callable[[float], None]
-"""Called with the time reached, s."""
+"""Function called with the time reached, s."""
 
 
 class Budget:
-    """Counts evaluations of the equations of motion.
+    """A budget of evaluations of the equations of motion.
 
     Args:
-        limit: after how many a run ends; None for the default.
-        times: of the steps of the trajectory, s.
+        limit: number of evaluations after which a run ends; None for the default.
+        times: sample times of the trajectory, s.
 
     Attributes:
-        limit: the same, or the default.
+        limit: number of evaluations after which a run ends.
         used: evaluations so far.
 
     Raises:
-        InputError: a limit below 1.
+        InputError: the limit is below 1.
     """
 
     def __init__(self, limit: int | None, times: FloatArray) -> None:
@@ -84,29 +84,30 @@ class Budget:
         self._first, self._last = float(times[0]), float(times[-1])
 
     def spent(self, _time: float) -> bool:
-        """Return whether nothing is left."""
+        """Return whether the budget is used up."""
         return self.used >= self.limit
 
     def too_slow(self, time: float) -> bool:
-        """Return whether a run that goes on at this rate exceeds the limit of explicit steps."""
-        projected = self.used * (self._last - self._first)  # times the part of it that is done
+        """Return whether a run that continues at this rate exceeds the limit of the explicit method."""
+        # Both sides are multiplied by the time elapsed, which may be zero.
+        projected = self.used * (self._last - self._first)
         share = EXPLICIT_SHARE * self.limit
         return self.used > TRIAL * self.limit and projected > share * (time - self._first)
 
 
 class Deadline:
-    """The event of `solve_ivp` at the end of the first step after which a run is to stop.
+    """An event of `solve_ivp` at the end of the step in which the budget is used up.
 
-    It is called at each step, and passes the time on.
+    It is called at each step, and reports the progress.
 
     Args:
-        limit: the budget, to be named.
-        is_due: whether to stop at a time, s.
-        last: where the run ends anyway, s.
-        progress: called with the time reached, s.
+        limit: budget, for the message.
+        is_due: function that returns whether to stop at a time, s.
+        last: time at which the run ends regularly, s.
+        progress: function called with the time reached, s.
 
     Attributes:
-        time: of that end, s; infinite until it has come.
+        time: time of the event, s; infinite until it occurs.
     """
 
     terminal = True
@@ -118,13 +119,13 @@ class Deadline:
         self.time = math.inf
 
     def __call__(self, time: float, _vector: FloatArray) -> float:
-        """Time left, zero at the end of that step."""
+        """Return the time left, s, at most 1; zero at the event."""
         self._progress(time)
         if math.isinf(self.time) and time < self._last and self._is_due(time):
             self.time = time
         return min(self.time - time, 1.0)
 
     def ending(self, time: float, _vector: FloatArray) -> Ending:
-        """Return the end of a run here."""
+        """Return the end of a run at this time."""
         reason = f"the budget of {self._limit} evaluations of the equations of motion is used up"
         return Ending(time, reason, verdict=INCOMPLETE)

@@ -1,4 +1,4 @@
-"""The states that a run goes through: as vectors, integrated over time, and every variable of them."""
+"""The history of a run: its integration to state vectors, and every variable evaluated from them."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.model import Robot
 
 CUTOFF = 0.1
-"""Cut-off frequency of the low-pass, in shares of the sampling rate: a delay of some two samples."""
+"""Cut-off frequency of the low-pass as a share of the sample rate: a delay of about two samples."""
 
 
 class RateFilter:
-    """Backward differences of joint and motor positions, smoothed by a low-pass of first order.
+    """Velocities by backward differences of joint and motor positions, smoothed by a first-order low-pass.
 
     Args:
         start: readings of the first sample, whose velocities are known: the robot rests.
@@ -34,7 +34,7 @@ class RateFilter:
         self.phase = start
 
     def add(self, read: Phase, elapsed: float) -> None:
-        """Take a sample of the positions, some seconds after the previous one."""
+        """Add a sample of the positions, `elapsed` seconds after the previous one."""
         keep = math.exp(-2 * math.pi * CUTOFF)
         dq, dtheta = (
             keep * rate + (1 - keep) * (new - old) / elapsed
@@ -49,7 +49,7 @@ class RateFilter:
 class StateTrajectory(NamedTuple):
     """A run: times (samples,), states (samples, entries), commanded torques (samples, motors).
 
-    `held` says whether the torques stay the same from step to step.
+    Torques are constant between samples if `held`.
     """
 
     time: FloatArray
@@ -63,7 +63,7 @@ class StateTrajectory(NamedTuple):
 def continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
 ) -> StateTrajectory:
-    """Return the states of a run whose controller acts at every instant, on the true state."""
+    """Integrate a run whose controller acts at every instant, on the true state."""
     time, states, ending = integrator.over(times, start)
     demand = loop.controller.torque(time, loop.packing.unpack(states))
     return StateTrajectory(time, states, demand, ending, integrator.effort)
@@ -76,9 +76,9 @@ def sampled(
     start: FloatArray,
     readings: Readings | None = None,
 ) -> StateTrajectory:
-    """Return the states of a run whose controller holds torques between the times, from measured positions.
+    """Integrate a run whose controller acts on measured positions at the times, and holds torques in between.
 
-    Measured positions are the readings of sensors, or the true ones.
+    Measured positions are the readings of sensors, or the true ones without `readings`.
     """
 
     def read(state: FloatArray, sample: int) -> Phase:
@@ -105,7 +105,7 @@ def sampled(
 class History(Block):
     """Variables of a simulation, (samples, joints[, 2]); see `SIMULATION_VARIABLES`.
 
-    NaN where a joint does not have the variable: motor 2 of an elastic joint, the stiffness of a rigid one.
+    Variables that a joint does not have are NaN: motor 2 of an elastic joint, the stiffness of a rigid one.
     """
 
     declared = SIMULATION_VARIABLES
@@ -118,7 +118,7 @@ def history(
     first: float,
     readings: Readings | None = None,
 ) -> History:
-    """Evaluate every variable along a state trajectory; `first` is the stamp of its time zero, s."""
+    """Evaluate every variable along a run; `first` is the stamp of its time zero, s."""
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
     found = _actual(loop, integrated)
@@ -126,7 +126,7 @@ def history(
         of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
-    for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
+    for name in ("stiffness", "dstiffness"):  # without a command, the reference is the actual value
         commanded[name] = np.where(chosen, commanded[name], found[name])
     demand = loop.plant.drivetrain.of_joints(integrated.demand)
     read: dict[str, FloatArray] = {}
@@ -182,13 +182,13 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
 
 
 def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
-    """Return the work of motors up to each sample, (samples, ...); torques held or linear in between."""
+    """Return the work of motors up to each sample, (samples, ...), J; torques held or linear in between."""
     given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
     return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
 
 
 def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
-    """Limits exceeded by what was, or was asked of the motors; at the last step, what ended the run."""
+    """Return flags of exceeded limits, of actual values and commanded torques, and of an early end."""
     flags = np.zeros(values["q"].shape, dtype=np.uint32)
     for index, joint in enumerate(robot.joints):
         flags[:, index] = limit_flags(joint, of_joint(values, index), flags[:, index])

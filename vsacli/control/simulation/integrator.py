@@ -1,4 +1,7 @@
-"""Integration of the equations of motion, explicit or implicit, to a boundary or the end of the budget."""
+"""Integration of the equations of motion by SciPy, to a boundary or the end of the budget.
+
+A run begins with an explicit method, and changes to an implicit one if that needs too many evaluations.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +23,20 @@ from vsacli.control.simulation.stick_slip import StickSlip, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
 EXPLICIT = "DOP853"
-"""Method of order 8: motors and links oscillate on their springs, and mostly nothing is stiff."""
+"""Method of order 8: motors and links oscillate on their springs, and most robots are not stiff."""
 
 IMPLICIT = "Radau"
-"""L-stable method of order 5: springs like steel and fast poles do not shorten its steps.
+"""L-stable method of order 5: very stiff springs and fast poles do not shorten its steps.
 
 With a joint of 1e9 N m/rad it was a hundred times as accurate as BDF and LSODA at the same tolerances, and
-with one of 1e6 it took a tenth of their evaluations, since these are not stable for oscillations.
+with one of 1e6 it took a tenth of their evaluations, since they are not stable for oscillations.
 """
 
 SMALLEST_RTOL = 1e-13
-"""Below, rounding alone exceeds the bound."""
+"""Smallest relative tolerance; rounding alone exceeds a smaller one."""
 
 LARGEST_TOLERANCE = 1e-3
-"""Largest tolerance: with it, the example of the paper ends 4e-4 rad off; with 0.1 it deviated by 0.3 rad."""
+"""Largest tolerance; with it, the example of the paper ends 4e-4 rad off, with 0.1 it deviated by 0.3 rad."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Method(Stored):
-    """A method of integration, by its name in SciPy, and from when on it was used, s."""
+    """A method of integration: its name in SciPy, and the time from which on it was used, s."""
 
     name: str
     start: float
@@ -75,16 +78,16 @@ class Effort(NamedTuple):
 
 
 class Integrator:
-    """`solve_ivp` with boundaries at which a run ends, explicit as long as that leads to the end.
+    """Integration by `solve_ivp` with boundaries at which a run ends, explicit as long as the budget allows.
 
     Args:
-        equations: to integrate, with their boundaries.
-        tolerances: of each step.
-        progress: called with the time reached, s.
-        sliding: of motors with sharp friction, at whose switches other equations of motion take over.
+        equations: equations of motion, with their boundaries.
+        tolerances: bounds on the local error of a step.
+        progress: function called with the time reached, s.
+        sliding: stick and slip of motors with sharp friction, whose switches change the equations of motion.
 
     Attributes:
-        equations: the same.
+        equations: equations of motion, with their boundaries.
     """
 
     def __init__(
@@ -107,7 +110,10 @@ class Integrator:
         return Effort(tuple(self._methods), budget.used, budget.limit, by)
 
     def over(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
-        """States at the times (samples,) reached, and one more where the run ended early."""
+        """Integrate over times, (samples,); return those reached, the states there, and an early end if any.
+
+        If the run ends early, the last time and state are those of its end.
+        """
         if not self._methods:
             self._methods.append(Method(EXPLICIT, float(times[0])))
         if self._methods[-1].name == IMPLICIT:
@@ -140,7 +146,7 @@ class Integrator:
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
         deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
-        if self._sliding:  # torques may be others than before
+        if self._sliding:  # torques may have changed since the last call
             self._sliding.settle(float(times[0]), start)
         first, at, state, parts = times[:1], float(times[0]), start, []
         while True:
@@ -154,7 +160,7 @@ class Integrator:
                 event = None
                 break
         reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
-        if not len(reached):  # over no time at all, and where the first step fails
+        if not len(reached):  # a span of zero length, or a failure of the first step
             reached, states = first, start[None]
         if solution.status < 0:
             reason = "the motion became too fast to integrate"
@@ -170,7 +176,7 @@ class Integrator:
         events: Sequence[Any],
         options: Mapping[str, Any],
     ) -> Any:
-        """Return a solution evaluated at further times, up to the first event or the last time."""
+        """Return a solution from a time on, at further times, up to the first event or the last time."""
         from scipy.integrate import solve_ivp
 
         time, times = span
@@ -188,14 +194,14 @@ class Integrator:
 
 
 def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Times and states (times, entries) of a solution, which may have none."""
+    """Return times and states, (times, entries), of a solution, which may have none."""
     if not len(solution.t):
         return np.empty(0), np.empty((0, len(start)))
     return solution.t, solution.y.T
 
 
 def _terminal_event(events: Sequence[Any], solution: Any) -> tuple[Any, float, FloatArray]:
-    """Return the event that ended a solution, its time and state; None if there was none."""
+    """Return the event that ended a solution, its time and state; the event is None if there was none."""
     for event, times, states in zip(events, solution.t_events, solution.y_events, strict=True):
         if len(times):
             return event, float(times[-1]), states[-1]

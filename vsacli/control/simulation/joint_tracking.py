@@ -28,14 +28,14 @@ _GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint'
 
 @dataclass(frozen=True)
 class GoalTolerance:
-    """Largest error of a joint's position at the end of a run that counts as having arrived.
+    """Largest error of a joint's position at the end of a run with which it counts as on target.
 
     Attributes:
-        share: of the range over which the joint is commanded, from 0 to 1.
-        absolute: added to it, so that a resting joint may have an error, too, rad (m).
+        share: relative part, as a share of the range over which the joint is commanded, from 0 to 1.
+        absolute: absolute part, added so that a resting joint may also have an error, rad (m).
 
     Raises:
-        InputError: one is negative or not finite, both are zero, or the share exceeds 1.
+        InputError: a part is negative or not finite, both are zero, or the share exceeds 1.
     """
 
     share: float = 0.01
@@ -50,10 +50,10 @@ class GoalTolerance:
 
     @classmethod
     def from_text(cls, written: str) -> GoalTolerance:
-        """Return the tolerance of a text: `2%` of each joint's range plus an absolute part, or rad (m).
+        """Parse a tolerance: `2%` of each joint's range plus the default absolute part, or rad (m).
 
         Raises:
-            InputError: it is neither, or out of range.
+            InputError: the text is neither, or out of range.
         """
         text = written.strip()
         try:
@@ -70,12 +70,12 @@ class GoalTolerance:
 HEADER = ("joint", "q error: peak", "end", "stiffness error: peak", "end", "peak motor 1 / 2")
 
 STIFFNESS_SHARE = 0.01
-"""Share of the largest commanded stiffness that it may be off at the end without a warning."""
+"""Error of the stiffness at the end without a warning, as a share of the largest commanded stiffness."""
 
 
 @dataclass(frozen=True)
 class Deviation(Stored):
-    """The deviation of an actual value from the command: largest, time (s), last; NaN without any."""
+    """Deviation of an actual value from the command: peak magnitude, its time (s), last; NaN if undefined."""
 
     peak: float
     time: float
@@ -83,7 +83,7 @@ class Deviation(Stored):
 
     @classmethod
     def of(cls, time: FloatArray, error: FloatArray) -> Deviation:
-        """Return the deviation of errors, (samples,), at times."""
+        """Return the deviation with these errors, (samples,), at times."""
         if np.isnan(error).all():
             return cls(np.nan, np.nan, np.nan)
         worst = int(np.nanargmax(np.abs(error)))
@@ -95,15 +95,15 @@ class JointTracking(Stored):
     """The findings of a simulation at one joint.
 
     Attributes:
-        name: of the joint.
-        type: "revolute" or "prismatic".
+        name: name of the joint.
+        type: type of the joint, "revolute" or "prismatic".
         q: deviation of the position, rad (m).
         stiffness: deviation of the stiffness, N m/rad (N/m).
-        peak_tau_motor: largest |torque| that motors 1 and 2 gave, N m (N).
-        steps_over_limit: how many steps have a limit exceeded.
-        worst: the worst excess of each limit, by its name.
+        peak_tau_motor: largest |torque| that motors 1 and 2 exerted, N m (N).
+        steps_over_limit: number of samples at which a limit is exceeded.
+        worst: worst excess of each limit, by its name.
         energy: work of the motors, elastic energy, co-contraction.
-        tolerance: how far off q may be at the end, rad (m); NaN in reports written before there was one.
+        tolerance: largest error of q at the end, rad (m); NaN in reports of versions without it.
     """
 
     name: str
@@ -128,7 +128,7 @@ class JointTracking(Stored):
 
     @property
     def off_course(self) -> bool:
-        """Whether q is further from the command at the end than it may be."""
+        """Whether q at the end is further from the command than the tolerance."""
         return abs(self.q.final) > self.tolerance
 
 
@@ -155,7 +155,7 @@ def _energies(robot: Robot, history: History) -> list[JointEnergy]:
 
 
 def _led(values: FloatArray) -> FloatArray:
-    """(..., samples + 1) from (samples, ...), the first step twice: a run may end with it."""
+    """Return (..., samples + 1) from (samples, ...), with the first sample twice: it may be the only one."""
     rows = by_joint(values)
     return np.concatenate((rows[..., :1], rows), axis=-1)
 
@@ -179,7 +179,7 @@ def _tracking(
 
 
 def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
-    """Return the worst excess of each limit of a joint; of either motor."""
+    """Return the worst excess of each limit of a joint, over both motors."""
     worst: dict[str, Worst] = {}
     most: dict[str, float] = {}
     checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
@@ -200,7 +200,7 @@ def _checked(variable: str) -> str:
 
 
 def row(joint: JointTracking) -> tuple[str, ...]:
-    """Return a joint in the table of the report, under `HEADER`."""
+    """Return the row of a joint in the table of the report, under `HEADER`."""
     motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
     return (
         joint.name,
@@ -217,12 +217,12 @@ def _with_unit(value: float, quantity: Quantity, joint: JointTracking) -> str:
 
 
 def _number(value: float) -> str:
-    """One decimal for large numbers, two digits for small ones."""
+    """Return a number with one decimal if large, with two digits if small."""
     return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2g}"
 
 
 def limit_sentence(joint: JointTracking, worst: Worst) -> str:
-    """Return by how much a joint exceeds a limit, and when."""
+    """Return a sentence on the largest excess of a limit by a joint."""
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     relation = "below" if worst.value < worst.bound else "above"
     return (
@@ -232,7 +232,7 @@ def limit_sentence(joint: JointTracking, worst: Worst) -> str:
 
 
 def end_sentence(joint: JointTracking) -> str:
-    """Return how far off target a joint ends."""
+    """Return a sentence on the position error of a joint at the end."""
     unit = POSITION.unit(joint.type)
     return (
         f"{joint.name}: at the end q is {joint.q.final:.3g} {unit} off the command, "
@@ -241,10 +241,10 @@ def end_sentence(joint: JointTracking) -> str:
 
 
 def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
-    """Yield a warning for each joint that arrives with another stiffness than commanded."""
+    """Yield a warning for each joint whose stiffness at the end differs from the command."""
     errors = history.stiffness_error[-1]
     allowed = STIFFNESS_SHARE * history.stiffness.max(axis=0)
-    for index in np.flatnonzero(np.abs(errors) > allowed):  # NaN of rigid joints exceeds nothing
+    for index in np.flatnonzero(np.abs(errors) > allowed):  # False for rigid joints, whose error is NaN
         joint = robot.joints[index]
         unit = STIFFNESS.unit(joint.type)
         yield (

@@ -1,4 +1,4 @@
-"""A closed loop recorded as programs, and C for these with the parameters of robot and controller as data."""
+"""A closed loop recorded as programs, and their C code with parameters of robot and controller as data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vsacli.control.simulation.tabulated import Instant, Table
 
 
 class Recorded(NamedTuple):
-    """A program of a state vector and of what tables have at a time, its inputs in this order."""
+    """A program whose inputs are the entries of a state vector, then the columns of tables at a time."""
 
     program: Program
     tables: tuple[Table, ...]
@@ -30,9 +30,9 @@ class Recording(NamedTuple):
     """The recorded closed loop at an instant.
 
     Attributes:
-        rates: time derivative of the state vector.
-        torques: that a controller which holds them asks for; none of others.
-        distances: to each boundary.
+        rates: program of the time derivative of the state vector.
+        torques: program of the torques that a controller which holds them commands; no outputs for others.
+        distances: program of the distance to each boundary.
     """
 
     rates: Recorded
@@ -41,7 +41,7 @@ class Recording(NamedTuple):
 
     @property
     def entries(self) -> int:
-        """Entries of a state vector."""
+        """Number of entries of a state vector."""
         return len(self.rates.program.outputs)
 
 
@@ -49,11 +49,11 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
     """Record a closed loop.
 
     Args:
-        loop: a robot under its controller; torques that it holds are a table.
-        boundaries: where its runs end.
+        loop: robot under its controller; torques that it holds become a table.
+        boundaries: boundaries at which its runs end.
 
     Raises:
-        NotImplementedError: it has no such program, or one of too many operations.
+        NotImplementedError: the loop has no such program, or one of too many operations.
     """
     if loop.slip is not None:
         raise NotImplementedError("motors with sharp friction stick and slide")
@@ -67,12 +67,11 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
     try:
         parts = (_recorded(each, loop.packing.entries) for each in (loop.derivative, torques, distances))
         return Recording(*parts)
-    except (AttributeError, IndexError, TypeError, ValueError) as error:  # as of a law of the user's own
+    except (AttributeError, IndexError, TypeError, ValueError) as error:  # e.g. from a user's own spring law
         raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
 
 
 def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
-    """Return a function of a time and a state vector."""
     tape = Tape(MOST_RECORDED)
 
     def inputs(count: int) -> Any:
@@ -84,10 +83,10 @@ def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
 
 
 def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
-    """Return what to compile for a recording, and the constants that the code is to be given.
+    """Return the C code of a recording, and the constants to be passed to it.
 
-    Constants are entries of an array, in the order in which they are written, so that robots that differ in
-    parameters alone have the same text; tables stay in the text.
+    Constants are entries of an array, in the order in which they are written, so that robots that differ only
+    in parameters have the same text. Tables stay in the text.
     """
     constants: list[float] = []
 
@@ -112,7 +111,7 @@ def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
 
 
 def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
-    """Return a function of a program, whose inputs are the entries of a state, then columns of tables."""
+    """Return the C function of a program, whose inputs are the entries of a state, then columns of tables."""
     places = (
         f"y[{number}]" if number < entries else f"s[{number - entries}]"
         for number in range(len(program.inputs))

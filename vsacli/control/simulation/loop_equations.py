@@ -1,7 +1,7 @@
-"""The equations of motion of a closed loop, evaluated by what is fastest for the length of a run.
+"""The equations of motion of a closed loop, evaluated by the fastest backend for the length of a run.
 
-`Equations` evaluates their text with NumPy, which takes any controller. `RecordedEquations` passes from the
-text to a program on plain numbers, and from that to compiled code, once a run is long enough.
+`Equations` evaluates them with NumPy, for any controller. `RecordedEquations` changes from NumPy to a program
+on plain numbers, and from that to compiled code, once a run is long enough.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from vsacli.control.simulation.loop_code import Recorded, Recording, loop_code, 
 
 
 class Equations:
-    """The integrated equations, with the boundaries of the run.
+    """The equations of motion of a closed loop evaluated with NumPy, with the boundaries of a run.
 
     Args:
-        loop: a robot under its controller.
-        boundaries: at which a run ends.
-        budget: of the run.
+        loop: robot under its controller.
+        boundaries: boundaries at which a run ends.
+        budget: budget of evaluations.
     """
 
     def __init__(self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget) -> None:
@@ -40,11 +40,11 @@ class Equations:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Values that tell how it was computed: `engine`, `compiler`, `threads`."""
+        """Backend of the computation: `engine`, `compiler`, `threads`."""
         return {"engine": "numpy", "compiler": "", "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """See `Equations`; where a number is not finite the text is evaluated."""
+        """Return the time derivatives of state vectors, (..., entries), at a time, s."""
         self.budget.used += vectors.size // vectors.shape[-1]
         return self.loop.derivative(time, vectors)
 
@@ -55,7 +55,7 @@ class Equations:
     def stages(
         self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
     ) -> FloatArray | None:
-        """See `Equations.stages`."""
+        """Compute stages of an explicit step; see `CompiledLoop.stages`. None leaves them to SciPy."""
         return None
 
     def distance(self, vector: FloatArray) -> float:
@@ -64,10 +64,10 @@ class Equations:
 
 
 class Edge:
-    """The event of `solve_ivp` at the first boundary.
+    """The event of `solve_ivp` at the first boundary that is reached.
 
     Args:
-        equations: to integrate.
+        equations: equations of motion, with their boundaries.
     """
 
     terminal = True
@@ -77,30 +77,30 @@ class Edge:
         self._equations = equations
 
     def __call__(self, _time: float, vector: FloatArray) -> float:
-        """Distance to the nearest boundary."""
+        """Return the distance to the nearest boundary."""
         return self._equations.distance(vector)
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
-        """Return the end of a run there."""
+        """Return the end of a run at this time and state."""
         reached = min(self._equations.boundaries, key=lambda each: float(each.distance(vector)))
         return reached.ending(time, vector)
 
 
 class NumberProgram:
-    """A program of states and tables as a Python function: without a compiler, and before one is worth it.
+    """A program of states and tables as a Python function, used without compiled code or before it pays off.
 
     Raises:
-        NotImplementedError: it has loops or branches.
+        NotImplementedError: the program has loops or conditionals.
     """
 
     def __init__(self, recorded: Recorded) -> None:
         self._function, self._tables = number_function(recorded.program), recorded.tables
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """Results (..., results) for state vectors (..., entries) at a time.
+        """Return results, (..., results), for state vectors, (..., entries), at a time.
 
         Raises:
-            ArithmeticError, ValueError: where NumPy would find NaN or infinity.
+            ArithmeticError, ValueError: NumPy would return NaN or infinity.
         """
         columns = [number for table in self._tables for number in table(time).tolist()]
         states = vectors.reshape(-1, vectors.shape[-1]).tolist()
@@ -109,26 +109,26 @@ class NumberProgram:
 
 
 RECORD_FROM = 50
-"""Evaluations for each joint from which on a program saves more time than recording it takes: 3 to 30 ms with
-three joints, 30 to 130 ms with seven, where an evaluation of the text takes 0.1 to 0.3 ms."""
+"""Evaluations per joint beyond which a program saves more time than recording it takes: 3 to 30 ms with three
+joints, 30 to 130 ms with seven, while an evaluation with NumPy takes 0.1 to 0.3 ms."""
 
 NUMBER_SECONDS = 4e-8
-"""Seconds of an operation of Python on plain numbers."""
+"""Time of a Python operation on plain numbers, s."""
 
 TEXT_SECONDS = 2e-4
-"""Seconds of an evaluation of the text by NumPy."""
+"""Time of an evaluation with NumPy, s."""
 
 LOOK_SECONDS = 0.02
-"""Seconds to see whether there is compiled code."""
+"""Time to look for compiled code in the cache, s."""
 
 
 class Computing(NamedTuple):
     """The backend of the equations of motion.
 
     Attributes:
-        engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
-        tell: receives problems with compiled code, and announcements of long work.
-        runs: how many share the compiled code.
+        engine: "numpy" to compile nothing, "c" to compile at once, "auto" to compile when that saves time.
+        tell: function called with problems of compiled code, and announcements of long work.
+        runs: number of runs that share the compiled code.
     """
 
     engine: str
@@ -137,21 +137,22 @@ class Computing(NamedTuple):
 
 
 class RecordedEquations(Equations):
-    """Equations whose evaluations pass from the text to a program on numbers, and from that to compiled code.
+    """Equations that change from NumPy to a program on plain numbers, and from that to compiled code.
 
-    Each comes when those before have taken about as long as it takes to make it, so a run never takes much
-    more than twice what the best choice would have taken, however long it becomes. When that is goes by the
-    number of evaluations, so that a run can be repeated to the last bit unless the cache has new code.
+    A backend is made when the earlier ones have taken about as long as making it takes. So a run never takes
+    much more than twice the time of the best choice, however long it becomes. The change depends on the
+    number of evaluations, not on measured time, so that a run is repeatable to the last bit unless the cache
+    has new code.
 
     Args:
-        loop: a robot under its controller.
-        boundaries: at which a run ends.
-        budget: of the run.
-        computing: the backend.
+        loop: robot under its controller.
+        boundaries: boundaries at which a run ends.
+        budget: budget of evaluations.
+        computing: choice of the backend.
 
     Raises:
-        InputError: there is no engine of that name; at the first evaluation, it is "c" and there is no
-            compiler that works, or nothing that it could compile.
+        InputError: the engine is unknown; or, at the first evaluation, it is "c" and there is no working
+            compiler, or the loop cannot be compiled.
     """
 
     def __init__(
@@ -169,13 +170,13 @@ class RecordedEquations(Equations):
 
     @property
     def provenance(self) -> dict[str, str]:
-        """See `Equations.provenance`; of the last computation."""
+        """See `Equations.provenance`; that of the last evaluation."""
         if self._compiled is None:
             return super().provenance
         return {"engine": "c", "compiler": self._compiler, "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """See `Equations`; where a number is not finite the text is evaluated."""
+        """See `Equations.__call__`; NumPy evaluates again where a result is not finite."""
         self._improve()
         rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
         if rates is None:
@@ -206,16 +207,16 @@ class RecordedEquations(Equations):
         return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
 
     def _improve(self) -> None:
-        """Take the faster backend if it is due."""
+        """Change to the next backend if it is due."""
         if self.budget.used >= self._due:
             self._due = next(self._later, math.inf)
 
     def _improving(self) -> Iterator[float]:
-        """Go on to what is faster; yields after how many evaluations to be asked again."""
+        """Make one faster backend after the other; yield the number of evaluations at which to continue."""
         yield RECORD_FROM * len(self.loop.plant.drivetrain.present)
         with suppress(NotImplementedError, CompilerError):
             recording = record(self.loop, self.boundaries)
-            with suppress(NotImplementedError):  # of loops
+            with suppress(NotImplementedError):  # raised for programs with loops
                 self._program = NumberProgram(recording.rates)
                 self._law = NumberProgram(recording.torques)
             begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
@@ -228,22 +229,22 @@ class RecordedEquations(Equations):
                     self._load(recording, code, numbers, lambda _code: True)
 
     def _seconds(self, recording: Recording) -> float:
-        """Return the seconds of an evaluation before there is compiled code."""
+        """Return the time of an evaluation without compiled code, s."""
         operations = len(recording.rates.program.operations)
         return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
 
     def _compiling(self) -> Iterator[float]:
-        """Yield the same for the engine "c"; that it cannot be had is an InputError."""
+        """Compile at once, for the engine "c"; yield like `_improving`. Failure raises an InputError."""
         yield 0.0
         with compiled_as_asked():
             recording = record(self.loop, self.boundaries)
             self._load(recording, *loop_code(recording), lambda _code: True)
 
     def _load(self, recording: Recording, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
-        """Load compiled code; compile it if that is worthwhile.
+        """Load compiled code; compile it if `worthwhile`.
 
         Raises:
-            CompilerError: it cannot be had.
+            CompilerError: the code cannot be compiled or loaded.
         """
         compiler = system_compiler()
         loaded = load(code, open_loop, compiler, self._computing.tell, worthwhile)
@@ -254,9 +255,9 @@ class RecordedEquations(Equations):
 def _finite(
     function: Callable[[float, FloatArray], FloatArray] | None, time: float, vectors: FloatArray
 ) -> FloatArray | None:
-    """Return the values of a function at states; None without it, or if a number is not finite."""
+    """Return the values of a function at states; None without a function, or if a value is not finite."""
     if function is not None:
-        with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
+        with suppress(ArithmeticError, ValueError):  # Python raises these where NumPy returns NaN or infinity
             found = function(time, vectors)
             if math.isfinite(found.sum()):
                 return found

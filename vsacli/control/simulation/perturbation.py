@@ -1,4 +1,4 @@
-"""Runs with a controller's model that differs from the robot, as an identified one does."""
+"""Runs whose controller has a model that differs from the robot, as an identified model does."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
-    """Return the robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
+    """Return the robot with a random relative error of every dynamic parameter.
 
-    Masses, centres of mass, inertia tensors, dampings, dry friction, motor inertias and the constants of
-    springs and mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a
-    whole, so that it remains one of a body. Geometry, gravity, limits and measured tables stay as they are.
+    Masses, centers of mass, inertia tensors, dampings, dry friction, motor inertias and the constants of
+    springs and mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]. A tensor is scaled
+    as a whole, so that it remains possible. Geometry, gravity, limits and measured tables are unchanged.
 
     Args:
-        robot: the true one.
-        relative: largest relative error, from 0 to below 1.
-        seed: of the random numbers, so that a run can be repeated.
+        robot: true robot.
+        relative: largest relative error, from 0 to below 1; 0 returns the robot itself.
+        seed: seed of the random numbers, so that a run can be repeated.
 
     Raises:
-        InputError: the error is not in that range, or a spring cannot have the constant it leads to.
+        InputError: the error is not in that range, or an actuator cannot have a constant that results.
     """
     if not 0 <= relative < 1:
         raise InputError.one(f"the relative error of the model must lie between 0 and 1, not {relative:g}")
@@ -49,7 +49,7 @@ def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
 
 
 class _Wrong:
-    """Draws the errors, in the order of the joints."""
+    """A generator of robots with random errors, drawn in the order of the joints."""
 
     def __init__(self, relative: float, random: np.random.Generator) -> None:
         self._relative = relative
@@ -81,7 +81,10 @@ class _Wrong:
         return replace(inertia, **{name: factor * getattr(inertia, name) for name in declared(Inertia)})
 
     def _record(self, record: Any) -> Any:
-        """Motors, springs, mechanisms and numbers but for limits, in the order in which they are declared."""
+        """Return a record with errors in its motors, springs, mechanisms and numbers, except limits.
+
+        Errors are drawn in the order in which fields are declared.
+        """
         wrong = {
             name: self._value(field.kind, getattr(record, name))
             for name, (field, _) in declared(type(record)).items()
@@ -114,7 +117,7 @@ class _Wrong:
         )
 
     def _friction(self, friction: Friction | None) -> Friction | None:
-        """Both directions by one factor, since those between links are equal; the width stays."""
+        """Return friction with one factor for both directions, which must stay equal between links."""
         if friction is None:
             return None
         factor = self._number(1.0)
@@ -132,26 +135,26 @@ def simulate_perturbed(
     processes: int = 1,
     **conditions: Any,
 ) -> Iterator[SimulationReport]:
-    """Reports on the run of a robot whose controller has a wrong model, for one error after the other.
+    """Simulate a robot whose controller has a wrong model, once for each seed; yield the reports.
 
-    The models differ in numbers alone, so that what is compiled for the first run serves all.
+    The models differ only in parameters, so that code compiled for the first run serves all.
 
     Args:
-        robot: the robot as it is.
-        trajectory: the commanded motion.
+        robot: true robot.
+        trajectory: commanded motion.
         relative: largest relative error of a parameter of the model; see `perturbed`.
-        seeds: of the errors, one a run.
-        processes: how many compute; a second for each to start is repaid by some ten runs. A script that asks
-            for more than one calls this below `if __name__ == "__main__":`.
-        conditions: further arguments of `simulate`, but for `model`.
+        seeds: seeds of the errors, one per run.
+        processes: number of worker processes. Each takes a second to start, which about ten runs repay. A
+            script with more than one must call this below `if __name__ == "__main__":`.
+        conditions: further arguments of `simulate`, except `model`.
 
     Raises:
-        InputError: as of `simulate` and `perturbed`, or there are less than one process.
+        InputError: see `simulate` and `perturbed`; or `processes` is below 1.
     """
     if processes < 1:
         raise InputError.one(f"there must be at least 1 process, not {processes}")
     report = partial(_report, robot, trajectory, relative, {"runs": len(seeds), **conditions})
-    yield from map(report, seeds[:1])  # alone, as it may have to compile
+    yield from map(report, seeds[:1])  # alone, since it may have to compile the code that the others use
     if processes == 1:
         yield from map(report, seeds[1:])
         return

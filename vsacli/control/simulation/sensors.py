@@ -1,4 +1,4 @@
-"""Sensors of positions and motor torques: their noise, and the steps of encoders."""
+"""Sensors of positions and motor torques: their noise, and the quantization of encoders."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 MOST_BITS = 48
-"""Beyond, the steps of an encoder come near to what double precision tells apart."""
+"""Most bits of an encoder; with more, its steps come near the resolution of double precision."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class Sensors:
     Attributes:
         position: standard deviation of the positions of joints and motors, joint side of the gear, rad (m).
         torque: standard deviation of the motor torques, joint side of the gear, N m (N).
-        encoder_bits: encoders have two to that power of steps in a turn, at the joint and on the shaft of
-            each motor whose gear ratio is known; where nothing turns, in the range of the joint's position.
-            None if they do not round.
-        seed: of the noise.
+        encoder_bits: bits of encoders, which have 2**bits steps per turn, at the joint and on the shaft of
+            each motor whose gear ratio is known; in the position limits of a prismatic joint otherwise. None
+            for encoders that do not round.
+        seed: seed of the noise.
 
     Raises:
-        InputError: a deviation that is negative or not finite, bits or a seed out of range.
+        InputError: a deviation is negative or not finite, or bits or seed are out of range.
     """
 
     position: float = 0.0
@@ -53,16 +53,16 @@ class Sensors:
 class Readings:
     """The readings of the sensors of a robot at each sample of a run.
 
-    The noise is drawn once: a controller that samples positions knows the numbers that are recorded.
+    The noise is drawn once, so that a controller that samples positions knows exactly the recorded values.
 
     Args:
-        sensors: their accuracy.
-        robot: where they are.
-        drivetrain: its motors and springs.
-        samples: that a run has at most.
+        sensors: accuracy of the sensors.
+        robot: robot that has them.
+        drivetrain: motors and springs of the robot.
+        samples: largest number of samples of a run.
 
     Raises:
-        InputError: encoders of a prismatic joint without position limits.
+        InputError: an encoder is at a prismatic joint without position limits.
     """
 
     def __init__(self, sensors: Sensors, robot: Robot, drivetrain: Drivetrain, samples: int) -> None:
@@ -83,7 +83,7 @@ class Readings:
             ]
 
     def positions(self, truth: Phase, rows: int | slice) -> tuple[FloatArray, FloatArray]:
-        """Return readings of joints (..., joints) and of all motors (..., motors) at these samples."""
+        """Return readings of joints, (..., joints), and of all motors, (..., motors), at samples `rows`."""
         theta = self._drivetrain.of_all(truth.q, truth.theta)
         return (
             _rounded(truth.q + self._q[rows], self._q_step),
@@ -96,7 +96,7 @@ class Readings:
         return truth._replace(q=q, theta=theta[self._drivetrain.sprung])
 
     def variables(self, truth: Phase, torque: FloatArray) -> dict[str, FloatArray]:
-        """Return all that is read along a run, from its states and the motor torques (samples, motors)."""
+        """Return the readings along a run by name, from its states and motor torques, (samples, motors)."""
         rows = slice(len(torque))
         q, theta = self.positions(truth, rows)
         of_joints = self._drivetrain.of_joints
@@ -107,7 +107,8 @@ class Readings:
 def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
     """Return the range that an encoder divides into steps, joint side of the gear, rad (m).
 
-    That is a turn of a joint, or of the shaft of a motor whose gear ratio is known.
+    It is a turn of a revolute joint, or of the shaft of a motor whose gear ratio is known, or the position
+    limits of a prismatic joint.
     """
     if gear_ratio is not None:
         return 2 * math.pi / abs(gear_ratio)

@@ -1,4 +1,7 @@
-"""Simulation of a robot that is to follow a trajectory, from the state in which it starts."""
+"""Simulation of a robot under a controller along a trajectory, from the initial state to the report.
+
+`simulate` integrates the full model (5) from a state of the inverse dynamics, with an optional initial error.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +42,11 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class InitialError:
-    """The difference of the initial state from the command, for all joints or for each.
+    """Difference of the initial state from the command, one value for all joints or one for each.
 
     Attributes:
-        q: of the position, rad (m).
-        stiffness: of the joint stiffness, N m/rad (N/m).
+        q: error of the position, rad (m).
+        stiffness: error of the joint stiffness, N m/rad (N/m).
     """
 
     q: npt.ArrayLike = 0.0
@@ -51,17 +54,17 @@ class InitialError:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the start is as commanded."""
+        """Whether the initial state is as commanded."""
         return not (np.any(self.q) or np.any(self.stiffness))
 
 
 def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> State:
-    """State at the first step: of the inverse dynamics, with position and stiffness off by the error.
+    """Return the initial state by inverse dynamics, with position and stiffness off by the error.
 
     All derivatives of both are as commanded.
 
     Raises:
-        InputError: the error has another length than the robot has joints, or the state cannot be had.
+        InputError: the error has a wrong length, or the state is infeasible or singular.
     """
     motion = trajectory.at(np.array(trajectory.times.span[:1]))
     joints = len(robot.joints)
@@ -93,7 +96,7 @@ Measured = Literal["state", "positions"]
 
 @dataclass(frozen=True, repr=False)
 class Simulation:
-    """A simulation: variables, report, and how it was computed: `engine`, `compiler`, `threads`."""
+    """A simulation: variables, report, and the backend that computed it: `engine`, `compiler`, `threads`."""
 
     history: History
     report: SimulationReport
@@ -104,7 +107,7 @@ class Simulation:
 
 
 PEAK_SAMPLES = 100
-"""Samples at which the largest torque of a motion is sought: an order of magnitude is wanted."""
+"""Samples that estimate the largest torque of a motion; an order of magnitude is enough."""
 
 _AMPLIFIED = (
     "model and start are exact, so what strayed are the errors of the integration, which this motion "
@@ -132,32 +135,32 @@ def simulate(
     """Integrate the full model (5) of a robot under a controller.
 
     Args:
-        robot: the robot as it is.
-        trajectory: the commanded motion; its wrench acts on the robot, and the controller knows it.
-        gains: of feedback linearization; None applies the torques of the inverse dynamics (feedforward).
-        model: the robot as the controller knows it, e.g. by `perturbed`; the robot itself if None.
-        initial_error: by how much the start differs from the command.
-        measured: what the controller knows: the full "state" at every instant, or the "positions" of joints
-            and motors at the steps of the trajectory, between which it holds its torques.
-        sensors: how well positions and torques are measured; None records no measurements, and the positions
-            that a controller measures are exact.
-        goal_tolerance: how far off the joints may be at the end of the run.
-        tolerances: of the integration.
-        budget: after how many evaluations of the equations of motion a run ends, incomplete; by default
-            200,000, or 100 for each step of the trajectory where that is more.
-        progress: called with the time reached, s.
-        engine: what evaluates the equations of motion: "numpy", "c", or "auto", which compiles them
-            where that saves time.
-        runs: how many such runs there will be, of robots that differ in numbers at most: what is compiled
-            serves them all, so it is worth it sooner.
-        tell: receives problems with compiled code, and announcements of long work.
+        robot: true robot.
+        trajectory: commanded motion; its wrench acts on the robot, and the controller knows it.
+        gains: gains of feedback linearization; None for feedforward of the inverse dynamics' torques.
+        model: robot as the controller knows it, e.g. from `perturbed`; None for the true robot.
+        initial_error: difference of the initial state from the command.
+        measured: measurement of the controller: the full "state" at every instant, or the "positions" of
+            joints and motors at the samples of the trajectory, between which it holds its torques.
+        sensors: accuracy of measured positions and torques. None records no measurements, and a controller
+            that measures positions has exact ones.
+        goal_tolerance: largest position error of the joints at the end of the run.
+        tolerances: tolerances of the integration.
+        budget: number of evaluations of the equations of motion after which a run ends, incomplete; by
+            default 200,000, or 100 per sample of the trajectory if that is more.
+        progress: function called with the time reached, s.
+        engine: backend of the equations of motion: "numpy", "c", or "auto", which compiles if that saves
+            time.
+        runs: number of runs planned, of robots that differ only in parameters; they share the compiled code,
+            so compiling pays off sooner.
+        tell: function called with problems of compiled code, and announcements of long work.
 
     Raises:
-        InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions
-            without gains, gains that do not fit, feedback linearization of a robot that mixes rigid joints
-            with others, a mass matrix that is not positive definite, springs so stiff or poles so fast that
-            double precision does not resolve them, a budget below 1, encoders of a joint that slides any far,
-            an engine that there is not, or that cannot compute this.
+        InputError: the trajectory is not for the robot; the initial state does not exist; positions are
+            measured without gains; gains do not fit; a robot under feedback linearization mixes rigid joints
+            with others; the mass matrix is not positive definite; double precision does not resolve very
+            stiff springs or fast poles; the budget is below 1; an encoder is at a prismatic joint without
+            limits; the engine is unknown, or cannot compute the run.
         TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
@@ -198,14 +201,14 @@ def _report(
     """Return the report on a run.
 
     Args:
-        robot: as of `simulate`.
-        trajectory: as above.
-        gains: as above.
-        past: the history.
-        integrated: how it was integrated.
-        goal_tolerance: as of `simulate`.
-        exact: whether model and start were.
-        full: the report on the same run with the full state measured, if positions were.
+        robot: see `simulate`.
+        trajectory: see `simulate`.
+        gains: see `simulate`.
+        past: variables of the run.
+        integrated: integrated states, with the effort and end of the integration.
+        goal_tolerance: see `simulate`.
+        exact: whether the controller has the exact model, and the initial state is as commanded.
+        full: report on the same run with the full state measured; None unless positions are measured.
     """
     joints = joint_trackings(robot, past, goal_tolerance)
     effort, ending = integrated.effort, integrated.ending
@@ -235,10 +238,10 @@ def _report(
 
 
 def check_measured(measured: Measured, gains: Gains | None) -> None:
-    """Refuse measurements that no controller uses.
+    """Raise an error for measurements that the controller cannot use.
 
     Raises:
-        InputError: there is no such word, or positions are measured, but there is no feedback.
+        InputError: the measurement is unknown, or positions are measured without feedback.
     """
     if measured not in (words := get_args(Measured)):
         raise InputError.one(f"unknown measurement {measured!r}{did_you_mean(measured, words)}")
@@ -249,7 +252,7 @@ def check_measured(measured: Measured, gains: Gains | None) -> None:
 
 
 def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
-    """Yield the joints whose command a recorded motion does not determine, which makes a run unreliable."""
+    """Yield warnings about joints whose command a recorded motion leaves undetermined: unreliable runs."""
     if trajectory.estimates:
         run = Run(robot, trajectory)
         deque(run, maxlen=0)
@@ -268,7 +271,7 @@ def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gain
 
 
 def _peak_torque(robot: Robot, trajectory: Trajectory) -> float:
-    """Return the largest torque of a motor along a trajectory, of `PEAK_SAMPLES` samples, N m (N)."""
+    """Return the largest motor torque at `PEAK_SAMPLES` samples of a trajectory, N m (N)."""
     motion = trajectory.at(np.linspace(*trajectory.times.span, PEAK_SAMPLES))
     return float(np.nanmax(np.abs(compute_block(robot, motion).tau_motor)))
 
@@ -285,7 +288,7 @@ def _integrate(
     progress: Progress,
     computing: Computing,
 ) -> StateTrajectory:
-    """Integrate as far as the controller has torques and the springs obey their laws."""
+    """Integrate as far as the controller's torques are defined, and the springs are within their laws."""
     last = loop.controller.ending
     times = trajectory.times.block(0, trajectory.samples)
     if last is not None and last.time <= times[0]:

@@ -1,4 +1,4 @@
-"""The verdict on a simulation: one object, rendered as text and as JSON, and stored in the file."""
+"""The report on a simulation: verdict, errors and effort, as an object, text and JSON, stored in the file."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Fl
 def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
     """Return the worst of `VERDICTS` that applies.
 
-    A flag of any step speaks for its own, joints off course where the run was to end for "strayed", and
-    an early end that no flag explains for itself.
+    A flag at any sample implies its own verdict. A complete run with joints off target is "strayed". An early
+    end without a flag has its own verdict.
     """
     flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
@@ -53,10 +53,10 @@ class LargestError(Published):
     """The largest error of q relative to the tolerance of its joint at the end.
 
     Attributes:
-        joint: its name.
-        value: |error|, rad (m).
-        unit: of it.
-        time: when, s.
+        joint: name of the joint.
+        value: magnitude of the error, rad (m).
+        unit: unit of the error.
+        time: time of the error, s.
     """
 
     joint: str
@@ -67,24 +67,24 @@ class LargestError(Published):
 
 @dataclass(frozen=True)
 class SimulationReport(Stored):
-    """The verdict on a simulation.
+    """The report on a simulation.
 
     Attributes:
         robot: name of the robot.
         trajectory: name of the trajectory.
-        controller: in words, as typed.
-        samples: steps stored.
-        duration: time from the first to the last step of the trajectory, s.
-        verdict: the worst of `VERDICTS` that applies; see `verdict_on`.
-        ending: why it ended early, as a sentence; None if it did not.
-        evaluations: of the equations of motion.
-        budget: how many there might have been; 0 in reports written before there was one.
-        methods: of integration, each from its time on; none in such reports.
-        warnings: doubts about the inputs.
-        notes: how they were understood, where that is not obvious.
-        joints: one report a joint.
+        controller: controller, as named on the command line.
+        samples: number of samples stored.
+        duration: time from the first to the last sample of the trajectory, s.
+        verdict: worst of `VERDICTS` that applies; see `verdict_on`.
+        ending: sentence on an early end; None for a complete run.
+        evaluations: evaluations of the equations of motion.
+        budget: largest number of evaluations; 0 in reports of versions without it.
+        methods: methods of integration, each from its time on; empty in such reports.
+        warnings: warnings about inputs and results.
+        notes: notes on the interpretation of the inputs, where that is not obvious.
+        joints: findings of each joint.
         with_full_state: deviation of q of each joint in the same run when the controller knows the full state
-            at every instant; empty unless positions alone are measured.
+            at every instant; empty unless only positions are measured.
     """
 
     robot: str
@@ -118,14 +118,14 @@ class SimulationReport(Stored):
 
     @property
     def largest_error(self) -> LargestError | None:
-        """The largest error of q on the way; None without a goal tolerance."""
+        """Largest error of q during the run; None without a goal tolerance."""
         if any(math.isnan(joint.tolerance) for joint in self.joints):
             return None
         worst = max(self.joints, key=lambda joint: joint.q.peak / max(joint.tolerance, sys.float_info.min))
         return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
 
     def as_text(self) -> ReportText:
-        """Return the report in its parts, as people read it."""
+        """Return the parts of the printed report."""
         lines = [
             *warnings_and_notes(self.warnings, self.notes),
             *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
@@ -150,7 +150,7 @@ class SimulationReport(Stored):
         return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
 
     def _loss(self) -> Iterator[str]:
-        """Yield the loss of accuracy by sensors of positions."""
+        """Yield sentences on the errors with the full state, for comparison with measured positions."""
         for joint, ideal in zip(self.joints, self.with_full_state, strict=False):
             unit = POSITION.unit(joint.type)
             yield (
@@ -159,7 +159,6 @@ class SimulationReport(Stored):
             )
 
     def _effort(self) -> Iterator[str]:
-        """Yield the method and effort of the integration."""
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)

@@ -1,4 +1,4 @@
-"""Sticking and sliding of motors with sharp friction: where its direction changes in a run."""
+"""Stick and slip of motors with sharp friction: events at which a motor stops, or breaks loose."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.control.simulation.closed_loop import ClosedLoop
 
 LONGEST_HELD = 0.01
-"""s; the longest step while a motor is held, and so how long it may break loose unnoticed, to be held again:
-what holds it changes without anything that moves, by which the integration chooses its steps."""
+"""Longest step while a motor is held, s, and so the longest time for which it may break loose unnoticed. The
+integration chooses its steps by the state, but holding friction changes while nothing moves."""
 
 
 class Switch:
-    """A motor that stops, or that its friction cannot hold any longer: an event of `solve_ivp`."""
+    """An event of `solve_ivp`: a motor stops, or its friction can no longer hold it."""
 
     terminal = True
     direction = -1.0
@@ -25,26 +25,27 @@ class Switch:
         self._sliding, self._motor = sliding, motor
 
     def __call__(self, time: float, vector: FloatArray) -> float:
-        """Velocity of the slide, or friction that is left to hold the motor; zero where it switches."""
+        """Return the sliding velocity, or the reserve of friction that holds the motor; zero at the event."""
         return float(self._sliding.distances(time, vector)[self._motor])
 
     def passed(self, time: float, vector: FloatArray) -> FloatArray:
-        """Return the state in which the run goes on."""
+        """Return the state after the event."""
         return self._sliding.switched(time, vector, self._motor)
 
 
 class StickSlip:
-    """Keeps `slip` of a closed loop: from one switch to the next its equations of motion are smooth.
+    """Stick and slip of the motors of a closed loop, whose `slip` it updates.
 
-    A motor slides one way until its velocity is zero. There it is held until that takes more than its
-    friction, which may be at once: then it slides, back or on.
+    Between two switches the equations of motion are smooth. A motor slides in one direction until its
+    velocity is zero. It is then held until the torque to hold it exceeds its friction, possibly at once; then
+    it slides again, in either direction.
 
     Args:
-        loop: the robot under its controller.
+        loop: robot under its controller.
         laws: friction of its motors.
 
     Attributes:
-        switches: one for each motor with sharp friction.
+        switches: events, one for each motor with sharp friction.
     """
 
     def __init__(self, loop: ClosedLoop, laws: FrictionLaws) -> None:
@@ -55,11 +56,11 @@ class StickSlip:
 
     @property
     def longest_step(self) -> float:
-        """Longest step in which no switch is missed, s."""
+        """Longest step of the integration, s; see `LONGEST_HELD`."""
         return LONGEST_HELD if np.any(self._slip == 0) else math.inf
 
     def start(self, time: float, vector: FloatArray) -> FloatArray:
-        """Begin in a state; returns it with the motors that rest at no velocity at all."""
+        """Initialize the directions in a state; return it with exactly zero velocity of motors at rest."""
         direction = direction_of(vector[self._velocity])
         self._loop.slip = np.where(self._laws.sharp, direction, np.nan)
         self.settle(time, vector)
@@ -78,7 +79,7 @@ class StickSlip:
     def distances(self, time: float, vector: FloatArray) -> FloatArray:
         """Return for each motor, (motors,), a distance that falls to zero at its next switch.
 
-        All switches ask for it in the same state, one after the other.
+        The last result is kept, since all switches need it in the same state, one after the other.
         """
         slip = self._slip
         if self._known is not None:
@@ -105,7 +106,7 @@ class StickSlip:
         return stopped
 
     def settle(self, time: float, vector: FloatArray) -> None:
-        """Let those motors slide, one after the other, that friction cannot hold under the torques of now."""
+        """Release held motors, one after the other, that friction cannot hold under the present torques."""
         while True:
             beyond = self._laws.beyond(self._friction(time, vector)) * (self._slip == 0)
             if not beyond.any():
@@ -126,6 +127,6 @@ class StickSlip:
 
 
 def sliding(loop: ClosedLoop) -> StickSlip | None:
-    """Return the friction of a robot with sharp laws; None if it has none."""
+    """Return the stick and slip of a robot; None if no motor has sharp friction."""
     laws = loop.plant.drivetrain.friction
     return None if laws is None or not laws.sharp.any() else StickSlip(loop, laws)

@@ -1,4 +1,4 @@
-"""Stiff equations of motion: their Jacobian, and whether double precision resolves them."""
+"""Stiff equations of motion: their Jacobian, and checks whether double precision resolves them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from vsacli.robot.model import Robot
 
 _EPSILON = float(np.finfo(np.float64).eps)
 _RELATIVE_STEP = math.sqrt(_EPSILON)
-"""Step of forward differences, where truncation and rounding are equal."""
+"""Step of forward differences, relative to an entry, at which truncation and rounding are equal."""
 
 
 def jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArray:
-    """Derivative of a function of time and state by the state, (values, entries), by forward differences.
+    """Return the Jacobian of a function with respect to the state, (values, entries), by forward differences.
 
-    Where a difference steps over the end of a spring's law the entry is zero: Newton's iteration becomes
-    slower by that, and not wrong.
+    An entry is zero if its difference leaves the range of a spring's law: Newton's iteration becomes slower,
+    not wrong.
     """
     steps = _RELATIVE_STEP * np.maximum(np.abs(vector), 1.0)
     rows = function(time, np.vstack((vector, vector + np.diag(steps))))
@@ -31,41 +31,41 @@ def jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArra
 
 
 def rounding(matrix: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return the effect of a rounded state on a function, (values,), from its Jacobian (values, entries)."""
+    """Return the effect of a rounded state on a function, (values,), by its Jacobian, (values, entries)."""
     changes: FloatArray = _EPSILON * (np.abs(matrix) @ np.maximum(np.abs(vector), 1.0))
     return changes
 
 
 def resolved(matrix: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:
-    """Smallest absolute tolerances (entries,) that rounding allows an implicit method with such a Jacobian.
+    """Return the smallest absolute tolerances, (entries,), that rounding allows with an implicit method.
 
-    Rounding makes rates of the fastest mode uncertain, and the mode forgets within 1/|lambda|. Newton's
-    iteration stops at a share of sqrt(rtol) of the tolerance (`Radau` of SciPy), which must not lie below.
+    Rounding makes the rates of the fastest mode uncertain, and this mode decays within 1/|lambda|. Newton's
+    iteration in SciPy's `Radau` stops at a share of sqrt(rtol) of the tolerance, which must exceed rounding.
     """
     fastest = float(np.abs(np.linalg.eigvals(matrix)).max(initial=1.0))
     return rounding(matrix, vector) / (fastest * math.sqrt(rtol))
 
 
 LARGEST_SHARE = 1e-4
-"""Share of the largest torque of the motion by which rounding may change torques. With 4e-6, a spring of
-1e12 N m/rad, a simulation is as exact as ever, with 4e-4, one of 1e14, its steps follow the rounding."""
+"""Share of the largest torque of the motion by which rounding may change torques. At 4e-6, with a spring of
+1e12 N m/rad, a simulation is as accurate as others; at 4e-4, with 1e14 N m/rad, steps follow rounding."""
 
 SMALLEST_TORQUE = 1e-3
-"""N m (N): a change below is harmless even where the motion takes no torque at all."""
+"""Change of torques, N m (N), that is harmless even if the motion requires no torque at all."""
 
 
 def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: float, peak: float) -> None:
-    """Refuse springs so stiff, or poles so fast, that torques follow the rounding of the state.
+    """Raise an error for springs so stiff, or poles so fast, that torques follow the rounding of the state.
 
     Args:
-        robot: the robot.
-        loop: it, under its controller.
-        start: its first state vector.
-        time: of that, s.
-        peak: the largest torque of a motor that the motion takes, N m (N).
+        robot: robot.
+        loop: robot under its controller.
+        start: initial state vector.
+        time: initial time, s.
+        peak: largest motor torque that the motion requires, N m (N).
 
     Raises:
-        InputError: torques do, at the joint where it is worst; it says what would help.
+        InputError: torques follow the rounding; names the worst joint, and a fix.
     """
 
     def of_springs(_time: float, vectors: FloatArray) -> FloatArray:

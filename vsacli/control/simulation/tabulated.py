@@ -1,6 +1,7 @@
-"""Functions of time that are costly at one instant, as piecewise polynomials through blocks of samples.
+"""Functions of time as piecewise polynomials, since evaluating them at one instant at a time is slow.
 
-A `Table` is what a recorded program reads as inputs, a `Reference` the trajectory that a controller follows.
+`tabulate` interpolates at Chebyshev nodes, and halves cells until the error is small. A `Table` is an input
+of recorded programs; a `Reference` is the tabulated trajectory that a controller follows.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class Table:
-    """Columns as piecewise polynomials of time; called with an `Instant`, it is an input of a program.
+    """Columns as piecewise polynomials of time; called with an `Instant`, they become inputs of a program.
 
     Attributes:
-        ends: of the cells, (cells + 1,), s.
-        coefficients: of powers of the time elapsed in the cell, highest first, (cells, powers, columns).
+        ends: ends of the cells, (cells + 1,), s.
+        coefficients: coefficients of powers of the time in the cell, highest first, (cells, powers, columns).
     """
 
     def __init__(self, ends: FloatArray, coefficients: FloatArray) -> None:
@@ -46,13 +47,13 @@ class Table:
 
     @cached_property
     def polynomial(self) -> PPoly[Any]:
-        """The same as SciPy has it."""
+        """The table as a polynomial of SciPy."""
         from scipy.interpolate import PPoly
 
         return PPoly(np.moveaxis(self.coefficients, 1, 0), self.ends)
 
     def __call__(self, time: Any) -> FloatArray:
-        """Columns at a time, (columns,), or at times (samples,), (samples, columns)."""
+        """Return the columns at a time, (columns,), or at times, (samples, columns)."""
         return time.columns_of(self) if isinstance(time, Instant) else self._at(time)
 
     def _at(self, time: float | FloatArray) -> FloatArray:
@@ -65,7 +66,7 @@ class Table:
 
 
 class Constant(Table):
-    """Columns that stay as they are until they are set; (columns,) whatever the time."""
+    """Columns that do not depend on time, (columns,), until they are set again."""
 
     def __init__(self, values: FloatArray) -> None:
         super().__init__(np.array([0.0, 1.0]), values[None, None].copy())
@@ -80,13 +81,13 @@ class Constant(Table):
 
 
 class Instant:
-    """The time of a program: what tables have then are inputs of it.
+    """The time of a program in recording, at which the columns of tables become inputs of the program.
 
     Args:
-        inputs: makes this many further inputs, as an array.
+        inputs: function that returns a number of further inputs as an array.
 
     Attributes:
-        tables: those that were read, in the order of their inputs.
+        tables: tables that were read, in the order of their inputs, with these inputs.
     """
 
     def __init__(self, inputs: Callable[[int], FloatArray]) -> None:
@@ -94,7 +95,7 @@ class Instant:
         self.tables: dict[Table, FloatArray] = {}
 
     def columns_of(self, table: Table) -> FloatArray:
-        """Return the values of a table at this time."""
+        """Return the inputs for the columns of a table."""
         if table not in self.tables:
             self.tables[table] = self._inputs(table.columns)
         return self.tables[table]
@@ -105,35 +106,36 @@ if TYPE_CHECKING:
 
 DEGREE = 7
 FIRST_CELLS = 32
-"""Cells that the span is divided into at first; those that the polynomial does not fit are halved."""
+"""Initial number of cells of the span; cells with a poor fit are halved."""
 
 TOLERANCE = 1e-12
-"""Error, relative to the largest value of its column, with which a cell fits: some hundred times rounding."""
+"""Largest error of a cell, relative to the largest value of its column: some hundred times rounding."""
 
 GAIN = 4.0
-"""Factor by which halving must lower the error to be worth another one: 256 where the function is smooth,
-nothing where the error is noise of the function itself."""
+"""Factor by which halving must lower the error for another halving. It is 256 where the function is smooth,
+and about 1 where the error is noise of the function itself."""
 
 HALVINGS = 10
-"""Bisections to the end of a function, to a thousandth of a first cell."""
+"""Most halvings, which locate the end of a function to a thousandth of an initial cell."""
 
 _NODES = (1 - np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))) / 2
-"""Chebyshev's, in shares of a cell."""
+"""Chebyshev nodes, as shares of a cell."""
 
 _PROBES = np.array([0.002, 0.5, 0.998])
-"""Points at which a polynomial through these nodes errs most."""
+"""Points, as shares of a cell, at which a polynomial through these nodes has its largest errors."""
 
 _TO_POWERS = np.linalg.inv(np.vander(_NODES))
-"""Values at the nodes to coefficients of powers, the highest first."""
+"""Matrix from values at the nodes to coefficients of powers, highest power first."""
 
 _TO_PROBES = np.vander(_PROBES, DEGREE + 1) @ _TO_POWERS
 
 
 def tabulate(function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> PPoly[Any]:
-    """Return a piecewise polynomial that stands for a function of time, to about `TOLERANCE`.
+    """Return a piecewise polynomial that approximates a function of time to about `TOLERANCE`.
 
     Args:
-        function: values (samples, columns) at times (samples,); analytic between breakpoints, or NaN.
+        function: function that returns values, (samples, columns), at times, (samples,), s; analytic between
+            breakpoints, or NaN.
         breakpoints: ascending times, s; the first and last are the span.
     """
     from scipy.interpolate import PPoly
@@ -159,7 +161,7 @@ def tabulate(function: Callable[[FloatArray], FloatArray], breakpoints: FloatArr
 
 
 def first_undefined(table: PPoly[Any]) -> tuple[float, int] | None:
-    """Start of the first cell in which a column is NaN, s, and the column; None if there is none."""
+    """Return the start of the first cell in which a column is NaN, s, and this column; None without one."""
     undefined = np.isnan(table.c).any(axis=0)
     cell = int(undefined.any(axis=1).argmax())
     return (float(table.x[cell]), int(undefined[cell].argmax())) if undefined.any() else None
@@ -168,16 +170,16 @@ def first_undefined(table: PPoly[Any]) -> tuple[float, int] | None:
 def _sampled(
     function: Callable[[FloatArray], FloatArray], starts: FloatArray, lengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Values at the nodes and at the probes of each cell, (cells, nodes, columns)."""
+    """Return values at the nodes and at the probes of each cell, (cells, nodes, columns)."""
     times = starts[:, None] + lengths[:, None] * np.concatenate((_NODES, _PROBES))
     values = function(times.ravel()).reshape(*times.shape, -1)
     return values[:, : len(_NODES)], values[:, len(_NODES) :]
 
 
 def _misfit(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -> FloatArray:
-    """Largest error of the polynomial in each cell, relative to the peak of its column, (cells,).
+    """Return the largest error of the polynomial in each cell, relative to the peak of its column, (cells,).
 
-    Infinite where a column is NaN in a part of the cell only; a column that is NaN throughout does not count.
+    It is infinite if a column is NaN in only a part of the cell; a column that is NaN throughout is ignored.
     """
     values = np.concatenate((nodes, probes), axis=1)
     missing = np.isnan(values)
@@ -198,12 +200,12 @@ def _halved(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatA
 
 
 class Reference:
-    """Commands of a trajectory and the wrench, as functions of time.
+    """Commands of a trajectory and its wrench, as tabulated functions of time.
 
-    A time gives arrays (joints,), times (samples,) give arrays (samples, joints).
+    Arrays are (joints,) at one time, and (samples, joints) at times (samples,).
 
     Attributes:
-        frame: of the wrench, None if there is none.
+        frame: frame of the wrench; None without one.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:
@@ -215,22 +217,22 @@ class Reference:
         self._damping = _tabulated(trajectory, DAMPING.names) if damped else None
 
     def __call__(self, time: float | FloatArray) -> Motion:
-        """Motion, stiffness and wrench."""
+        """Return motion, commanded signals and wrench."""
         return Motion.of(np.asarray(time), self._commands(time), self.wrench(time))
 
     def damping(self, time: float | FloatArray) -> dict[str, FloatArray]:
-        """Return the damping with its derivatives, by name; nothing if none is commanded."""
+        """Return the commanded damping and its derivatives by name; empty if none is commanded."""
         return {} if self._damping is None else self._damping(time)
 
     def wrench(self, time: float | FloatArray) -> Wrench | None:
-        """Return the wrench alone."""
+        """Return the wrench; None without one."""
         return None if self._wrench is None else Wrench(**self._wrench(time), frame=self.frame or "")
 
 
 def _tabulated(
     trajectory: Trajectory, names: Sequence[str]
 ) -> Callable[[float | FloatArray], dict[str, FloatArray]]:
-    """Variables of the motion by name, as functions of time."""
+    """Return a function of time that gives variables of the motion by name."""
 
     def columns(time: FloatArray) -> FloatArray:
         variables = trajectory.at(time).variables()

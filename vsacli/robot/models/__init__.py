@@ -1,4 +1,4 @@
-"""The robot for other programs: its kinematics and bodies, and, where they know such, motors and springs."""
+"""Export of a robot to other programs: kinematics and bodies, and motors and springs where supported."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ FORMATS = LazyRegistry(
         "mjcf": "vsacli.robot.models.mjcf:mjcf_model",
     }
 )
-"""Formats by their names on a command line, each a function from a robot, and the `Start` of a
-motion or None, to an `ExportedModel`."""
+"""Formats by their names on the command line: functions from a robot, and the `Start` of a motion or None, to
+an `ExportedModel`."""

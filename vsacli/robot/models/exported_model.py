@@ -1,4 +1,4 @@
-"""Common parts of exported models: text and notes, XML, and shapes of the links."""
+"""Common parts of exported models: the result, writing of XML, and shapes of the links."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ Value: TypeAlias = str | bool | float | Iterable[float]
 
 
 def element(parent: Element, tag: str, /, **attributes: Value) -> Element:
-    """Return a new element in another one."""
+    """Add a new element to another one, and return it."""
     return add(ElementTree.SubElement(parent, tag), **attributes)
 
 
 def add(to: Element, /, **attributes: Value) -> Element:
-    """Return the element with attributes that are new or replaced."""
+    """Add or replace attributes of an element, and return it."""
     to.attrib.update({name: _text(value) for name, value in attributes.items()})
     return to
 
 
 def document(root: Element, comment: str) -> str:
-    """Return the file, indented, with a comment at its beginning."""
+    """Return the text of an XML file, indented, with a comment at its beginning."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {_harmless(comment)} -->\n{text}\n'
 
 
 def _text(value: Value) -> str:
-    """Numbers by the shortest text that reads back bit for bit; zero without a sign."""
+    """Return numbers as the shortest text that reads back bit for bit; zero without a sign."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool):
@@ -43,21 +43,21 @@ def _text(value: Value) -> str:
 
 
 def _harmless(comment: str) -> str:
-    """Without the two hyphens that would end it."""
+    """Return a comment without double hyphens, which would end it."""
     while "--" in comment:
         comment = comment.replace("--", "- -")
     return comment
 
 
 THICKNESS_SHARE = 0.07
-"""Radius of a rod as a share of the mean length of links."""
+"""Radius of a drawn rod as a share of the mean length of links."""
 
 WITHOUT_LENGTH = 0.5
-"""Length, m, of an arm all of whose origins are one."""
+"""Length, m, of an arm whose frame origins all coincide."""
 
 
 def arm_length(robot: Robot) -> float:
-    """Sum of the distances from origin to origin at q = 0, m."""
+    """Return the sum of the distances from origin to origin at q = 0, m."""
     return math.fsum(math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints) or WITHOUT_LENGTH
 
 
@@ -67,12 +67,12 @@ def rod_radius(robot: Robot) -> float:
 
 
 class ExportedModel(NamedTuple):
-    """A robot in the words of another program.
+    """A robot in the file format of another program.
 
     Attributes:
-        text: the model.
-        forces: text of a Python file with the forces that the model has no place for; None if there are none.
-        notes: what it leaves out, sentences.
+        text: text of the model file.
+        forces: text of a Python file with the forces that the format cannot express; None if there are none.
+        notes: sentences on parts that are left out.
     """
 
     text: str

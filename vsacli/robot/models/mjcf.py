@@ -1,8 +1,8 @@
-"""The robot as MJCF, the XML of MuJoCo: links with the motors and springs that move them.
+"""Export to MJCF, the XML format of MuJoCo: links with the motors and springs that move them.
 
-The frame of a body is the Denavit-Hartenberg frame of its link, so that centre of mass and inertia stand
-there as in the robot file. Nothing in the model acts that is not in the equations of motion: no contact, no
-enforced limit, no constraint.
+The frame of a body is the Denavit-Hartenberg frame of its link, so that center of mass and inertia have the
+same values as in the robot file. The model contains nothing that is not in the equations of motion: no
+contact, no enforced limit, no constraint.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ from vsacli.robot.models.mjcf_drives import (
 from vsacli.robot.models.passive_forces import check_friction, forces_text, forces_words
 
 LOWEST_VERSION = "3.7"
-"""Lowest version of MuJoCo: the first with springs whose torque is a polynomial; tried with 3.5, 3.6, 3.7
+"""Lowest version of MuJoCo: the first with springs whose torque is a polynomial. Tested with 3.5, 3.6, 3.7
 and 4.0."""
 
 TIME_STEP = 1e-3
-"""s. With torques that are known at each stage, the motion of the shipped 3R is 4e-13 rad off with it."""
+"""Time step, s; if torques are given at each stage, the motion of the bundled 3R is 4e-13 rad off with it."""
 
 SEEN = 2
-"""Size of what a viewer shows at first, as a multiple of the length of the arm."""
+"""Size of the initial view, as a multiple of the length of the arm."""
 
 LINK_COLOUR = (0.35, 0.45, 0.6, 1)
 
 
 def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
-    """Return the model, with a key frame if it is known where a motion starts.
+    """Return the model, with a key frame if the start of a motion is given.
 
     Raises:
-        InputError: MuJoCo takes no such link, or knows no such friction; or the start is none.
+        InputError: MuJoCo does not support a link or friction of the robot; or the start is undefined.
     """
     check_bodies(robot)
     check_friction(robot)
@@ -77,7 +77,7 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
 
 
 def _add_light(root: Element) -> None:
-    """A bright sky, against which a model is seen that has no ground."""
+    """Add a bright sky, against which a model without a ground is visible."""
     element(element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
     sky = element(element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384)
     add(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
@@ -94,7 +94,7 @@ def _placed(parent: Element, name: str, pose: Pose) -> Element:
 
 
 def _link(parent: Element, joint: Joint, radius: float) -> Element:
-    """Return the body of a link, where it is at q = 0, with its joint."""
+    """Add the body of a link at its pose at q = 0, with its joint, and return it."""
     dh, link = joint.dh, joint.link
     sa, ca = math.sin(dh.alpha), math.cos(dh.alpha)
     place = (dh.a * math.cos(dh.theta), dh.a * math.sin(dh.theta), dh.d)
@@ -117,7 +117,6 @@ def _link(parent: Element, joint: Joint, radius: float) -> Element:
 
 
 def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> None:
-    """A rod along the link, or a ball if it has no length."""
     if math.hypot(*origin) > radius:
         draw_rod(body, origin, radius, LINK_COLOUR)
     else:
@@ -125,13 +124,13 @@ def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> N
 
 
 def _row_quaternion(joint: Joint) -> tuple[float, ...]:
-    """Rz(theta) Rx(alpha)."""
+    """Return the quaternion of Rz(theta) Rx(alpha)."""
     (ct, st), (ca, sa) = (_half(angle) for angle in (joint.dh.theta, joint.dh.alpha))
     return (ct * ca, ct * sa, st * sa, st * ca)
 
 
 def _quaternion(pose: Pose) -> tuple[float, ...]:
-    """Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return the quaternion of Rz(yaw) Ry(pitch) Rx(roll)."""
     (cr, sr), (cp, sp), (cy, sy) = map(_half, pose.rpy)
     return (
         cy * cp * cr + sy * sp * sr,

@@ -1,4 +1,8 @@
-"""Bodies and drives in MJCF: links with their inertia, rotors, springs, levers, and where they start."""
+"""Bodies and drives in MJCF: inertia of links, rotors, springs, levers, dampers, and the start of a motion.
+
+Motors behind springs are bodies of their own. Springs and dampers are tendons whose length is a weighted sum
+of joint and motor positions; only the spring of a lever mechanism follows its geometry in space.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +23,19 @@ from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import Element, Value, add, element
 
 LEAST = 1e-14
-"""Mass, kg, and moment of inertia, kg m^2, that MuJoCo takes: ten times what it holds for nothing."""
+"""Smallest mass, kg, and moment of inertia, kg m^2, written: ten times what MuJoCo treats as zero."""
 
 ROUNDING = 1e-14
-"""Share of the largest moment that is added to all of them where the largest is the sum of both others, as of
-flat bodies: MuJoCo turns the tensor to its principal axes, where rounding may find it larger. By trial on two
-thousand flat bodies whose moments span six decades, 3e-15 does."""
+"""Share of the largest moment that is added to all moments if the largest equals the sum of the others, as
+for flat bodies: MuJoCo rotates the tensor to its principal axes, where rounding may make the largest one
+exceed the sum. In a test with two thousand flat bodies whose moments span six decades, 3e-15 was enough."""
 
 
 def check_bodies(robot: Robot) -> None:
-    """Refuse links that MuJoCo would.
+    """Raise an error for links that MuJoCo refuses.
 
     Raises:
-        InputError: for each link, what is wrong with it.
+        InputError: MuJoCo refuses links; names each with the reason.
     """
     reasons = [reason for joint in robot.joints for reason in _reasons(joint)]
     if reasons:
@@ -39,7 +43,7 @@ def check_bodies(robot: Robot) -> None:
 
 
 def file_of(robot: Robot) -> str:
-    """Return the file that a robot was read from, empty if there is none."""
+    """Return the path of the file that a robot was read from; empty without one."""
     return next((source.path for source in robot.sources), "")
 
 
@@ -58,7 +62,7 @@ def _reasons(joint: Joint) -> Iterator[str]:
 
 
 def full_inertia(link: Link) -> tuple[float, ...]:
-    """Entries xx, yy, zz, xy, xz, yz about the centre of mass."""
+    """Return entries xx, yy, zz, xy, xz, yz of the inertia tensor about the center of mass, kg m^2."""
     inertia = link.inertia
     low, middle, high = inertia.principal_moments
     excess, rounding = float(high - low - middle), ROUNDING * float(high)
@@ -68,7 +72,7 @@ def full_inertia(link: Link) -> tuple[float, ...]:
 
 
 class Rotor(NamedTuple):
-    """A motor: what its coordinate is called, and its inertia less what is coupled."""
+    """A motor, with the name of its coordinate, and its inertia without the coupled part."""
 
     name: str
     motor: JointMotor
@@ -76,15 +80,15 @@ class Rotor(NamedTuple):
 
 
 def motor_name(joint: Joint, number: int) -> str:
-    """Name of the coordinate of a motor, 1 or 2: that of the joint where there are no springs."""
+    """Return the name of the coordinate of motor 1 or 2; that of the joint if there are no springs."""
     return f"{joint.name}.motor_{number}" if joint.actuator.sprung else joint.name
 
 
 def rotors_of(joint: Joint, tendons: Element) -> list[Rotor]:
-    """Return the motors of a joint; what couples their inertias becomes the inertia of a tendon between them.
+    """Return the motors of a joint; a coupling of their inertias becomes the inertia of a tendon.
 
-    The inertia m of a tendon along theta_1 + w theta_2 is m of motor 1, m w^2 of motor 2, and m w of both.
-    With w^2 = B_2/B_1 that takes |B_12|/sqrt(B_1 B_2) of either motor's inertia, which is less than all.
+    A tendon along theta_1 + w theta_2 with inertia m adds m to motor 1, m w^2 to motor 2, and the coupling m
+    w. With w^2 = B_2/B_1 these are a share |B_12|/sqrt(B_1 B_2), below 1, of either motor's inertia.
     """
     actuator = joint.actuator
     named = [(motor_name(joint, number), motor) for number, motor in enumerate(actuator.motors, 1)]
@@ -102,10 +106,10 @@ def rotors_of(joint: Joint, tendons: Element) -> list[Rotor]:
 
 
 def add_rotors(world: Element, rotors: list[Rotor], *, coupled: bool) -> None:
-    """Rotors that turn by themselves, about z.
+    """Add rotors as separate bodies that turn about z.
 
-    If they are coupled, the second one's body is in that of the first: MuJoCo keeps no inertia between
-    coordinates of which neither moves the other.
+    If they are coupled, the body of the second is inside that of the first, since MuJoCo stores no inertia
+    between coordinates of which neither moves the other.
     """
     parent = world
     for rotor in rotors:
@@ -114,7 +118,7 @@ def add_rotors(world: Element, rotors: list[Rotor], *, coupled: bool) -> None:
 
 
 def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
-    """Return the body of a motor in another body, with its coordinate along or about z."""
+    """Add the body of a motor to another body, with its coordinate along or about z, and return it."""
     body = element(parent, "body", name=rotor.name)
     element(body, "inertial", pos=(0, 0, 0), mass=LEAST, diaginertia=(LEAST,) * 3)
     damping, inertia = rotor.motor.damping, rotor.inertia
@@ -123,7 +127,7 @@ def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
 
 
 def add_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
-    """Return a tendon whose length is a weighted sum of positions."""
+    """Add a tendon whose length is a weighted sum of positions, and return it."""
     tendon = element(tendons, "fixed", name=name)
     for position, weight in weights.items():
         element(tendon, "joint", joint=position, coef=weight)
@@ -131,7 +135,7 @@ def add_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
 
 
 ANCHOR = 2.0
-"""Distance, m for rad, of the anchor from motor 2 at zero, which is its least while there is pretension."""
+"""Distance of the anchor from motor 2 at zero, 1 m for 1 rad; motor 2 is farther away under pretension."""
 
 DRAWN = 0.005
 """Size of a drawn point, m."""
@@ -142,18 +146,18 @@ GHOST: dict[str, Value] = {"contype": 0, "conaffinity": 0, "mass": 0}
 """Attributes of a shape that is only drawn."""
 
 HIDDEN = 4
-"""Group of what a viewer does not show unless asked: the spring is drawn along the pulley, too, a metre for a
+"""Group that a viewer hides by default: the spring would also be drawn along the pulley, a meter per
 radian."""
 
 
 def draw_rod(body: Element, end: Sequence[float], radius: float, colour: Sequence[float]) -> None:
-    """A rod from the origin of a body to a point, without mass and contact."""
+    """Draw a rod from the origin of a body to a point, without mass and contact."""
     ends = (0, 0, 0, *end)
     element(body, "geom", type="capsule", fromto=ends, size=radius, rgba=colour, **GHOST)
 
 
 def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequence[Rotor]) -> None:
-    """Both motors, on the link before the joint; the lever stands along the link while both are at zero."""
+    """Add both motors to the link before the joint; at zero, the lever is aligned with the link."""
     first, second = rotors
     half = joint.dh.theta / 2
     lever = add_rotor(below, first, type="hinge")
@@ -167,7 +171,7 @@ def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequenc
 
 
 def add_lever_spring(tendons: Element, joint: Joint, spring: LeverSpring, setter: str, body: Element) -> None:
-    """The spring from the lever to a point of the link, and by the pulley from the anchor to motor 2."""
+    """Add the spring from the lever to a point of the link, and via the pulley from the anchor to motor 2."""
     dh, lead = joint.dh, abs(spring.lead)
     place = (spring.arm - dh.a, -dh.d * math.sin(dh.alpha), -dh.d * math.cos(dh.alpha))
     element(body, "site", name=f"{joint.name}.point", pos=place, size=DRAWN)
@@ -181,14 +185,14 @@ def add_lever_spring(tendons: Element, joint: Joint, spring: LeverSpring, setter
 
 
 POLYNOMIAL_TERMS = 3
-"""Terms of a spring's torque in MuJoCo: phi, phi^2 as it stands, phi^3."""
+"""Number of terms of a spring's torque in MuJoCo: phi, phi^2, phi^3."""
 
 SLACK = (-1e6, 0.0)
-"""Lengths of a tendon at which it does not pull."""
+"""Range of lengths at which a tendon is slack."""
 
 
 class Sections(NamedTuple):
-    """Sections of the file for the parts of a drive."""
+    """Sections of the file that contain the parts of a drive."""
 
     world: Element
     tendons: Element
@@ -196,14 +200,14 @@ class Sections(NamedTuple):
 
 
 def has_springs_of(joint: Joint) -> bool:
-    """Return whether MJCF has springs such as those of a joint; also if it has none."""
+    """Return whether MJCF can express the springs of a joint; True if it has none."""
     elements = joint.actuator.spring_elements
     polynomial = elements is not None and all(_terms(each.law) is not None for each in elements)
     return polynomial or joint.actuator.lever_spring is not None
 
 
 def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -> None:
-    """Motors, springs and torques of a joint between two bodies, the second one that of its link."""
+    """Add motors, springs and torques of a joint; `below` is the body before the joint, `body` its link's."""
     rotors = rotors_of(joint, sections.tendons)
     for rotor in rotors:
         _actuate(sections.actuators, rotor)
@@ -220,13 +224,12 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
 
 
 def _drive_directly(body: Element, joint: Joint, rotors: Sequence[Rotor]) -> None:
-    """Add a motor whose rotor is a part of the joint."""
+    """Add the inertia and damping of a motor, whose rotor moves with the joint, to the joint."""
     (moving,), (rotor,) = body.findall("joint"), rotors
     add(moving, armature=rotor.inertia, damping=joint.damping + rotor.motor.damping)
 
 
 def _actuate(actuators: Element, rotor: Rotor) -> None:
-    """The torque of a motor."""
     actuator = element(actuators, "motor", name=f"{rotor.name}.torque", joint=rotor.name)
     most = rotor.motor.max_torque
     if math.isfinite(most):
@@ -239,7 +242,7 @@ def _add_springs(tendons: Element, joint: Joint) -> None:
 
 
 def _add_spring(tendons: Element, name: str, joint: Joint, spring: SpringElement) -> None:
-    """A tendon with the law of a spring; one that pulls at negative deflections only is turned round."""
+    """Add a tendon with the law of a spring, reversed if it pulls only at negative deflections."""
     turned = -1.0 if spring.law.domain[1] <= 0 else 1.0
     motors = [motor_name(joint, number) for number in range(1, 1 + len(spring.motors))]
     weights = zip((joint.name, *motors), (spring.joint, *spring.motors), strict=True)
@@ -249,7 +252,7 @@ def _add_spring(tendons: Element, name: str, joint: Joint, spring: SpringElement
 
 
 def _terms(law: SpringLaw) -> tuple[float, ...] | None:
-    """Stiffness of a tendon, one number if the spring is linear; None if MuJoCo has no such spring."""
+    """Return the stiffness of a tendon, one number if linear; None if MuJoCo has no such spring."""
     terms = law.polynomial
     if terms is None or len(terms) > POLYNOMIAL_TERMS:
         return None
@@ -257,7 +260,7 @@ def _terms(law: SpringLaw) -> tuple[float, ...] | None:
 
 
 def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
-    """Dampers, each with its damping as a control; they stand behind the torques of the motors."""
+    """Add dampers, each with its damping as a control; these controls follow the torques of the motors."""
     for joint in joints:
         if joint.damper_at("link"):
             _add_damper(sections.actuators, f"{joint.name}.damping", joint=joint.name)
@@ -270,7 +273,7 @@ def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
 
 
 def _add_damper(actuators: Element, name: str, **place: str) -> None:
-    """A force of minus the velocity times the control."""
+    """Add a force that is minus the velocity times the control."""
     element(actuators, "general", name=name, gaintype="affine", gainprm=(0, 0, -1), **place)
 
 
@@ -279,11 +282,11 @@ KEY = "start"
 
 
 class Start(NamedTuple):
-    """The first step of a run.
+    """The first sample of a run.
 
     Attributes:
-        q, dq: positions and velocities of the joints, (joints,).
-        theta, dtheta: those of the motors, joint side of the gear, (joints, 2).
+        q, dq: positions and velocities of the joints, (joints,), rad (m) and rad/s (m/s).
+        theta, dtheta: positions and velocities of the motors, joint side of the gear, (joints, 2).
     """
 
     q: FloatArray
@@ -293,10 +296,10 @@ class Start(NamedTuple):
 
 
 def add_start(root: Element, world: Element, robot: Robot, start: Start) -> None:
-    """A key frame with positions and velocities in the order in which the world has the coordinates.
+    """Add a key frame with positions and velocities in the order of the coordinates in the world.
 
     Raises:
-        InputError: a motor has no position there, since the step is infeasible or singular.
+        InputError: a motor position is undefined, since the sample is infeasible or singular.
     """
     states: dict[str, tuple[float, float]] = {}
     for index, joint in enumerate(robot.joints):

@@ -1,7 +1,6 @@
-"""A Python file with the forces that MJCF has no place for: springs of other laws, and smooth dry friction.
+"""A Python file with the forces that MJCF cannot express: springs of other laws, and smooth dry friction.
 
-The forces are traced as they are computed everywhere else, and written down operation by operation, so that
-the file needs NumPy and MuJoCo alone.
+The usual code of these forces is traced, and written by operations, so the file needs only NumPy and MuJoCo.
 """
 
 from __future__ import annotations
@@ -55,10 +54,10 @@ def install(model):
 
 
 def check_friction(robot: Robot) -> None:
-    """Refuse friction whose shape is the sign function.
+    """Raise an error for friction whose shape is the sign function.
 
     Raises:
-        InputError: for each such friction, with what would do.
+        InputError: frictions have the width 0; names each, with a fix.
     """
     problems = [
         Problem(
@@ -76,7 +75,7 @@ def check_friction(robot: Robot) -> None:
 
 
 def forces_words(robot: Robot) -> str:
-    """Return words for the forces in the file, "" without any."""
+    """Return a phrase on the forces in the file; "" without any."""
     springs = [joint.name for joint in robot.joints if not has_springs_of(joint)]
     friction = [joint.name for joint in robot.joints if joint.has_friction]
     parts = {"springs": springs, "friction": friction}
@@ -84,7 +83,7 @@ def forces_words(robot: Robot) -> str:
 
 
 def forces_text(robot: Robot) -> str | None:
-    """Return the file; None if MJCF has a place for all forces of the robot."""
+    """Return the text of the file; None if MJCF can express all forces of the robot."""
     joints = [joint for joint in robot.joints if joint.has_friction or not has_springs_of(joint)]
     if not joints:
         return None
@@ -106,7 +105,6 @@ def forces_text(robot: Robot) -> str | None:
 
 
 def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
-    """Yield each dry friction with words for its place."""
     if joint.friction is not None:
         yield f"joint {joint.name}: its friction", joint.friction
     for number, motor in enumerate(joint.actuator.motors, 1):
@@ -115,13 +113,13 @@ def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
 
 
 def _coordinates(joint: Joint) -> list[str]:
-    """Return the joint, and its motors if they move by themselves."""
+    """Return the coordinates of a joint and of motors that move separately from it."""
     numbers = range(1, 1 + len(joint.actuator.motors))
     return list(dict.fromkeys([joint.name, *(motor_name(joint, number) for number in numbers)]))
 
 
 def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
-    """Rows of forces on all coordinates, from rows of their positions and velocities."""
+    """Return rows of forces on all coordinates, from rows of their positions and velocities."""
     positions, velocities = list(rows[: len(rows) // 2]), list(rows[len(rows) // 2 :])
     forces = []
     for joint in joints:
@@ -132,7 +130,7 @@ def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
 
 
 def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
-    """Return the torques of springs less friction on the coordinates of a joint."""
+    """Return the torques of springs minus friction on the coordinates of a joint."""
     forces = [np.zeros_like(position) for position in positions]
     if not has_springs_of(joint):
         elements = joint.actuator.spring_elements
@@ -147,7 +145,7 @@ def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]
 
 
 def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
-    """Return the torques of springs by their weights; those that only pull go slack."""
+    """Return the torques of springs on coordinates by their weights; springs that only pull may be slack."""
     forces = [np.zeros_like(position) for position in positions]
     for spring in elements:
         weights = (spring.joint, *spring.motors)
@@ -160,7 +158,7 @@ def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) ->
 
 
 def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
-    """Return the torques of springs of a joint that are known by their potential alone."""
+    """Return the torques of the springs of a joint from its elasticity, if they have no spring elements."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))
     against = (torques.tau_spring[..., side] for side in range(len(joint.actuator.motors)))

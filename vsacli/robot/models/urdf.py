@@ -1,7 +1,7 @@
-"""The robot as URDF: links, joints, limits. It has no place for springs, and hardly one for motors.
+"""Export to URDF: links, joints and limits. URDF cannot express springs, and hardly motors.
 
-The frame of a link is the one that URDF asks for, on the axis of its joint: the Denavit-Hartenberg frame of
-the link is Tx(a) Rx(alpha) farther.
+URDF requires the frame of a link on the axis of its joint. The Denavit-Hartenberg frame of the link follows
+from it by Tx(a) Rx(alpha).
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from vsacli.robot.models.mjcf_drives import Start
 from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
 ROOT, TOOL = "world", "tool"
-"""Links at the ends; those between are called `<joint>_link`."""
+"""Names of the first and last link; others are named `<joint>_link`."""
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-"""m/s^2, what most readers of a URDF take."""
+"""Gravity, m/s^2, that most readers of a URDF assume."""
 
 NO_LIMIT = 1e9
-"""Stands for a limit that URDF requires and the robot does not have; `import-urdf` takes it for none."""
+"""Value in place of a limit that URDF requires and the robot lacks; `import-urdf` reads it as none."""
 
 
 def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
-    """Return the model, with what it leaves out.
+    """Return the model, with notes on parts that are left out.
 
     Raises:
-        InputError: a start is given, for which there is no place.
+        InputError: a start is given, which URDF cannot express.
     """
     if start is not None:
         raise InputError.one("a URDF does not say where a motion starts; leave out --start")
@@ -58,7 +58,7 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
 
 
 def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
-    """A link; what is known along the axes of its Denavit-Hartenberg frame stays as it is known there."""
+    """Add a link; the inertia tensor keeps the axes of the Denavit-Hartenberg frame, and so its entries."""
     link, whole = joint.link, element(root, "link", name=name)
     body = element(whole, "inertial")
     end = pose_matrix((joint.dh.a, 0, 0), (joint.dh.alpha, 0, 0))
@@ -72,7 +72,7 @@ def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
 
 
 def _draw(link: Element, joint: Joint, radius: float) -> None:
-    """A rod from origin to origin of the Denavit-Hartenberg frames, which nothing collides with."""
+    """Draw a rod from origin to origin of the Denavit-Hartenberg frames, without collision geometry."""
     a, d = joint.dh.a, joint.dh.d
     visual = element(link, "visual")
     element(visual, "origin", xyz=(a / 2, 0, -d / 2), rpy=(0, math.atan2(a, d), 0))
@@ -101,7 +101,7 @@ def _type(joint: Joint) -> str:
 
 
 def _add_drive(moving: Element, joint: Joint) -> None:
-    """Axis, damping, friction and limits of a joint; the efforts of two motors are none of the joint."""
+    """Add axis, damping, friction and limits of a joint; two motors together have no effort limit."""
     element(moving, "axis", xyz=(0, 0, 1))
     friction = {} if joint.friction is None else {"friction": max(joint.friction.coulomb)}
     element(moving, "dynamics", damping=joint.damping, **friction)
@@ -115,7 +115,6 @@ def _add_drive(moving: Element, joint: Joint) -> None:
 
 
 def _left_out(robot: Robot) -> Iterator[str]:
-    """Yield sentences on parts without a place in URDF."""
     yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
     if robot.gravity != STANDARD_GRAVITY:
         gravity = ", ".join(f"{each:g}" for each in robot.gravity)

@@ -1,4 +1,4 @@
-"""Numbers of a robot that are hardly what was meant, by rules that are data; see `documents.plausibility`."""
+"""Plausibility of the numbers of a robot, by rules that are data; see `documents.plausibility`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
 def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
-    """Return the findings of the rules, with lines of the robot file: the first of the sources."""
+    """Return the findings of the rules, with lines of the robot file, which is the first of the sources."""
     return findings(ROBOT_RULES, checked, _written(sources))
 
 
 def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
-    """Names of the rules that find something."""
+    """Return the names of the rules that have findings."""
     return frozenset(strange(ROBOT_RULES, checked, _written(sources)))
 
 

@@ -1,4 +1,4 @@
-"""Rules on angles, lengths, limits, masses and gravity of a robot."""
+"""Plausibility rules of angles, lengths, limits, masses and gravity of a robot."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sph
 
 TURN = 2 * math.pi
 ROUNDED = 1e-3
-"""Share by which an angle printed with a few digits may exceed a whole number of turns."""
+"""Share by which an angle printed with a few digits may exceed an integer number of turns."""
 
 FASTEST = 60.0
-"""rad/s; limbs do not turn ten times a second."""
+"""Largest velocity, rad/s; limbs do not turn ten times a second."""
 
 UNLIMITED_ANGLE = 1e4
-"""rad; who writes larger ones into limits wants none."""
+"""Angle, rad; larger limits mean no limit."""
 
 DEGREES = OtherUnit("deg", math.pi / 180)
 DEGREES_PER_SECOND = OtherUnit("deg/s", math.pi / 180)
@@ -27,7 +27,7 @@ RPM = OtherUnit("rpm", math.pi / 30)
 MILLIMETRES = OtherUnit("mm", 1e-3)
 CENTIMETRES = OtherUnit("cm", 1e-2)
 GRAMS = OtherUnit("g", 1e-3, power=2.5)
-"""Units of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
+"""Unit of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
 
 INERTIA_POWER = -1.5
 """Power of the inertia in the density of the sphere, at a given mass."""
@@ -45,13 +45,13 @@ SLIPS_OF_GRAVITY = (
     OtherUnit("ft/s^2", 0.3048),
 )
 SIZES = ("lengths", "densities of links", "sizes of links", "mass of the robot")
-"""Rules on what the sizes of a robot follow from; where one of them finds something, these mean little."""
+"""Names of rules of numbers that determine the sizes of a robot; if one has findings, sizes mean little."""
 
 Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
 
 
 def turns(angle: float) -> float:
-    """Return an angle in turns; NaN (not judged) for a multiple of a right angle, up to rounding."""
+    """Return an angle in turns; NaN (not judged) for a computed multiple of a right angle, up to rounding."""
     rights = angle / (TURN / 4)
     computed = not angle.is_integer() and abs(rights - round(rights)) < ROUNDED * abs(rights)
     return math.nan if computed else abs(angle) / TURN
@@ -63,7 +63,10 @@ def _numbers(
     without: tuple[str, ...] = (),
     size: Callable[[CheckedRobot, float], float] | None = None,
 ) -> Measure:
-    """Return every number in a unit with one of these keys on its path and none of those; size |value|."""
+    """Return the measure of numbers in a unit with any of `keys` and none of `without` on their paths.
+
+    Their size is |value|, unless given by `size`.
+    """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         for number in checked.of_unit(unit):
@@ -83,7 +86,7 @@ def _range(_: CheckedRobot, angle: float) -> float:
 
 
 def _velocity(_: CheckedRobot, velocity: float) -> float:
-    """NaN for powers of ten from 100 on, which mean no limit."""
+    """Return |velocity|; NaN for powers of ten from 100 on, which mean no limit."""
     size = abs(velocity)
     return math.nan if size >= 100 and math.log10(size).is_integer() else size
 
@@ -95,7 +98,7 @@ def _lengths(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 def _links(size: Callable[[CheckedRobot, int], float]) -> Measure:
-    """Return the mass of each link, with a size made from its index."""
+    """Return the measure of the mass of each link, with a size from its index."""
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         for index, joint in enumerate(checked.joints):
@@ -106,12 +109,12 @@ def _links(size: Callable[[CheckedRobot, int], float]) -> Measure:
 
 
 def _gyration(checked: CheckedRobot, index: int) -> float:
-    """Over the reach from the base frame on, since single wheels and rotors have little of their own."""
+    """Return the radius of gyration over the reach from the base frame; single wheels have little reach."""
     return ratio(float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz))
 
 
 def _crowding(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the heaviest link for all of them; a robot without any mass has a warning of its own."""
+    """Yield the heaviest link on behalf of all; a robot without any mass has a warning of its own."""
     crowding = _links(lambda checked, _: ratio(checked.sizes.mass, checked.sizes.extent**3))
     heaviest = max(crowding(checked), key=lambda measured: measured.value)
     if heaviest.value > 0:
@@ -119,7 +122,7 @@ def _crowding(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 def _gravity(size: Callable[[float], float]) -> Measure:
-    """Return the magnitude of gravity, with a size made from it."""
+    """Return the measure of the magnitude of gravity, with a size from it."""
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         value = math.hypot(*checked.gravity)

@@ -1,4 +1,4 @@
-"""Size and weight of a robot: the measures that single numbers of its file are compared with."""
+"""Sizes and weight of a robot, with which plausibility rules compare the numbers of its file."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from vsacli.documents.record_values import Entry, Number, NumberPath
 from vsacli.robot.joint import Joint, Link, Pose
 
 WEIGHT_PER_MASS = 9.81
-"""m/s^2. Loads are compared with the weight on earth, also of robots that work in space."""
+"""Gravity, m/s^2; loads are compared with the weight on earth, also of robots in space."""
 
 SPHERE = 0.4
-"""Moment of inertia of a solid sphere over mass times radius squared."""
+"""Moment of inertia of a solid sphere, over mass times radius squared."""
 
 
 @dataclass(frozen=True)
 class CheckedRobot:
-    """A robot as the rules of plausibility see it.
+    """A robot with the data that plausibility rules need.
 
     Attributes:
-        joints: from the base to the tip.
-        base: as in the robot file.
-        gravity: as in the robot file, m/s^2.
-        numbers: all of the file.
-        placeholder: whether springs and motors only stand in for others.
+        joints: joints from the base to the tip.
+        base: pose of DH frame 0 in the base frame.
+        gravity: gravity acceleration in the base frame, m/s^2.
+        numbers: all numbers of the file.
+        placeholder: whether springs and motors are placeholders.
     """
 
     joints: tuple[Joint, ...]
@@ -43,22 +43,22 @@ class CheckedRobot:
 
     @cached_property
     def sizes(self) -> BodySizes:
-        """Sizes of the robot."""
+        """Body sizes of the robot."""
         return BodySizes(self.joints)
 
     @property
     def driven(self) -> Iterator[tuple[int, Joint]]:
-        """The joints with their indices, unless springs and motors only stand in for others."""
+        """Joints with their indices; none if springs and motors are placeholders."""
         return enumerate(() if self.placeholder else self.joints)
 
     def of_unit(self, unit: str) -> Iterator[Measured]:
-        """Yield the numbers in a unit, each with its magnitude as size."""
+        """Yield the numbers with a unit, each with its magnitude as size."""
         for path, quantity, value, _ in self.numbers:
             if quantity.unit(self._variant(path)) == unit:
                 yield Measured(path, value, unit, abs(value))
 
     def _variant(self, path: NumberPath) -> str:
-        """Return the joint type on which a unit depends: revolute for a motor behind its gear."""
+        """Return the joint type on which the unit of a number depends; "revolute" for a motor with a gear."""
         if path[0] != "joints" or not isinstance(path[1], Entry):
             return "revolute"
         joint = self.joints[path[1].number]
@@ -67,17 +67,17 @@ class CheckedRobot:
 
 
 def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
-    """Return the path to something of a joint."""
+    """Return the path of a part of a joint."""
     return ("joints", Entry(number, joint.name), *steps)
 
 
 def motors(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
-    """Return the motors of a joint as they are written, each with its path from the joint."""
+    """Return the motors of a joint as written in the file, each with its path from the joint."""
     return written_once(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
 
 
 def written_once(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, Any]]:
-    """One record or a pair of them, each with its path; if one serves both sides, that one."""
+    """Yield a record, or each record of a pair, with its path; a record for both sides is yielded once."""
     sides = content if isinstance(content, tuple) else (content,)
     if len({id(side) for side in sides}) == 1:
         yield path, sides[0]
@@ -86,16 +86,17 @@ def written_once(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, A
 
 
 class BodySizes:
-    """Sizes of a robot, each an upper bound over its configurations; prismatic joints count at zero.
+    """Sizes of a robot, each an upper bound over its configurations with prismatic joints at zero.
 
     Attributes:
-        gyrations: radius of gyration of each link about its centre of mass, m; 0 without mass or inertia.
-        reach: of the stretched robot, m: to the end of its rows or its farthest centre of mass.
-        levers: distance of what is farthest from each joint while the robot is stretched, m.
-        mass: of all links, kg.
-        inertias: of each link alone about its joint, kg m^2; of a prismatic joint the mass, kg.
-        moved: of all that a joint moves while the robot is stretched, kg m^2; of a prismatic joint, kg.
-        loads: what the weight can ask of each joint while the robot is stretched, N m (N).
+        gyrations: radius of gyration of each link about its center of mass, m; 0 without mass or inertia.
+        reach: reach of the stretched robot, m, to the end of its rows or its farthest center of mass.
+        levers: distance from each joint to the farthest point of the stretched robot, m.
+        mass: mass of all links, kg.
+        inertias: inertia of each link alone about its joint, kg m^2; for a prismatic joint the mass, kg.
+        moved: inertia of all links that a joint of the stretched robot moves, kg m^2; for a prismatic joint
+            their mass, kg.
+        loads: largest torque of the weight at each joint of the stretched robot, N m (N).
     """
 
     def __init__(self, joints: Sequence[Joint]) -> None:
@@ -131,20 +132,20 @@ class BodySizes:
 
 
 def _from_tip(values: FloatArray) -> FloatArray:
-    """Sums from each entry to the last."""
+    """Return the sums from each entry to the last."""
     sums: FloatArray = np.cumsum(values[::-1])[::-1]
     return sums
 
 
 def _com_distance(joint: Joint) -> float:
-    """Return the distance of the centre of mass from frame i-1, in which it is Tz(d) Tx(a) Rx(alpha) com."""
+    """Return the distance of the center of mass, Tz(d) Tx(a) Rx(alpha) com, from frame i-1, m."""
     x, y, z = joint.link.com
     c, s = math.cos(joint.dh.alpha), math.sin(joint.dh.alpha)
     return math.hypot(joint.dh.a + x, c * y - s * z, joint.dh.d + s * y + c * z)
 
 
 def _sum_of_moments(link: Link) -> float:
-    """Trace of the inertia tensor, kg m^2: twice the integral of r^2 dm, whatever the axes."""
+    """Return the trace of the inertia tensor, kg m^2: twice the integral of r^2 dm, for any axes."""
     return link.inertia.xx + link.inertia.yy + link.inertia.zz
 
 
@@ -153,9 +154,10 @@ def _gyration(link: Link) -> float:
 
 
 def density_of_sphere(link: Link) -> float:
-    """Density of the solid sphere with the mass and the sum of moments of a link, kg/m^3; NaN if either is 0.
+    """Return the density, kg/m^3, of the solid sphere with mass and sum of moments of a link.
 
-    A real body is at least as dense somewhere, since the sphere has the least moments for its volume.
+    It is NaN if mass or moments are zero. A real body is at least as dense somewhere, since the sphere has
+    the smallest moments for its volume.
     """
     moments = _sum_of_moments(link)
     if not (link.mass > 0 and moments > 0):
@@ -165,5 +167,5 @@ def density_of_sphere(link: Link) -> float:
 
 
 def ratio(value: float, reference: float) -> float:
-    """Return a value over another; NaN if there is nothing to hold it against."""
+    """Return a value over a reference; NaN unless the reference is positive."""
     return value / reference if reference > 0 else math.nan

@@ -1,4 +1,4 @@
-"""Rules on motors, gears, windings, viscous damping and dry friction of a robot."""
+"""Plausibility rules of motors, gears, windings, viscous damping and dry friction of a robot."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, FASTEST, RPM, S
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
 
 TINY = 0.1
-"""m; the rotors of shorter robots, fingers say, outweigh them by far behind their gears."""
+"""Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
 
 DAMPING_IN_MILLIMETRES = OtherUnit("N mm s/rad", 1e-3)
 OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
 WHICH_SIDE = "with `gear_ratio` it is that of the motor's shaft, without that on the joint's side"
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
-"""Rules on what the motors' sizes behind the gear follow from, and what they are compared with."""
+"""Names of rules, of gear ratios and sizes, whose findings explain those of motors behind a gear."""
 
 
 class _Driven(NamedTuple):
-    """A motor with its joint. A property is NaN without a bound (`torque`, `velocity`), gravity (`load`)."""
+    """A motor with its joint; `torque` and `velocity` are NaN without a bound, `load` without gravity."""
 
     checked: CheckedRobot
     number: int
@@ -38,51 +38,51 @@ class _Driven(NamedTuple):
 
     @property
     def behind(self) -> JointMotor:
-        """The motor as its joint has it, behind the gear."""
+        """Motor on the joint side of the gear."""
         return self.motor.at_joint
 
     @property
     def carries(self) -> bool:
-        """Whether it moves with the joint; one that only sets the springs may be small and fast."""
+        """Whether the motor carries the load; one that only sets the springs may be small and fast."""
         last = self.at[-1]
         return bool(self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0])
 
     @property
     def torque(self) -> float:
-        """Largest torque behind the gear."""
+        """Largest torque on the joint side of the gear, N m (N)."""
         return _bounded(self.behind.max_torque)
 
     @property
     def link_inertia(self) -> float:
-        """Inertia of the link alone about its joint."""
+        """Inertia of the link alone about its joint, kg m^2 (kg)."""
         return float(self.checked.sizes.inertias[self.number])
 
     @property
     def scale(self) -> float:
-        """The weight of the robot at its reach."""
+        """Weight of the robot at its reach, N m (N)."""
         return self.checked.sizes.scale(self.joint)
 
     @property
     def load(self) -> float:
-        """Largest torque of the weight of the stretched arm at the joint."""
+        """Largest torque of the weight of the stretched arm at the joint, N m (N)."""
         return float(self.checked.sizes.loads[self.number]) if any(self.checked.gravity) else math.nan
 
     @property
     def velocity(self) -> float:
-        """Largest velocity behind the gear."""
+        """Largest velocity on the joint side of the gear, rad/s (m/s)."""
         return _bounded(self.behind.max_velocity)
 
     def unit(self, name: str) -> str:
-        """Return the unit of a field; a motor behind a gear is one of rotation."""
+        """Return the unit of a field; a motor with a gear is rotational."""
         kind = self.joint.type if name == "gear_ratio" or self.motor.gear_ratio is None else "revolute"
         return declared(Motor)[name][0].quantity.unit(kind)
 
     def path(self, name: str) -> NumberPath:
-        """Return the path to a field."""
+        """Return the path of a field."""
         return joint_path(self.number, self.joint, *self.at, name)
 
     def measured(self, name: str, size: float) -> Measured:
-        """Return a field with a size."""
+        """Return the measured value of a field, with a size."""
         return Measured(self.path(name), getattr(self.motor, name), self.unit(name), size)
 
 
@@ -99,13 +99,13 @@ def _all_motors(checked: CheckedRobot) -> Iterator[_Driven]:
 def _motors(
     name: str, size: Callable[[_Driven], float] | None = None, *, unit: str = "", carrying: bool = False
 ) -> Measure:
-    """Return a field of the motors; its size is |value|, NaN if 0 or infinite, or made from the motor.
+    """Return the measure of a field of the motors.
 
     Args:
-        name: of the field.
-        size: makes the size.
-        unit: passes over motors whose field has another one.
-        carrying: whether to pass over motors that do not move with their joint.
+        name: name of the field.
+        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
+        unit: unit of the field; motors with another one are skipped. "" for any unit.
+        carrying: whether to skip motors that do not carry the load.
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
@@ -128,12 +128,12 @@ def _output_velocity(driven: _Driven) -> float:
 
 
 def _joint_velocity(driven: _Driven) -> float:
-    """Largest velocity that the motor allows the joint, over the limit of the joint."""
+    """Return the largest velocity that the motor allows the joint, over the limit of the joint."""
     return ratio(driven.velocity, max(map(abs, driven.joint.limits.velocity)))
 
 
 def _speed_voltage(driven: _Driven) -> float:
-    """Voltage that the largest velocity of a motor makes, over its largest voltage."""
+    """Return the voltage that the largest velocity of a motor induces, over its largest voltage."""
     constant, bound = driven.motor.torque_constant, driven.motor.max_voltage
     if constant is None or bound is None:
         return math.nan
@@ -146,7 +146,7 @@ def _damping(number: int, joint: Joint, size: float) -> Measured:
 
 
 def _braking(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the torque of damping at the largest velocity, over the largest torque; 0 without a limit."""
+    """Yield the torque of damping at the largest velocity, over the largest torque; 0 if that is infinite."""
     for driven in _all_motors(checked):
         joint, motor = driven.joint, driven.behind
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
@@ -162,7 +162,7 @@ def _joint_damping(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 class _Rubbing(NamedTuple):
-    """Dry friction of a motor, or of a joint: without a gear, and without a largest torque."""
+    """Dry friction of a motor, or of a joint, which has no gear and no largest torque."""
 
     path: NumberPath
     friction: Friction
@@ -186,7 +186,7 @@ def _rubbing(checked: CheckedRobot) -> Iterator[_Rubbing]:
 
 
 def _coulomb(size: Callable[[_Rubbing, float], float]) -> Measure:
-    """Coulomb friction as it is written, once if it is the same in both directions."""
+    """Return the measure of Coulomb friction as written: one number if it is equal in both directions."""
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         for rubbing in _rubbing(checked):

@@ -1,4 +1,4 @@
-"""Rules on springs and dampers of a robot, and on the stiffness that springs give to its joints."""
+"""Plausibility rules of springs and dampers of a robot, and of the stiffness that springs give its joints."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, ra
 
 HALF_TURN = math.pi
 SMALL_SHARE = 0.003
-"""Small angle as a share of half a turn: half a degree."""
+"""Small angle, as a share of half a turn: half a degree."""
 
 TOO_SOFT = (
     OtherUnit("N m/deg", 180 / math.pi, instead_of="N m/rad"),
@@ -30,7 +30,7 @@ TOO_SOFT = (
 )
 NEWTON_MILLIMETRES = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
 TOO_STIFF = (NEWTON_MILLIMETRES, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
-"""Units in which a stiffness is a smaller, or a larger number than in the expected one."""
+"""Units in which a stiffness is a smaller number (`TOO_SOFT`) or a larger one than in the expected unit."""
 
 SLIPS_OF_DAMPING = (
     OtherUnit("N mm s/rad", 1e-3, instead_of="N m s/rad"),
@@ -40,14 +40,14 @@ SLIPS_OF_DAMPING = (
 
 
 class Corridor(NamedTuple):
-    """The stiffness that a joint can have while it carries nothing, N m/rad (N/m)."""
+    """Attainable stiffness of a joint without load, N m/rad (N/m)."""
 
     lower: float
     upper: float
 
 
 def corridor(joint: Joint) -> Corridor | None:
-    """Return the attainable range of a joint; None if its stiffness is not commanded."""
+    """Return the attainable range of a joint without load; None if its stiffness is not commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return None
     solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
@@ -59,12 +59,12 @@ def _unit(joint: Joint) -> str:
 
 
 def _travel(checked: CheckedRobot, joint: Joint) -> float:
-    """Return a radian, or for a prismatic joint the reach of the robot, m."""
+    """Return 1 rad, or for a prismatic joint the reach of the robot, m."""
     return 1.0 if joint.is_revolute else checked.sizes.extent
 
 
 def _corridors(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
-    """Yield the joints whose stiffness can be commanded, with their indices."""
+    """Yield the joints with commanded stiffness, with index and attainable range."""
     for index, joint in checked.driven:
         found = corridor(joint)
         if found is not None:
@@ -72,7 +72,7 @@ def _corridors(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
 
 
 def _soft_ends(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the stiffness of antagonistic springs at rest over the weight at full reach."""
+    """Yield the minimum stiffness at rest, where stiffness is commanded, over the weight at full reach."""
     for index, joint, found in _corridors(checked):
         size = ratio(found.lower * _travel(checked, joint), checked.sizes.scale(joint))
         beside = {"stiffness": f"{found.lower:.4g} {_unit(joint)}"}
@@ -80,22 +80,22 @@ def _soft_ends(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 def _stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
-    """Stiffness at rest over the weight at full reach, per rad."""
+    """Yield the stiffness at rest of single springs, over the weight at full reach, per rad."""
     for joint, measured, held in _single_springs(checked):
         if joint.is_revolute:
             yield measured._replace(size=ratio(float(held["stiffness"][0]), checked.sizes.scale(joint)))
 
 
 def _soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield a rad, or the reach, over the deflection under what the weight can ask, if there is any."""
+    """Yield 1 rad, or the reach, over the deflection under the largest weight, if there is gravity."""
     for joint, measured, held in _single_springs(checked) if any(checked.gravity) else ():
         yield measured._replace(size=ratio(_travel(checked, joint), float(held["phi"][0, 1])))
 
 
 def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, OfJoint]]:
-    """Yield each joint without commanded stiffness: its spring at rest and under the largest weight.
+    """Yield joints without commanded stiffness, with the spring solved at rest and under the largest weight.
 
-    What is measured is the stiffness or the law; its size is to be replaced.
+    The measured number is the stiffness or the law; callers replace its size.
     """
     for number, joint in checked.driven:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
@@ -108,7 +108,7 @@ def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, Of
 
 
 def _springs(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
-    """Yield the springs with their joints, as they are written."""
+    """Yield the springs as written in the file, with joint and path."""
     for number, joint in checked.driven:
         path = joint_path(number, joint, "actuator", "spring")
         for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
@@ -116,9 +116,9 @@ def _springs(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringL
 
 
 def _hardening(checked: CheckedRobot, share: float, *, of_pairs: bool = False) -> Iterator[Measured]:
-    """Stiffness at a share of half a turn (of the reach), or where the law ends before, over that at rest.
+    """Yield the stiffness at a share of half a turn (of the reach) or at the law's end, over that at rest.
 
-    If asked for, only that of pairs, whose stiffness is chosen by it.
+    With `of_pairs`, only springs of joints with commanded stiffness, which depends on hardening.
     """
     for joint, path, law in _springs(checked):
         if not law.is_linear and ("stiffness" in joint.actuator.commanded or not of_pairs):
@@ -139,7 +139,7 @@ def _deflections(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
-    """Limits over the lowest at rest; a lower limit below all that springs give does no harm."""
+    """Yield limits over the minimum at rest; a lower limit below the attainable range does no harm."""
     for index, joint, found in _corridors(checked):
         beside = {"lower": f"{found.lower:.4g}", "unit": _unit(joint)}
         for side, limit in enumerate(joint.limits.stiffness):
@@ -150,7 +150,7 @@ def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 def _least_stiffness(joint: Joint) -> float:
-    """Return the least that a joint can have without load, N m/rad (N/m)."""
+    """Return the minimum stiffness of a joint without load, N m/rad (N/m)."""
     found = corridor(joint)
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
@@ -159,7 +159,7 @@ def _least_stiffness(joint: Joint) -> float:
 
 
 def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the upper end of each damper's range over twice the root of inertia times stiffness."""
+    """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
     for number, joint in checked.driven:
         if joint.damper is not None and joint.actuator.sprung:
             product = float(checked.sizes.moved[number]) * _least_stiffness(joint)

@@ -1,4 +1,8 @@
-"""Conversion of a URDF's chain to a robot, with what it keeps, leaves out, and must be told."""
+"""Conversion of a serial chain of a URDF to a robot, with a report on parts left out and changed.
+
+The steps: read the file, find the chain, place Denavit-Hartenberg frames, move inertias into them, size
+placeholder actuators, and compare the forward kinematics of robot and URDF.
+"""
 
 from __future__ import annotations
 
@@ -43,26 +47,26 @@ from vsacli.robot.urdf.serial_chain import (
 from vsacli.robot.urdf.srdf import ends_of_group
 
 EXACT_RESIDUAL = 1e-9
-"""m and rad; kinematics that stray less are called the same."""
+"""Residual, m and rad, up to which kinematics are reported as the same."""
 
 SMALLEST_RESIDUAL = 1e-12
-"""m and rad; smaller residuals differ between machines, and are not told apart."""
+"""Smallest residual reported, m and rad; smaller ones differ between machines."""
 
 _HEADER = ("joint", "a/m", "alpha/rad", "d/m", "theta/rad", "mass/kg", "links")
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """A robot made from a URDF, and what was done to it.
+    """A robot made from a URDF, with details of the conversion.
 
     Attributes:
         file: path of the URDF as given.
-        chain: the joints and links it was made from; `chain.joints` belong to `robot.joints` in turn.
-        robot: the result.
-        placeholders: its actuators, as they were asked for.
-        loads: what each joint carries at most, to which the actuators were sized.
+        chain: chain of the URDF; `chain.joints` correspond to `robot.joints` in order.
+        robot: converted robot.
+        placeholders: requested actuators.
+        loads: largest load of each joint, to which its actuator was sized.
         snaps: axes that were made parallel.
-        residual: how far its tip strays from the chain's.
+        residual: deviation of the robot's tip from the chain's.
     """
 
     file: str
@@ -75,11 +79,11 @@ class Conversion:
 
     @property
     def one_motor_each(self) -> bool:
-        """Whether a single motor drives each joint, so that what the URDF knows of motors holds for it."""
+        """Whether a single motor drives each joint, so that effort limits and gears of the URDF apply."""
         return all(joint.actuator.motor_count == 1 for joint in self.robot.joints)
 
     def __str__(self) -> str:
-        """Return the Denavit-Hartenberg table, its accuracy, doubts, and what was left out or changed."""
+        """Return the Denavit-Hartenberg table, its accuracy, warnings, and notes."""
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
@@ -101,7 +105,7 @@ class Conversion:
             yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
-        """Yield sentences on values that are hardly meant."""
+        """Yield sentences about implausible values."""
         yield from (warning for held in self.chain.held for warning in held.warnings())
         yield from self.robot.warnings
 
@@ -117,7 +121,7 @@ class Conversion:
             yield f"{what} left out: {', '.join(joint.name for joint in joints if what in joint.left_out)}"
 
     def _of_motors(self) -> Iterator[str]:
-        """Yield notes on effort limits and gears, which are those of a single motor."""
+        """Yield notes on effort limits and gears, which apply to a single motor."""
         joints = [joint.urdf for joint in self.chain.joints]
         known = {
             "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
@@ -130,7 +134,6 @@ class Conversion:
 
 
 def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
-    """Yield the joints held at zero, and those held elsewhere."""
     at_zero = [joint.urdf.name for joint in joints if joint.position == 0]
     elsewhere = [str(joint) for joint in joints if joint.position != 0]
     if at_zero:
@@ -147,7 +150,7 @@ def _exactness(residual: Residual) -> str:
 
 
 def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Columns of one width, numbers to the right."""
+    """Yield the lines of a table with aligned columns, numbers right-aligned."""
     table = list(rows)
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     for first, *numbers, last in table:
@@ -156,7 +159,7 @@ def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
 
 
 NEGLIGIBLE_INERTIA = 1e-15
-"""Inertia, over mass times the arm's size squared, that is rounding of a zero in the file."""
+"""Inertia, over mass times the arm's size squared, that counts as a rounded zero of the file."""
 
 
 def import_urdf(
@@ -169,20 +172,20 @@ def import_urdf(
     srdf: str | os.PathLike[str] | None = None,
     group: str | None = None,
 ) -> Conversion:
-    """Return a robot from a serial chain of a URDF file.
+    """Convert a serial chain of a URDF file to a robot.
 
     Args:
-        path: the URDF file.
-        base: name of the link that stands still; the root by default.
-        tip: name of the end effector's link; by default the only one that can be.
-        placeholders: the actuators, of which a URDF says nothing; by default sized to what they carry.
-        snap: angle in rad; axes closer to parallel are made parallel if their common normal is far away.
-        hold: where joints beside the chain stand, by name, in rad (m) or as "30 deg"; others stand at zero.
-        srdf: an SRDF file, of which a group says base and tip, if these are not given.
+        path: path of the URDF file.
+        base: name of the fixed link; the root by default.
+        tip: name of the end effector's link; by default the only possible one.
+        placeholders: actuators, which a URDF does not describe; by default sized to their loads.
+        snap: angle, rad; axes closer to parallel are made parallel if their common normal is far away.
+        hold: positions of joints not on the chain, by name, in rad (m) or as "30 deg"; zero for others.
+        srdf: path of an SRDF file, a group of which gives base and tip if these are not given.
         group: name of the group; the only one by default.
 
     Raises:
-        InputError: the file is no URDF, has no such chain, or its joints cannot be held like this.
+        InputError: the file is not a URDF, has no such chain, or joints cannot be held as requested.
     """
     file, chosen = os.fspath(path), placeholders or Placeholders()
     urdf = read_urdf(path)
@@ -220,7 +223,7 @@ def _robot(
 
 
 def _description(path: str, chain: SerialChain) -> str:
-    """Return the origin of the robot, and the joints held elsewhere than at zero."""
+    """Return a description of the robot's origin, with joints held elsewhere than at zero."""
     held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
     origin = f"converted from {one_line(os.path.basename(path))}, from link {chain.base} to link {chain.tip}"
     return f"{origin}{''.join(held)}"
@@ -244,10 +247,10 @@ def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actu
 
 
 def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
-    """Return the links that each joint carries, in its Denavit-Hartenberg frame.
+    """Return the links that each joint moves, in its Denavit-Hartenberg frame.
 
     Raises:
-        InputError: no body has such an inertia.
+        InputError: an inertia is physically impossible.
     """
     problems, links = Problems(path), []
     for joint, pose in zip(joints, frames.poses, strict=True):
@@ -282,7 +285,7 @@ def _pose(pose: FloatArray, scale: float) -> Pose:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Return different names of letters, digits, `_` and `-` that begin with a letter or `_`."""
+    """Return distinct names of letters, digits, `_` and `-` that begin with a letter or `_`."""
     chosen: list[str] = []
     for name in names:
         word = re.sub(r"[^A-Za-z0-9_-]", "_", name)

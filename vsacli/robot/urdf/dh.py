@@ -1,4 +1,7 @@
-"""Denavit-Hartenberg rows of a chain of frames, and how far the robot that they give deviates from it."""
+"""Denavit-Hartenberg rows of a URDF's chain by common normals, and the deviation of the resulting robot.
+
+Numbers that are short ones, or multiples of pi/2, but for rounding in the file are replaced by these.
+"""
 
 from __future__ import annotations
 
@@ -18,27 +21,27 @@ from vsacli.robot.urdf.link_tree import inverse, pose_matrix, transform
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
 SNAP_ANGLE = 1e-4
-"""rad; by default, axes closer to parallel are made parallel if their common normal is far away."""
+"""Default angle, rad; axes closer to parallel are made parallel if their common normal is far away."""
 
 FAR_NORMAL = 10.0
-"""m; a common normal this close to the joints needs no snapping, however small the angle."""
+"""Distance of a common normal from the joints, m, up to which no axis is made parallel at any angle."""
 
 FILE_ROUNDING = 1e-11
-"""rad, or relative to the largest number; less to a right angle or a short number is rounding of the file."""
+"""Rounding of the file: difference from a right angle, rad, or from a short number, over the largest one."""
 
 SHORT_DECIMALS = 9
-"""Decimals, relative to the largest number, that a short number has at most."""
+"""Most decimals of a short number, relative to the largest number."""
 
 
 class Axis(NamedTuple):
-    """A line: a point of it and its unit direction, (3,) each."""
+    """A line: one of its points, m, and its unit direction, (3,) each."""
 
     point: FloatArray
     direction: FloatArray
 
 
 class Snap(NamedTuple):
-    """An axis that was made parallel to the one before it: name of its joint, and the angle in rad."""
+    """An axis that was made parallel to the one before it: name of its joint, and the angle removed, rad."""
 
     joint: str
     angle: float
@@ -50,8 +53,8 @@ class Frames:
 
     Attributes:
         base: pose of frame 0 in the base, (4, 4).
-        rows: lead from each frame to the next.
-        poses: of the frames 1 to N in the base, each (4, 4).
+        rows: rows from each frame to the next.
+        poses: poses of frames 1 to N in the base, each (4, 4).
         tool: pose of the tip in frame N, (4, 4).
         snaps: axes that were made parallel.
         scale: largest coordinate, m.
@@ -66,12 +69,12 @@ class Frames:
 
 
 def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Frames:
-    """Return the frames of a chain whose tip has the pose `tip` at position zero.
+    """Return the Denavit-Hartenberg frames of a chain.
 
     Args:
-        joints: from the base.
-        tip: (4, 4), in the base.
-        snap: angle in rad below which axes are made parallel.
+        joints: joints from the base.
+        tip: pose of the tip in the base at position zero, (4, 4).
+        snap: angle, rad, below which axes are made parallel.
     """
     axes, snaps = _parallelled(joints, _axes(joints), snap)
     frame = _first_frame(axes[0])
@@ -92,7 +95,7 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
 
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
-    """Return the numbers, each replaced by the short one of which it is rounding; `scale` is the largest."""
+    """Return numbers, replaced by short ones from which they differ by rounding; `scale` is the largest."""
     short = np.round(numbers, SHORT_DECIMALS - _exponent(scale))
     return np.where(abs(numbers - short) <= FILE_ROUNDING * scale, short, numbers) + 0.0  # no negative zero
 
@@ -102,14 +105,14 @@ def _exponent(scale: float) -> int:
 
 
 def tidy_angle(angle: float) -> float:
-    """Return the angle, or the multiple of pi/2 of which it is rounding."""
+    """Return an angle, replaced by the multiple of pi/2 from which it differs by rounding."""
     right_angles = round(angle / (math.pi / 2))
     nearest = right_angles * (math.pi / 2)
     return nearest if abs(angle - nearest) <= FILE_ROUNDING else angle
 
 
 def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
-    """Return the axes; the free line of a prismatic joint passes through the next joint."""
+    """Return the axes; a prismatic joint's, whose location is arbitrary, passes through the next joint."""
     axes: list[Axis] = []
     for joint in reversed(joints):
         point = axes[-1].point if axes and not joint.is_revolute else joint.origin
@@ -120,7 +123,7 @@ def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
 def _parallelled(
     joints: Sequence[ChainJoint], axes: Sequence[Axis], snap: float
 ) -> tuple[list[Axis], tuple[Snap, ...]]:
-    """Return the axes, those nearly parallel to the one before turned about their own point."""
+    """Return the axes, rotated about their own points if nearly parallel to the ones before."""
     result, snaps = [axes[0]], []
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
         before = result[-1]
@@ -138,7 +141,7 @@ def _normal_is_far(first: Axis, second: Axis) -> bool:
 
 
 def _feet(first: Axis, second: Axis) -> tuple[float, float]:
-    """Return where the common normal of two axes meets each, as distance along it from its point."""
+    """Return the feet of the common normal of two axes, as distances along each axis from its point, m."""
     across = second.point - first.point
     normal = np.cross(first.direction, second.direction)
     scaled = normal / (normal @ normal)
@@ -149,7 +152,7 @@ def _feet(first: Axis, second: Axis) -> tuple[float, float]:
 
 
 def _first_frame(axis: Axis) -> FloatArray:
-    """Return the frame on the first axis that is closest to the base's own."""
+    """Return the frame on the first axis with origin and x axis closest to the base frame's."""
     origin = axis.point - (axis.point @ axis.direction) * axis.direction
     x, y, _ = np.eye(3)
     reference = x if abs(axis.direction[0]) < math.sqrt(0.5) else y
@@ -157,7 +160,7 @@ def _first_frame(axis: Axis) -> FloatArray:
 
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
-    """Return the frame on an axis, by the common normal with the z axis of the frame before."""
+    """Return the frame on an axis, at the common normal with the z axis of the frame before."""
     before = Axis(frame[:3, 3], frame[:3, 2])
     normal = np.cross(before.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
@@ -173,7 +176,7 @@ def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
 
 
 def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
-    """No offset along parallel axes, and no turn if they coincide."""
+    """Return the frame on a parallel axis, without offset along it, and without rotation if they coincide."""
     across = axis.point - frame[:3, 3]
     across = across - (across @ axis.direction) * axis.direction
     distance = float(np.linalg.norm(across))
@@ -183,18 +186,18 @@ def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
 
 
 def _turns_back(x: FloatArray, frame: FloatArray) -> bool:
-    """Return whether -x is closer to the x axis before, or to its y axis if x is at right angles to that."""
+    """Return whether -x is closer to the previous x axis, or to the previous y axis if x is normal to x."""
     along_x, along_y = float(x @ frame[:3, 0]), float(x @ frame[:3, 1])
     return along_x < -FILE_ROUNDING or (abs(along_x) <= FILE_ROUNDING and along_y < 0)
 
 
 def _negligible(point: FloatArray) -> float:
-    """m; distances below are rounding of coordinates of this size."""
+    """Return the distance, m, below which two points like this differ only by rounding."""
     return 1e-13 * max(1.0, float(np.abs(point).max()))
 
 
 def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
-    """Return the frame on the last axis beside the tip, turned as the tip if that needs no tilt."""
+    """Return the frame on the last axis at the height of the tip, with the tip's x axis if possible."""
     axis = frame[:3, 2]
     origin = frame[:3, 3] + (axis @ (tip[:3, 3] - frame[:3, 3])) * axis
     along = abs(float(axis @ tip[:3, 0]))
@@ -203,7 +206,7 @@ def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
 
 
 def _across(vector: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the unit vector along the part of a vector at right angles to an axis."""
+    """Return the unit vector along the component of a vector normal to an axis."""
     part = vector - (vector @ axis) * axis
     result: FloatArray = part / np.linalg.norm(part)
     return result
@@ -214,7 +217,7 @@ def _frame(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
 
 
 def _row(step: FloatArray, scale: float) -> DenavitHartenberg:
-    """Return the row of the transform between two frames that obey the convention."""
+    """Return the row of a transform between two frames that follow the convention."""
     theta = tidy_angle(math.atan2(step[1, 0], step[0, 0]))
     alpha = tidy_angle(math.atan2(step[2, 1], step[2, 2]))
     along_x = math.cos(theta) * step[0, 3] + math.sin(theta) * step[1, 3]
@@ -225,18 +228,18 @@ def _row(step: FloatArray, scale: float) -> DenavitHartenberg:
 SAMPLES = 256
 SEED = 1
 DRAWN_HALF_WIDTH = {True: np.pi, False: 1.0}
-"""Half the range of the drawn positions of a revolute (rad) or prismatic (m) joint without limits."""
+"""Half the range of random positions of a revolute (rad) or prismatic (m) joint without limits."""
 
 
 class Residual(NamedTuple):
-    """Largest distance in m and angle in rad between the tips, over random positions of the joints."""
+    """Largest distance, m, and angle, rad, between the tips, over random joint positions."""
 
     position: float
     orientation: float
 
 
 def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
-    """Compare the tips at random positions within the limits."""
+    """Compare the tips of chain and robot at random positions within the limits."""
     q = _positions(chain.joints)
     expected, found = _chain_tips(chain, q), _robot_tips(robot, q)
     shift = np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1)
@@ -245,7 +248,7 @@ def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
 
 
 def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
-    """Random positions, (samples, joints)."""
+    """Return random positions, (samples, joints), rad (m)."""
     rng = np.random.default_rng(SEED)
     reach = np.array([DRAWN_HALF_WIDTH[joint.is_revolute] for joint in joints])
     given = [joint.urdf.limit.position for joint in joints]
@@ -255,7 +258,7 @@ def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
 
 
 def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
-    """Return the tip's poses, (samples, 4, 4), by moving every joint in its own URDF frame."""
+    """Return the poses of the tip, (samples, 4, 4), by moving every joint in its own URDF frame."""
     poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     before = np.eye(4)
     for joint, positions in zip(chain.joints, q.T, strict=True):

@@ -1,4 +1,4 @@
-"""The links and joints of a URDF as a tree, motions between their frames, and the path of a chain in it."""
+"""The links and joints of a URDF as a tree, rigid motions of their frames, and the path of a chain in it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from vsacli.documents.tree import quoted
 
 
 def transform(rotation: FloatArray, origin: FloatArray) -> FloatArray:
-    """Return the pose of a frame with these axes (columns) and this origin."""
+    """Return the pose of a frame, (4, 4), from its axes as columns and its origin."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, origin
     return pose
 
 
 def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
-    """Return the pose of an `origin`: at xyz, with the axes of Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return the pose of an `origin` element: at xyz, with the axes of Rz(yaw) Ry(pitch) Rx(roll)."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
     rotation = np.array(
         [
@@ -37,7 +37,7 @@ def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
 
 
 def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
-    """Angles with which `pose_matrix` gives this rotation, to rounding even where roll and yaw are one."""
+    """Return angles with which `pose_matrix` gives this rotation, up to rounding, also in gimbal lock."""
     r = rotation
     yaw = math.atan2(r[1, 0], r[0, 0])
     c, s = math.cos(yaw), math.sin(yaw)
@@ -53,26 +53,26 @@ def inverse(pose: FloatArray) -> FloatArray:
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:
-    """Return the matrix with which a vector multiplies from the left as a cross product."""
+    """Return the matrix of the cross product with a vector from the left."""
     x, y, z = vector
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 class Body(NamedTuple):
-    """A rigid body: mass, centre of mass (3,), inertia about it (3, 3); in some frame."""
+    """A rigid body in some frame: mass, kg, center of mass, (3,), m, inertia about it, (3, 3), kg m^2."""
 
     mass: float
     com: FloatArray
     inertia: FloatArray
 
     def moved(self, pose: FloatArray) -> Body:
-        """Return the body in the frame in which its own frame has this pose."""
+        """Return the body in another frame, in which its own frame has this pose."""
         rotation = pose[:3, :3]
         return Body(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
 
 
 def welded(bodies: list[Body]) -> Body:
-    """Bodies of one frame as a single body (parallel axes); without mass, one at the origin."""
+    """Return bodies given in one frame as a single body; without mass, it is at the origin."""
     mass = math.fsum(body.mass for body in bodies)
     moment = sum((body.mass * body.com for body in bodies), np.zeros(3))
     com = moment / mass if mass > 0 else np.zeros(3)
@@ -93,15 +93,14 @@ MOVING = (*ROTATING, "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
 
 LARGEST_NUMBER = 1e9
-"""Numbers beyond are no length, mass or inertia of a robot, and products of them would overflow."""
+"""Largest number; beyond, none is a length, mass or inertia of a robot, and products would overflow."""
 
 
 @dataclass(frozen=True)
 class UrdfLink:
     """A link; `body` is in its own frame, None if the file gives no inertial data.
 
-    `flaw` is the line of inertial data that are not whole and what is missing, which matters if a joint
-    carries the link.
+    `flaw` is the line of incomplete inertial data and the missing part, an error only if the link moves.
     """
 
     name: str
@@ -112,7 +111,7 @@ class UrdfLink:
 
 @dataclass(frozen=True)
 class UrdfLimit:
-    """Limits of a joint, None where the file gives none that bounds anything."""
+    """Limits of a joint; None if the file gives none, or one that bounds nothing."""
 
     position: tuple[float, float] | None = None
     velocity: float | None = None
@@ -132,8 +131,8 @@ class Mimic:
 class UrdfJoint:
     """A joint; at position zero its child has the pose `placement` in its parent.
 
-    `gear_ratio` is the motion of its only motor over its own, None if that is 1 or not known; `left_out` is
-    what the file says of it that has no place in a robot file, a few words each.
+    `gear_ratio` is the motion of its only motor over its own, None if 1 or unknown; `left_out` has a short
+    phrase for each property that a robot file cannot express.
     """
 
     name: str
@@ -151,20 +150,20 @@ class UrdfJoint:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it joins its links rigidly."""
+        """Whether the joint connects its links rigidly."""
         return self.type == "fixed"
 
     @property
     def is_revolute(self) -> bool:
-        """Whether it turns."""
+        """Whether the joint rotates."""
         return self.type in ROTATING
 
     def unit(self, quantity: Quantity = POSITION) -> str:
-        """Unit of a quantity of it."""
+        """Return the unit of a quantity of the joint."""
         return quantity.unit("revolute" if self.is_revolute else "prismatic")
 
     def motions(self, positions: FloatArray) -> FloatArray:
-        """Return the motion of its child at positions (samples,), (samples, 4, 4), by Rodrigues' formula."""
+        """Return motions of the child, (samples, 4, 4), at positions, (samples,), by Rodrigues' formula."""
         poses = np.tile(np.eye(4), (len(positions), 1, 1))
         if not self.is_revolute:
             poses[:, :3, 3] = np.outer(positions, self.axis)
@@ -180,11 +179,11 @@ class Urdf:
     """A robot as a tree of links.
 
     Attributes:
-        file: its path as given.
-        name: of the robot.
-        links: by name.
-        joints: by name.
-        root: the link without a parent.
+        file: path of the file as given.
+        name: name of the robot.
+        links: links by name.
+        joints: joints by name.
+        root: name of the link without a parent.
     """
 
     file: str
@@ -203,7 +202,7 @@ class Urdf:
         return path[::-1]
 
     def followed(self, joint: UrdfJoint) -> Mimic:
-        """Return the joint that a joint follows in the end, itself if it follows none that there is."""
+        """Return the relation to the last leader in a chain of mimics; to itself without a leader."""
         mimic = Mimic(joint.name)
         while (further := self.joints[mimic.leader].mimic) is not None and further.leader in self.joints:
             multiplier, offset = mimic.multiplier, mimic.offset
@@ -214,7 +213,7 @@ class Urdf:
 
 
 def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
-    """Joints that hang below a link, parents before children."""
+    """Yield the joints below a link, parents before children."""
     children: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
         children.setdefault(joint.parent, []).append(joint)
@@ -226,7 +225,7 @@ def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
 
 
 MAX_TIPS = 12
-"""Links that a message offers as tip."""
+"""Most links that a message offers as tip."""
 
 
 class ChainPath(NamedTuple):
@@ -243,10 +242,10 @@ class ChainPath(NamedTuple):
 
 
 def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
-    """Return the path from a base link (the root if None) to a tip link (the only one there can be if None).
+    """Return the path from a base link (None: the root) to a tip link (None: the only possible one).
 
     Raises:
-        InputError: there is no such link or path, or no joint moves on it.
+        InputError: a link or path does not exist, or no joint moves on it.
     """
     start = urdf.root if base is None else _known(urdf, base, "base")
     end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "tip")
@@ -272,7 +271,7 @@ def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
 
 
 def _only_tip(urdf: Urdf, base: str) -> str:
-    """Return the end of the only branch that moves, if only one link could be meant by that."""
+    """Return the end of the only branch that moves; raise an InputError if it is ambiguous."""
     leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
     longest = max(leaves.values(), key=len, default=())
     tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
@@ -292,7 +291,7 @@ def _leaves(urdf: Urdf, base: str) -> list[str]:
 
 
 def _forks(urdf: Urdf, base: str) -> Iterator[str]:
-    """Links behind a moving joint from which more than one branch with moving joints goes on."""
+    """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
     branches: dict[str, set[str]] = {}
     for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
         for joint in _path(urdf, base, moving.child).joints:

@@ -1,10 +1,10 @@
-"""Springs and motors, of which a URDF says nothing, in proportion to what each joint carries.
+"""Placeholder springs and motors, which a URDF does not describe, in proportion to the load of each joint.
 
 A joint carries the links beyond it at a distance from its axis. Bounds of these distances over all
-configurations give a bound I of the inertia about the axis, and with the mass m the torque
-g sqrt(m I), which by Schwarz's inequality is at least that of gravity, however the arm stands and the axis
-points. So also the springs of a vertical axis, which gravity does not load, fit the arm that they accelerate.
-To this comes what the joint's damping asks for in a slow motion.
+configurations give a bound I of the inertia about the axis, and with the mass m the torque g sqrt(m I). By
+Schwarz's inequality this is at least the torque of gravity in any configuration and for any direction of the
+axis. So the springs of a vertical axis, which gravity does not load, also fit the arm that they accelerate.
+The torque of the joint's damping in a slow motion is added.
 """
 
 from __future__ import annotations
@@ -20,39 +20,39 @@ from vsacli.robot.joint import DenavitHartenberg, Link
 from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint
 
 DEFLECTION = {True: 0.1, False: 0.01}
-"""Deflection of springs by the largest load, at revolute (rad) and prismatic (m) joints."""
+"""Deflection of springs under the largest load, of revolute (rad) and prismatic (m) joints."""
 
 SLOW = {True: 1.0, False: 0.2}
-"""Velocity of a slow motion, rad/s and m/s, which the springs carry the damping of; that of wrists in URDF
-files exceeds their weight many times."""
+"""Velocity of a slow motion, rad/s (revolute) and m/s (prismatic), whose damping the springs carry. Damping
+of wrists in URDF files exceeds their weight many times."""
 
 HARDENING = 0.05
-"""k_c/k times the square of this deflection; gives the k_c/k of 5 rad^-2 that the paper's springs have."""
+"""Ratio k_c/k times the deflection squared; it gives 5 rad^-2, as of the paper's springs."""
 
 MOTOR_SHARE = 0.5
-"""Inertia of each motor relative to the largest that the joint carries. At the shoulders of the shipped arms
-after the Panda, the UR5 and the LWR it is 0.1 to 0.9; it grows towards their wrists."""
+"""Inertia of each motor over the largest that the joint carries. At the shoulders of the bundled arms modeled
+on the Panda, the UR5 and the LWR it is 0.1 to 0.9; it grows towards their wrists."""
 
 DIGITS = 2
-"""Digits of the constants, which are made up and should look so."""
+"""Significant digits of the constants, few since they are invented."""
 
 LEAST_TORQUE, LEAST_INERTIA = 1e-9, 1e-12
-"""N m and kg m^2 (N and kg); a joint that carries less carries nothing."""
+"""Torque, N m (N), and inertia, kg m^2 (kg), up to which a joint counts as unloaded."""
 
 UNLOADED = PlaceholderConstants(motor_inertia=1.0, stiffness=1000.0, spring=(400.0, 2000.0))
-"""Constants of a joint without load, as in a file without masses."""
+"""Constants of a joint without load, e.g. of a file without masses."""
 
 
 class Placeholders(NamedTuple):
-    """The actuator of every joint as long as nothing is known of it, and its constants, in SI units.
+    """The placeholder actuator of every joint, with its constants in SI units.
 
-    Constants that are None follow from what each joint carries.
+    Constants that are None follow from the load of each joint.
 
     Attributes:
-        actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
-        motor_inertia: of each motor, joint side of the gear.
-        stiffness: of an elastic transmission, and in the middle of what a serial one reaches.
-        spring: k and k_c of the cubic springs of an antagonistic one.
+        actuator: kind, a key of `vsacli.actuators.kinds.ACTUATORS`.
+        motor_inertia: inertia of each motor, joint side of the gear.
+        stiffness: stiffness of an elastic transmission, or middle of the attainable range of a serial one.
+        spring: coefficients k and k_c of the cubic springs of an antagonistic actuator.
     """
 
     actuator: str = "antagonistic"
@@ -73,7 +73,7 @@ class Placeholders(NamedTuple):
         )
 
     def origin(self, field: str, joint: ChainJoint, load: JointLoad) -> str:
-        """Return the source of the numbers in a field of its actuator, a clause."""
+        """Return a clause on the origin of the numbers in a field of the actuator."""
         sized = {"motor": self.motor_inertia, "stiffness": self.stiffness, "spring": self.spring}
         if not load.is_there or sized.get(field, ()) is not None:
             return "not from the URDF"
@@ -88,8 +88,8 @@ class JointLoad(NamedTuple):
     """The largest load of a joint.
 
     Attributes:
-        torque: of weight and damping, N m (N).
-        inertia: about its axis, kg m^2 (the mass, kg).
+        torque: torque of weight and damping, N m (N).
+        inertia: inertia about the joint axis, kg m^2 (for a prismatic joint the mass, kg).
     """
 
     torque: float
@@ -97,11 +97,14 @@ class JointLoad(NamedTuple):
 
     @property
     def is_there(self) -> bool:
-        """Whether there is anything to carry."""
+        """Whether the joint carries a load."""
         return self.torque > LEAST_TORQUE and self.inertia > LEAST_INERTIA
 
     def constants(self, deflection: float, gear: float) -> PlaceholderConstants:
-        """Constants with which the load deflects the springs by so much, rad (m), of motors behind a gear."""
+        """Return constants with which the load deflects the springs by `deflection`, rad (m).
+
+        The motor inertia is rounded on the motor side of the gear ratio `gear`.
+        """
         if not self.is_there:
             return UNLOADED
         stiffness = _rounded(self.torque / deflection)
@@ -118,12 +121,12 @@ def _rounded(number: float) -> float:
 
 
 class _Masses(NamedTuple):
-    """Bodies at distances of at most r from a point or an axis.
+    """Moments of bodies of mass m at distances of at most r from a point or an axis.
 
     Attributes:
-        mass: sum of their masses m.
+        mass: sum of m.
         first: sum of m r.
-        second: sum of m r^2 and of their own largest moments of inertia.
+        second: sum of m r^2 and of the largest principal moments of the bodies.
     """
 
     mass: float = 0.0
@@ -131,12 +134,12 @@ class _Masses(NamedTuple):
     second: float = 0.0
 
     def farther(self, distance: float) -> _Masses:
-        """Seen from a point that is so far from the first."""
+        """Return the moments about a point at a distance from the present one."""
         second = self.second + (2 * self.first + self.mass * distance) * distance
         return _Masses(self.mass, self.first + self.mass * distance, second)
 
     def joined(self, link: Link, distance: float) -> _Masses:
-        """Return the masses with a further link whose centre of mass has this distance."""
+        """Return the moments with a further link, whose center of mass is at this distance."""
         own = link.mass * distance
         moment = max(float(link.inertia.principal_moments[-1]), 0.0)
         return _Masses(self.mass + link.mass, self.first + own, self.second + own * distance + moment)
@@ -148,9 +151,9 @@ def joint_loads(
     """Return the largest load of each joint over all configurations.
 
     Args:
-        joints: from the base.
-        rows: of each joint.
-        links: that each joint moves.
+        joints: joints from the base.
+        rows: rows of the joints.
+        links: links that the joints move.
     """
     loads, beyond = [], _Masses()  # beyond joint i, as seen from the origin of frame i
     for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
@@ -167,7 +170,7 @@ def joint_loads(
 
 
 def _centre(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
-    """Distance of a link's centre of mass from the axis that moves it, and its height along it above d."""
+    """Return the distance of a link's center of mass from its joint axis, and its height along it above d."""
     x, y, z = link.com
     c, s = math.cos(row.alpha), math.sin(row.alpha)
     return math.hypot(row.a + x, c * y - s * z), s * y + c * z

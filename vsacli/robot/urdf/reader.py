@@ -1,4 +1,8 @@
-"""Reading of URDF: links and joints, and what vendors add (transmissions, safety controllers)."""
+"""Reading of URDF: links and joints, and extensions by vendors (transmissions, safety controllers).
+
+All problems of a file are collected, each with its line; a faulty element is replaced by a harmless one, so
+that reading continues.
+"""
 
 from __future__ import annotations
 
@@ -32,20 +36,20 @@ from vsacli.robot.urdf.link_tree import (
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 SIMPLE = "SimpleTransmission"
-"""A transmission of one motor to one joint, as ROS control and the PR2 name it."""
+"""Type of a transmission from one motor to one joint, in ROS control and for the PR2."""
 
 REDUCTIONS = ("mechanicalReduction", "mechanical_reduction")
-"""Tags of ROS control and of ros2_control."""
+"""Tags of a gear reduction in ROS control and in ros2_control."""
 
 SPRINGS = ("springStiffness", "springReference")
 
 
 class Beside(NamedTuple):
-    """Statements outside of joints, by the names of joints.
+    """Data on joints outside of their elements, by the names of joints.
 
     Attributes:
         gear_ratios: motion of the only motor over that of the joint.
-        left_out: what a robot file does not hold, a few words each.
+        left_out: short phrases on properties that a robot file cannot express.
     """
 
     gear_ratios: Mapping[str, float]
@@ -77,7 +81,7 @@ def _transmissions(root: Element) -> Iterator[Element]:
 
 
 def _is_simple(transmission: Element) -> bool:
-    """Return whether it says to be of that type, of one motor, with one reduction at most."""
+    """Return whether a transmission is declared as simple, with one motor and one reduction at most."""
     types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
     motors = list(transmission.all("actuator"))
@@ -89,7 +93,7 @@ def _found(transmission: Element) -> list[Element]:
 
 
 def _reduction(transmission: Element, problems: Problems) -> float:
-    """Return the reduction of a simple transmission, 1 if it has none."""
+    """Return the reduction of a simple transmission; 1 without one."""
     for element in _found(transmission):
         try:
             ratio = float(element.text.replace("_", "?"))
@@ -103,10 +107,10 @@ def _reduction(transmission: Element, problems: Problems) -> float:
 
 
 MACRO = re.compile(r"\$\{|\$\((anon|arg|dirname|env|eval|find|optenv)\b")
-"""Beginning of an xacro expression; names may hold other signs, as a shell's."""
+"""Beginning of an xacro expression; names may contain other dollar signs."""
 
 MESH = "filename"
-"""Attribute that names a mesh, which nobody opens here."""
+"""Attribute that names a mesh, which is never opened."""
 
 MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
@@ -118,7 +122,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     """Read a URDF file.
 
     Raises:
-        InputError: with every problem of the file, each with its line.
+        InputError: the file has problems; lists each with its line.
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
@@ -141,7 +145,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
 
 
 def _refuse_macros(root: Element, problems: Problems) -> None:
-    """Refuse tags and expressions that xacro fills in; its name space alone stays in what it has expanded."""
+    """Report tags and expressions of xacro; its namespace is allowed, since expanded files keep it."""
     for element in root.everything():
         macros = [f"<{quoted(element.tag)[1:-1]}>"] if element.tag.startswith("xacro:") else []
         values = (word for name, word in element.attributes.items() if name != MESH)
@@ -183,7 +187,6 @@ def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], 
 
 
 def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
-    """No joint may follow itself."""
     for joint in joints.values():
         if joint.name in _leaders(joint, joints):
             message = "follows itself: the <mimic> of joints form a circle"
@@ -191,7 +194,7 @@ def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
 
 
 def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
-    """Names of the joints that a joint follows, directly or by way of others."""
+    """Return the names of the joints that a joint follows, directly or indirectly."""
     leaders: set[str] = set()
     while joint.mimic is not None and joint.mimic.leader in joints.keys() - leaders:
         joint = joints[joint.mimic.leader]
@@ -200,7 +203,7 @@ def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
 
 
 def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
-    """Return the one link without a parent, from which every other hangs."""
+    """Return the name of the only link without a parent, and check that all others are below it."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
@@ -215,7 +218,7 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], proble
 
 
 class _Reader:
-    """Reads elements; what is wrong is noted and replaced by something harmless, so that reading goes on."""
+    """A reader of elements; problems are collected, and faulty parts replaced, so that reading continues."""
 
     def __init__(self, problems: Problems, beside: Beside) -> None:
         self._problems = problems
@@ -261,7 +264,7 @@ class _Reader:
         )
 
     def _left_out(self, joint: Element) -> Iterator[str]:
-        """Yield the parts not taken over: without a place in a robot file, or ambiguous in the URDF."""
+        """Yield phrases on parts that a robot file cannot express, or that are ambiguous in the URDF."""
         for dynamics in joint.all("dynamics"):
             if self._non_negative(dynamics, "friction", 0.0):
                 yield "dry friction"
@@ -310,7 +313,7 @@ class _Reader:
         )
 
     def _bound(self, element: Element, name: str) -> float:
-        """Return a limit, which may be infinite or, for want of one, very large."""
+        """Return a limit, clipped; files write infinite or very large ones for no limit."""
         return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, self._float(element, name, 0.0, math.inf)))
 
     def _origin(self, element: Element) -> FloatArray:
@@ -355,7 +358,7 @@ class _Reader:
         return 0.0
 
     def word(self, element: Element, name: str, default: str = "") -> str:
-        """Return an attribute that is shown to people."""
+        """Return a required, printable attribute, for use in messages."""
         word = element.attributes.get(name, "").strip()
         if not word:
             self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
@@ -364,7 +367,7 @@ class _Reader:
         return word or default
 
     def _child(self, element: Element, tag: str) -> Element | None:
-        """Return the only child of a tag, if there is one."""
+        """Return the only child with a tag; None without one."""
         found = list(element.all(tag))
         if len(found) > 1:
             self._problems.add(found[1].line, f"{element.tag}: a second <{tag}>; one is expected")

@@ -1,4 +1,4 @@
-"""A converted robot as a robot file, with comments on what to replace."""
+"""The text of a robot file for a converted robot, with comments on the placeholders to replace."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from vsacli.robot.urdf.link_tree import UrdfJoint
 
 COMMENT_COLUMN = 34
 MAX_LINKS = 4
-"""Links that a comment names before it counts the rest."""
+"""Most links that a comment names before it counts the rest."""
 
 
 def robot_text(conversion: Conversion) -> str:
-    """Return the robot file; `load_robot` gives the same robot again."""
+    """Return the text of the robot file; `load_robot` returns the same robot from it."""
     robot = conversion.robot
     lines = [
         "# From a URDF, by vsacli import-urdf: frames, masses, inertias, damping and limits of the joints.",
@@ -79,7 +79,7 @@ def _link_lines(link: Link) -> Iterator[str]:
 
 
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
-    """Return the source of the numbers in a field of an actuator, with what the URDF says of a motor."""
+    """Return the origin of the numbers in a field of an actuator, with motor data of the URDF."""
     joint, load = conversion.chain.joints[index], conversion.loads[index]
     origin = conversion.placeholders.origin(field, joint, load)
     known = " and ".join(_known(joint.urdf))
@@ -89,7 +89,6 @@ def _origin_of(field: str, conversion: Conversion, index: int) -> str:
 
 
 def _known(joint: UrdfJoint) -> Iterator[str]:
-    """Yield the statements of a URDF on the only motor of a joint."""
     if joint.limit.effort:
         yield f"an effort limit of {_number(joint.limit.effort)} {joint.unit(TORQUE)} (joint side)"
     if joint.gear_ratio:
@@ -97,7 +96,7 @@ def _known(joint: UrdfJoint) -> Iterator[str]:
 
 
 def _written(record: Any) -> dict[str, str]:
-    """Return the fields of a record on one line, without those at their default."""
+    """Return the text of each field of a record, without fields at their default."""
     values = {name: getattr(record, name) for name in declared(type(record))}
     return {
         name: _value(field.kind, values[name])
@@ -145,12 +144,12 @@ def _numbers(numbers: Iterable[float]) -> str:
 
 
 def _number(number: float) -> str:
-    """Return the fewest digits that give the same number again, without a superfluous zero."""
+    """Return the shortest text that reads back as the same number."""
     return repr(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
 
 
 def _angle(angle: float) -> str:
-    """Return the angle in rad; a multiple of pi/2 as an expression."""
+    """Return the text of an angle in rad; a multiple of pi/2 becomes an expression."""
     quarters = round(angle / (math.pi / 2))
     if quarters == 0 or quarters * (math.pi / 2) != angle:
         return _number(angle)

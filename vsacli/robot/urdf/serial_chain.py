@@ -1,4 +1,7 @@
-"""The serial chain that a URDF holds: joints of its path, and held joints, whose links move with it."""
+"""The serial chain of a URDF: joints of the path from base to tip, and held joints next to it.
+
+Links on side branches move with the joint of the chain that carries them, with their own joints held.
+"""
 
 from __future__ import annotations
 
@@ -28,19 +31,19 @@ from vsacli.robot.urdf.link_tree import (
 )
 
 Hold = Mapping[str, float | str]
-"""Positions by name of the joint, rad (m), or texts such as "90 deg"."""
+"""Positions of held joints by name, rad (m), or texts such as "90 deg"."""
 
 LIMIT_ROUNDING = 1e-9
-"""rad or m; a joint that is this far beyond a limit stands at it."""
+"""Distance, rad or m, by which a held joint may be beyond a limit without a warning."""
 
 
 class HeldJoint(NamedTuple):
-    """A joint that could move but stands still.
+    """A joint that could move but is held.
 
     Attributes:
-        urdf: the joint as its file describes it.
-        position: where it stands, rad (m).
-        leader: name of the joint that it follows in the end, its own if it follows none that there is.
+        urdf: joint of the URDF.
+        position: position at which it is held, rad (m).
+        leader: name of the last leader in a chain of mimics; its own without an existing leader.
     """
 
     urdf: UrdfJoint
@@ -49,7 +52,7 @@ class HeldJoint(NamedTuple):
 
     @property
     def follows(self) -> bool:
-        """Whether another joint takes it where it stands."""
+        """Whether its position follows from another joint."""
         return self.leader != self.urdf.name
 
     def __str__(self) -> str:
@@ -57,7 +60,7 @@ class HeldJoint(NamedTuple):
         return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit()}{following}"
 
     def warnings(self) -> Iterator[str]:
-        """Yield the warning that it may stand at another place, with a fix."""
+        """Yield warnings that the position may be wrong, with a fix."""
         mimic, limit = self.urdf.mimic, self.urdf.limit.position
         if mimic is not None and not self.follows and self.position == _resting(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
@@ -72,16 +75,16 @@ class HeldJoint(NamedTuple):
 def held_joints(
     urdf: Urdf, standing: Iterable[UrdfJoint], moving: Collection[str], hold: Hold
 ) -> list[HeldJoint]:
-    """Return the joints that stand still, each where it is held or follows another one to, else at zero.
+    """Return held joints, at their given position, at one that follows from a leader, or at zero.
 
     Args:
-        urdf: the robot.
-        standing: the joints.
-        moving: names of those that move, which none of them follows.
-        hold: positions of joints that follow none.
+        urdf: robot.
+        standing: joints to hold.
+        moving: names of joints that move; no held joint follows one of them.
+        hold: positions of joints that follow no other.
 
     Raises:
-        InputError: such a position cannot be given, or has no effect.
+        InputError: a position cannot be given, or has no effect.
     """
     followed = [(joint, urdf.followed(joint)) for joint in standing]
     leaders = {mimic.leader: _resting(urdf.joints[mimic.leader]) for _, mimic in followed}
@@ -102,7 +105,7 @@ def held_joints(
 
 
 def _resting(joint: UrdfJoint) -> float:
-    """Return the position of a joint nobody states: as if its missing leader stood at zero."""
+    """Return the default position of a joint: zero, or that at which its missing leader is at zero."""
     return 0.0 if joint.mimic is None else joint.mimic.offset
 
 
@@ -114,7 +117,7 @@ def _given(
     moving: Collection[str],
     problems: Problems,
 ) -> float:
-    """Return the position at which a joint is to be held; 0 if a problem was noted."""
+    """Return the given position of a held joint; 0 after adding a problem."""
     reason = _reason_against(urdf, name, leaders, moving)
     if reason:
         problems.add(0, f"hold: {reason}")
@@ -129,7 +132,7 @@ def _given(
 
 
 def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Collection[str]) -> str:
-    """Why a joint cannot be held; empty if it can."""
+    """Return the reason why a joint cannot be held; empty if it can."""
     joint, shown = urdf.joints.get(name), quoted(name)
     if joint is None:
         return f"there is no joint {shown}{did_you_mean(name, leaders)}"
@@ -145,18 +148,18 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
 
 
 STANDARD_GRAVITY = 9.81
-"""m/s^2, along -z of the root link; a URDF does not give any."""
+"""Gravity, m/s^2, along -z of the root link; a URDF does not give any."""
 
 
 @dataclass(frozen=True)
 class ChainJoint:
-    """A joint that moves.
+    """A joint of the chain, at position zero.
 
     Attributes:
-        urdf: the joint as its file describes it.
-        frame: pose of its URDF frame, (4, 4).
-        links: those it carries rigidly, its own first.
-        body: these links as one.
+        urdf: joint of the URDF.
+        frame: pose of its URDF frame in the base link, (4, 4).
+        links: links that it carries rigidly, its own first.
+        body: these links as a single body, in the base link.
     """
 
     urdf: UrdfJoint
@@ -166,17 +169,17 @@ class ChainJoint:
 
     @property
     def is_revolute(self) -> bool:
-        """Whether it turns."""
+        """Whether the joint rotates."""
         return self.urdf.is_revolute
 
     @property
     def origin(self) -> FloatArray:
-        """A point of its axis, (3,)."""
+        """Point on the joint axis, (3,), m."""
         return self.frame[:3, 3]
 
     @property
     def direction(self) -> FloatArray:
-        """The unit vector along its axis, (3,)."""
+        """Unit vector along the joint axis, (3,)."""
         result: FloatArray = self.frame[:3, :3] @ self.urdf.axis
         return result
 
@@ -190,7 +193,7 @@ class SerialChain:
         base: name of the base link.
         tip: name of the tip link.
         up: direction of the root link's z axis, (3,).
-        joints: those that move, from the base.
+        joints: joints that move, from the base.
         tip_pose: pose of the tip link, (4, 4).
         held_below: joints between root and base that could move.
         held_beside: joints on side branches that could move.
@@ -207,24 +210,24 @@ class SerialChain:
 
     @property
     def held(self) -> tuple[HeldJoint, ...]:
-        """All joints that could move and affect the chain, but stand still."""
+        """All held joints, which could move and affect the chain."""
         return (*self.held_below, *self.held_beside)
 
 
 def serial_chain(
     urdf: Urdf, base: str | None = None, tip: str | None = None, hold: Hold | None = None
 ) -> SerialChain:
-    """Return the chain from a base link (the root if None) to a tip link (the only one there is if None).
+    """Return the chain from a base link to a tip link.
 
     Args:
-        urdf: the robot.
-        base: name of a link.
-        tip: name of a link.
-        hold: where joints stand that are not on the chain, by name; zero for others.
+        urdf: robot.
+        base: name of the base link; the root by default.
+        tip: name of the tip link; by default the only possible one.
+        hold: positions of joints that are not on the chain, by name; zero for others.
 
     Raises:
-        InputError: there is no such chain, it has joints that no serial robot can have, or joints cannot be
-            held like this.
+        InputError: the chain does not exist, has joints without a drive, or joints cannot be held as
+            requested.
     """
     path = find_path(urdf, base, tip)
     carried = _carried(urdf, path)
@@ -254,7 +257,7 @@ def serial_chain(
 def _check_joints(
     urdf: Urdf, path: ChainPath, below_base: Iterable[UrdfJoint], beside: Iterable[UrdfJoint]
 ) -> None:
-    """Refuse joints without a drive of their own, and others that move along with the chain."""
+    """Raise an error for joints of the chain without a drive, and for others that follow the chain."""
     problems = Problems(urdf.file)
     for joint in path.moving:
         name = f"joint {quoted(joint.name)}"
@@ -279,7 +282,6 @@ def _check_joints(
 
 
 def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
-    """Refuse inertial data that are not whole of links that move."""
     problems = Problems(urdf.file)
     for link in (link for links in carried for link in links):
         if link.flaw is not None:
@@ -288,7 +290,7 @@ def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
 
 
 def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
-    """Return the pose of every link in the root, where some joints are held and all others stand at zero."""
+    """Return the pose of every link in the root, with some joints held and all others at zero."""
     positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
     for joint in below(urdf.root, urdf.joints.values()):
@@ -310,7 +312,6 @@ def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
 
 
 def _beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
-    """Joints that could move on side branches."""
     names = {link.name for links in carried for link in links}
     moving = {joint.name for joint in path.moving}
     candidates = (joint for joint in urdf.joints.values() if joint.child in names and not joint.is_fixed)

@@ -1,4 +1,4 @@
-"""Groups of joints of a URDF, as an SRDF names them for MoveIt: from which link to which a group reaches.
+"""Groups of joints in an SRDF, the file of MoveIt: base and tip link of the chain of a group.
 
 The format: https://docs.ros.org/en/api/srdfdom/html/structsrdf_1_1Model_1_1Group.html
 """
@@ -16,7 +16,7 @@ from vsacli.robot.urdf.link_tree import Urdf, UrdfJoint
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 MAX_BYTES = 10_000_000
-"""Largest file, as for a URDF: pairs of links that may touch make most of an SRDF."""
+"""Largest file, as for a URDF; most of an SRDF are pairs of links that may collide."""
 
 
 class Ends(NamedTuple):
@@ -27,15 +27,16 @@ class Ends(NamedTuple):
 
 
 def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> Ends:
-    """Between which links the chain of a group lies.
+    """Return the base and tip link of the chain of a group.
 
     Args:
-        path: the SRDF file.
-        group: its name; None for the only one there is.
-        urdf: the robot.
+        path: path of the SRDF file.
+        group: name of the group; None for the only one.
+        urdf: robot.
 
     Raises:
-        InputError: the file is no SRDF, has no such group, or it is no serial chain of this robot.
+        InputError: the file is not an SRDF, or the group does not exist, or is not a serial chain of the
+            robot.
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
@@ -54,7 +55,7 @@ def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -
 
 
 class _Groups:
-    """The groups of a file, seen on a robot."""
+    """The groups of a file, resolved on a robot."""
 
     def __init__(self, groups: Mapping[str, Element], urdf: Urdf, problems: Problems) -> None:
         self._groups, self._urdf, self._problems = groups, urdf, problems
@@ -82,7 +83,7 @@ class _Groups:
         return Ends(first.parent if chain is None else chain.attributes["base_link"], tip)
 
     def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
-        """Return the joints of a group by name: its own, those of its links, chains and groups."""
+        """Return the joints of a group by name: its own, and those of its links, chains and groups."""
         group = self._groups[name]
         if name in around:
             self._problems.fail(group.line, f"the group {quoted(name)} contains itself")

@@ -1,4 +1,4 @@
-"""XML text to a tree with line numbers: no document types, so no entities, and nothing without bounds."""
+"""Parsing of XML to a tree with line numbers; bounded, and without document types, so without entities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_ELEMENTS = 100_000
 
 @dataclass(frozen=True)
 class Element:
-    """An element with its attributes and children, and the text outside of these."""
+    """An element with its attributes, its children, and the text outside of its children."""
 
     tag: str
     line: int
@@ -25,17 +25,17 @@ class Element:
 
     @property
     def text(self) -> str:
-        """The text, without space around it."""
+        """Text of the element, without surrounding whitespace."""
         return "".join(self.texts).strip()
 
     def everything(self) -> Iterator[Element]:
-        """Yield the element and all below it."""
+        """Yield the element and all its descendants."""
         yield self
         for child in self.children:
             yield from child.everything()
 
     def all(self, tag: str) -> Iterator[Element]:
-        """Return the children of this tag."""
+        """Return the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
 
@@ -43,7 +43,7 @@ def parse_xml(text: str, problems: Problems) -> Element:
     """Parse a document.
 
     Raises:
-        InputError: broken syntax, a document type declaration, or more than the limits allow.
+        InputError: the syntax is broken, there is a document type declaration, or a limit is exceeded.
     """
     builder = _Builder(problems)
     try:
@@ -55,7 +55,7 @@ def parse_xml(text: str, problems: Problems) -> Element:
 
 
 class _Builder:
-    """Takes start and end tags and leaves the document in `root`."""
+    """A builder of the tree from the events of the parser; `root` is its result."""
 
     root: Element
 

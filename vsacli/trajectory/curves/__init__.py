@@ -1,4 +1,4 @@
-"""Profiles of signals in closed form: here the simple ones."""
+"""Profiles of signals in closed form; this namespace exports the simple ones."""
 
 from vsacli.trajectory.curves.closed_form import DEGREES, VIA_DEGREES, ClosedForm, Constant
 from vsacli.trajectory.curves.polynomial import RestToRest

@@ -1,4 +1,4 @@
-"""Profiles given by a formula, and the simplest of them."""
+"""The base class of profiles in closed form, and the simplest of them, a constant."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from vsacli.base.signals import Signal
 from vsacli.trajectory.times import stretch
 
 SHORTEST, LONGEST = 1e-30, 1e30
-"""Durations of profiles, s, of which the fourth power is still a number."""
+"""Range of durations, s, whose fourth powers neither overflow nor underflow."""
 
 DEGREES = range(3, 16, 2)
 """Degrees of rest-to-rest polynomials."""
 
 VIA_DEGREES = range(3, 10, 2)
-"""Degrees of splines through points; those of higher degree lose too many digits."""
+"""Degrees of splines through points; higher degrees lose too many digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClosedForm(ABC):
-    """A profile given by a formula, analytic between the two ends of its span, in s."""
+    """A profile in closed form, analytic between its breakpoints; its span is in s."""
 
     signal: Signal
     span: tuple[float, float]
@@ -40,73 +40,73 @@ class ClosedForm(ABC):
     @property
     @abstractmethod
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Nothing: a formula leaves no doubt."""
+        """No warnings, since a formula leaves nothing uncertain."""
         return ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Nothing: all that is given plays a part."""
+        """No notes, since nothing is interpreted."""
         return ()
 
     @property
     def breakpoints(self) -> FloatArray:
-        """The ends of the span."""
+        """Ends of the span."""
         return np.array(self.span)
 
     @property
     def known_between(self) -> bool:
-        """True: steps are nothing special."""
+        """True, since samples are evaluated like any other time."""
         return True
 
     @abstractmethod
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """Return the same at the steps start..stop-1, whose times are `time`."""
+        """Return the same at samples, whose times are `time`."""
         return self.at(time)
 
     @property
     def estimate(self) -> None:
-        """None: no value comes from a fit of samples."""
+        """None, since no value comes from a fit."""
         return None
 
     def stretched(self, factor: float) -> Self:
-        """Return the same profile, slower by a factor."""
+        """Return the profile slowed down by a factor."""
         first, last = self.span
         return replace(self, span=(first, stretch(last, first, factor)))
 
     @abstractmethod
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component."""
+        """Return the profile with a constant added to each component."""
 
 
 def added(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
-    """Return the sum of two values of each component."""
+    """Return the sums of two values for each component."""
     return tuple(value + constant for value, constant in zip(values, by, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Constant(ClosedForm):
-    """The same `value`, one number a component, all the time."""
+    """A constant `value`, one number per component."""
 
     value: tuple[float, ...]
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
         return len(self.value)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """See `ClosedForm.at`."""
         rows = np.zeros((self.signal.orders, self.components, len(time)))
         rows[0] = np.array(self.value)[:, None]
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component."""
+        """See `ClosedForm.raised`."""
         return replace(self, value=added(self.value, by))

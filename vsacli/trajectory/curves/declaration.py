@@ -1,4 +1,8 @@
-"""Declarations of a trajectory file: of which signals, in which fields, and the curve that follows."""
+"""Declarations of signals in trajectory files: base classes with fields and uses, and recorded signals.
+
+A type of declaration, such as a polynomial, becomes a record class for each of its uses, i.e. for a signal
+and for robots with or without springs.
+"""
 
 from __future__ import annotations
 
@@ -37,20 +41,20 @@ if TYPE_CHECKING:
 
 
 SAME_TIME = 1e-9
-"""Times whose difference is a smaller share than this are the same, but for rounding in a file."""
+"""Relative difference up to which times are equal: rounding in a file."""
 
 Values: TypeAlias = tuple[float | None, ...]
-"""A number for each joint or axis, None for joints that do not take the signal."""
+"""A number for each joint or axis; None for joints that the signal does not command."""
 
 _TIMES = ("not", "once", "twice", "three times", "four times")
 
 
 @dataclass(frozen=True)
 class Use:
-    """The use of a declaration.
+    """The use of a type of declaration.
 
     Attributes:
-        signal: the declared signal.
+        signal: declared signal.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
     """
 
@@ -63,27 +67,27 @@ class Use:
         return 2 if self.rigid else self.signal.orders - 1
 
     def one(self, role: str, **options: Any) -> Any:
-        """Return the field of a value, e.g. `role` "at the start"."""
+        """Return the field of a value; `role` is e.g. "at the start"."""
         return self._field(self._kind, f"{self.signal.key} {role}", **options)
 
     def several(self, role: str) -> Any:
-        """Return the field of a list of values, e.g. `role` "to pass"."""
+        """Return the field of a list of values; `role` is e.g. " to pass"."""
         plural = self.signal.key + ("es" if self.signal.key.endswith(("s", "ch")) else "s")
         return self._field(Items(self._kind), plural + role)
 
     def size(self, doc: str) -> Any:
-        """Return the field of a positive value in the unit of the signal, which may be absent."""
+        """Return the optional field of a positive value in the unit of the signal."""
         return value(self._kind, doc, check=POSITIVE, default=None)
 
     def frame(self) -> dict[str, Any]:
-        """Return the field that says along whose axes a wrench is given; none for other signals."""
+        """Return the field of a wrench's frame; empty for other signals."""
         if self.signal is not WRENCH:
             return {}
         doc = f"along whose axes `{' '.join(WRENCH_AXES)}` are given"
         return {"frame": choice(WRENCH_FRAMES, doc)}
 
     def degree(self, degrees: range) -> Check:
-        """Return the check for degrees smooth enough for a motion that begins and ends at rest."""
+        """Return the check of a degree: smooth enough for a motion that begins and ends at rest."""
         signal = self.signal
         subject, vanishing = signal.key, "its rate"
         if signal is POSITION:
@@ -104,18 +108,18 @@ class Use:
 
 
 def odd(degrees: range, lowest: int, reason: str) -> Check:
-    """Return the odd degrees from the lowest on that is smooth enough."""
+    """Return the check of a degree: odd, and at least the lowest that is smooth enough."""
     allowed = range(max(lowest, degrees.start), degrees.stop, degrees.step)
     words = f"odd, {allowed[0]} to {allowed[-1]} ({reason})"
     return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
 
 
 class Declaration(ABC):
-    """A type of signal in a trajectory file: its fields, for each of its uses.
+    """A type of declaration in a trajectory file, with its fields for each use.
 
     Attributes:
-        use: of the records that `record` makes.
-        frame: along whose axes a wrench is given; other signals have none.
+        use: use of the record classes that `record` returns.
+        frame: frame along whose axes a wrench is given; only for wrenches.
     """
 
     use: ClassVar[Use]
@@ -133,7 +137,7 @@ class Declaration(ABC):
 
     @classmethod
     def record(cls, use: Use) -> type[Self]:
-        """Return the record class in which it is declared for a use."""
+        """Return the record class for a use."""
         made: type[Self] = _record(cls, use)
         return made
 
@@ -141,7 +145,6 @@ class Declaration(ABC):
         check_fields(self, *self._problems())
 
     def _problems(self) -> Iterator[FieldProblem]:
-        """Yield the problems of the record beyond its fields."""
         return iter(())
 
 
@@ -217,7 +220,7 @@ class Recorded(Declaration):
 
 
 class Formula(Declaration):
-    """A signal that is given by a formula."""
+    """The declaration of a signal in closed form."""
 
     @property
     def signal(self) -> Signal:
@@ -226,15 +229,15 @@ class Formula(Declaration):
 
     @property
     def lasts(self) -> float | None:
-        """Duration that follows from the declaration, s; None if any will do."""
+        """Duration that follows from the declaration, s; None if it may have any."""
         return None
 
     @abstractmethod
     def over(self, span: tuple[float, float]) -> ClosedForm:
-        """Return the profile from the first to the last time of a span, in s."""
+        """Return the profile over a span, s."""
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """Yield why it cannot last this long, in s."""
+        """Yield the problems that prevent a profile of this duration, s."""
         if self.lasts is not None and not same_time(self.lasts, duration):
             yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
             return
@@ -244,24 +247,24 @@ class Formula(Declaration):
             yield FieldProblem((), str(error))
 
     def warnings_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
-        """Yield doubts about it over a span, in clauses.
+        """Yield warnings about the profile over a span, as clauses.
 
         Args:
-            _span: in s.
-            _joints: name and type of each.
+            _span: first and last time, s.
+            _joints: joint types by joint name.
         """
         return iter(())
 
     def notes_over(self, _span: tuple[float, float], /) -> Iterator[str]:
-        """Yield clauses on values over a span, in s, that the user did not give."""
+        """Yield notes on values that were derived for a span, s, as clauses."""
         return iter(())
 
 
 def same_time(one: float, other: float) -> bool:
-    """Return whether two times are the same but for rounding."""
+    """Return whether two times are equal up to rounding."""
     return math.isclose(one, other, rel_tol=SAME_TIME)
 
 
 def numbers(values: Values) -> tuple[float, ...]:
-    """NaN in place of None."""
+    """Return values with NaN in place of None."""
     return tuple(math.nan if value is None else value for value in values)

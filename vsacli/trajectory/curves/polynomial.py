@@ -1,4 +1,4 @@
-"""Polynomials from rest to rest, and values that are held: their curves, and how a file declares them."""
+"""Rest-to-rest polynomials and constant values: profiles, and their declarations in files."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class RestToRest(ClosedForm):
     """Polynomial whose derivatives up to (degree-1)/2 vanish at both ends of the span.
 
     Attributes:
-        degree: odd, 3 to 15.
-        start, end: one value a component, taken exactly at the ends.
+        degree: degree, odd, 3 to 15.
+        start, end: values of the components, exact at the ends.
     """
 
     degree: int
@@ -42,11 +42,11 @@ class RestToRest(ClosedForm):
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """See `ClosedForm.components`."""
         return len(self.start)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """See `ClosedForm.at`."""
         first, last = self.span
         elapsed, remaining = time - first, last - time
         late = remaining < elapsed
@@ -61,14 +61,15 @@ class RestToRest(ClosedForm):
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component."""
+        """See `ClosedForm.raised`."""
         return replace(self, start=added(self.start, by), end=added(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:
-    """Return the polynomial from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
+    """Return the polynomial from 0 at u = 0 to 1 at u = 1.
 
-    With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
+    With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k, whose terms are
+    positive, so it is accurate for small u.
     """
     m = (degree - 1) // 2
     series = np.polyval([math.comb(m + k, k) for k in range(m, -1, -1)], 1 - u)
@@ -76,10 +77,10 @@ def _rise(u: FloatArray, degree: int) -> FloatArray:
 
 
 def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int) -> Iterator[FloatArray]:
-    """Derivatives 1, 2, ... of that polynomial by time.
+    """Yield the time derivatives of order 1, 2, ... of the polynomial `_rise`.
 
-    The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and
-    c = degree! / m!^2. Since dp/ds = 1-2s and d(1-2s)/ds = -2, the others are sums of p^i (1-2s)^j as well.
+    The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and c = degree! / m!^2. Since
+    dp/ds = 1-2s and d(1-2s)/ds = -2, the others are also sums of terms p^i (1-2s)^j.
     """
     m = (degree - 1) // 2
     p, slope = elapsed / total * (remaining / total), (remaining - elapsed) / total
@@ -94,7 +95,7 @@ def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int
 
 
 def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
-    """d/ds of the sum of c p^i (1-2s)^j, given and returned as {(i, j): c}."""
+    """Return d/ds of the sum of terms c p^i (1-2s)^j, given and returned as {(i, j): c}."""
     result: dict[tuple[int, int], float] = defaultdict(float)
     for (i, j), c in terms.items():
         if i:
@@ -105,7 +106,7 @@ def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], fl
 
 
 def _power(base: FloatArray, exponent: int) -> FloatArray:
-    """base^exponent by multiplication, much faster than `**` on arrays."""
+    """Return base^exponent by multiplication, which is much faster than `**` on arrays."""
     return reduce(np.multiply, [base] * exponent, np.ones_like(base))
 
 
@@ -113,7 +114,7 @@ AXES = f", `[{', '.join(WRENCH_AXES)}]`"
 
 
 class Polynomial(Formula):
-    """From one value to another, at rest before and after."""
+    """A polynomial from one value to another, at rest at both ends."""
 
     degree: int
     start: Values
@@ -144,13 +145,13 @@ class Polynomial(Formula):
         return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
 
     def over(self, span: tuple[float, float]) -> RestToRest:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         start, end = numbers(self.start), numbers(self.end)
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
 
 class Hold(Formula):
-    """The same value all the time."""
+    """A constant value."""
 
     value: Values
 
@@ -167,5 +168,5 @@ class Hold(Formula):
         return f"The same {use.signal.key} all the time."
 
     def over(self, span: tuple[float, float]) -> Constant:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         return Constant(signal=self.signal, span=span, value=numbers(self.value))

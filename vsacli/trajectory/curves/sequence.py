@@ -1,4 +1,4 @@
-"""Motions one after the other, as a file declares them; each begins where the one before ends."""
+"""Sequences of motions, declared in files; each part begins where the previous one ends."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ Position: TypeAlias = tuple[float, ...]
 
 
 class Part(Declaration):
-    """A motion with a duration of its own; its declaration may leave the start open."""
+    """A motion with a duration of its own, whose start may follow from the previous part."""
 
     opening: ClassVar[tuple[str | int, ...]]
-    """Path to where the position at its start is declared."""
+    """Path of the field that declares the position at the start."""
 
     @property
     @abstractmethod
     def lasts(self) -> float:
-        """The duration, s."""
+        """Duration, s."""
 
     @property
     @abstractmethod
     def begins(self) -> Position | None:
-        """The position at the start; None if it is where the part before ends."""
+        """Position at the start; None if it is the end of the previous part."""
 
     @abstractmethod
     def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
-        """Return the profile over a span, in s, after a part that ends here."""
+        """Return the profile over a span, s, after a part that ends at position `here`."""
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """Yield the problems that prevent its execution."""
+        """Yield the problems of the part alone."""
         return iter(())
 
 
@@ -61,7 +61,7 @@ class _Timed(Part):
 
     @property
     def lasts(self) -> float:
-        """The duration, s."""
+        """Duration, s."""
         return self.duration
 
 
@@ -72,7 +72,7 @@ class Dwell(_Timed):
     begins = None
 
     def placed(self, span: tuple[float, float], here: Position) -> Constant:
-        """Return the profile over a span, in s, after a part that ends here."""
+        """See `Part.placed`."""
         return Constant(signal=POSITION, span=span, value=here)
 
 
@@ -104,35 +104,35 @@ class PolynomialPart(_Timed):
 
     @property
     def begins(self) -> Position | None:
-        """The position at the start; None if it is where the part before ends."""
+        """See `Part.begins`."""
         return self.start
 
     def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
-        """Return the profile over a span, in s, after a part that ends here."""
+        """See `Part.placed`."""
         start = here if self.start is None else self.start
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
 class _Standalone(Formula, Part):
-    """A formula that is a part as well: it knows on its own where it begins."""
+    """A formula that is also a part; its start does not depend on the previous part."""
 
     @property
     @abstractmethod
     def lasts(self) -> float:
-        """The duration, s."""
+        """Duration, s."""
 
     @property
     def begins(self) -> Position:
-        """The position at the start."""
+        """Position at the start."""
         start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
         return start
 
     def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
-        """Return the profile over a span, in s."""
+        """See `Part.placed`."""
         return self.over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """Yield the problems that prevent its execution."""
+        """See `Part.own_problems`."""
         return self.problems_over(self.lasts)
 
 
@@ -165,7 +165,7 @@ class ViaPart(Via, _Standalone):
 
     @property
     def lasts(self) -> float:
-        """The duration, s."""
+        """Duration, s."""
         duration = self.duration if self.times is None else self.times[-1]
         assert duration is not None, "see _problems"
         return duration
@@ -185,7 +185,7 @@ class SinusoidsPart(SumOfSinusoids, _Standalone):
 
     @property
     def lasts(self) -> float:
-        """The duration, s."""
+        """Duration, s."""
         return self.duration
 
 
@@ -243,7 +243,7 @@ class Sequence(Formula):
             yield FieldProblem(("parts",), message)
 
     def _discontinuities(self) -> Iterator[FieldProblem]:
-        with np.errstate(all="ignore"):  # numbers that are too large are noticed elsewhere
+        with np.errstate(all="ignore"):  # too large numbers are reported elsewhere
             jumps = list(self.over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
         for jump in jumps:
             part = ("parts", jump.part)
@@ -261,17 +261,17 @@ class Sequence(Formula):
         return f"{remedy}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
 
     def _ends(self) -> FloatArray:
-        """Ends of the parts, from the start of the first on, s; (parts+1,)."""
+        """Return start and ends of the parts, from zero on, s, (parts+1,)."""
         with np.errstate(over="ignore"):  # an infinite sum is refused
             return np.concatenate(([0.0], np.cumsum([part.lasts for part in self.parts])))
 
     @property
     def lasts(self) -> float:
-        """The sum of the durations, s."""
+        """Sum of the durations, s."""
         return float(self._ends()[-1])
 
     def over(self, span: tuple[float, float]) -> Chain:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
 
     def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:

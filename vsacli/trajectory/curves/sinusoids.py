@@ -1,4 +1,4 @@
-"""Sums of sinusoids, the excitation of identification experiments: the curve, and how files declare it."""
+"""Sums of sinusoids, the excitation of identification experiments: profile, and its declaration in files."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from vsacli.trajectory.curves.steps import stepwise
 from vsacli.trajectory.times import MAX_STEPS
 
 RAMP_DEGREE = 9
-"""Degree of the rise at both ends: its first four derivatives vanish there."""
+"""Degree of the ramps at both ends, so that four derivatives vanish there."""
 
 SAMPLES_PER_PERIOD = 64
-"""Samples of the period of the highest harmonic, where a minimum is searched, at least as many in a ramp:
-an extreme lies at most 0.12 % of the amplitudes beyond adjacent samples."""
+"""Samples per period of the highest harmonic in the search for a minimum, and at least as many in a ramp: an
+extremum is at most 0.12 % of the amplitudes beyond adjacent samples."""
 
 HALVINGS = 40
-"""Bisections between two such samples, after which the extreme value is exact to rounding."""
+"""Bisections between two such samples, after which the extremum is exact up to rounding."""
 
 
 class Lowest(NamedTuple):
-    """The smallest value of each component, (components,), and when it is taken first, s."""
+    """The smallest value of each component, (components,), and its first time, s."""
 
     value: FloatArray
     at: FloatArray
@@ -39,17 +39,17 @@ class Lowest(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Sinusoids(ClosedForm):
-    """offset + sum over k = 1, 2, ... of sine_k sin(k w t) + cosine_k cos(k w t), t from the start on.
+    """The sum offset + sum over k = 1, 2, ... of sine_k sin(k w t) + cosine_k cos(k w t).
 
-    The finite Fourier series of Swevers, Ganseman, Tukel, De Schutter & Van Brussel (IEEE Trans. Robotics and
-    Automation 13(5), 1997).
+    Time t counts from the start. It is the finite Fourier series of Swevers, Ganseman, Tukel, De Schutter &
+    Van Brussel (IEEE Trans. Robotics and Automation 13(5), 1997).
 
     Attributes:
         cycles: periods of the lowest harmonic in the span, w = 2 pi cycles / duration.
-        offset: one value a component.
-        sine, cosine: amplitudes, one value a component for each harmonic.
+        offset: offsets of the components.
+        sine, cosine: amplitudes of the components, for each harmonic.
         ramp: share of the span in which the sum rises from zero at the start, and falls to zero at the end;
-            its first four derivatives are then zero as well.
+            its first four derivatives are then zero there, too.
     """
 
     cycles: float
@@ -69,12 +69,12 @@ class Sinusoids(ClosedForm):
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """See `ClosedForm.components`."""
         return len(self.offset)
 
     @property
     def breakpoints(self) -> FloatArray:
-        """The ends of the span and of the ramps."""
+        """Ends of the span and of the ramps."""
         return np.unique([*self.span, *(time for ends in self._ramps() for time in ends)])
 
     def _ramps(self) -> list[tuple[float, float]]:
@@ -82,7 +82,7 @@ class Sinusoids(ClosedForm):
         return [(first, first + ramp), (max(last - ramp, first + ramp), last)] if ramp else []
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """See `ClosedForm.at`."""
         rows = self._series(time)
         if self.ramp:
             window = stepwise(self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps())
@@ -98,10 +98,10 @@ class Sinusoids(ClosedForm):
         return Lowest(values[first], times[first])
 
     def _searched(self) -> Iterator[FloatArray]:
-        """Times, in stretches, among which the smallest value is: one period between the ramps, or the whole.
+        """Yield ascending times of stretches that together contain the smallest value.
 
-        In a ramp the sum is smaller than a period farther from the middle of the span: the period next to the
-        middle has what all its others have. Both ends have the offset.
+        Between the ramps one period is enough. In a ramp, the period next to the middle of the span is
+        enough, since values a period farther out are the same, scaled down. Both ends have the offset.
         """
         first, last = self.span
         period = (last - first) / self.cycles
@@ -117,7 +117,7 @@ class Sinusoids(ClosedForm):
         yield np.array(self.span)
 
     def _sampled_lowest(self, time: FloatArray) -> Lowest:
-        """Return the smallest of the values at ascending times and at the extremes next to them."""
+        """Return the smallest of the values at ascending times and at the minima next to them."""
         values = self.at(time)[0]
         found = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
         for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
@@ -128,7 +128,7 @@ class Sinusoids(ClosedForm):
         return found
 
     def _minima(self, time: FloatArray, values: FloatArray, component: int) -> FloatArray:
-        """Times of the smallest values next to samples that no neighbour is below, by bisection."""
+        """Return the times of minima, by bisection next to samples without a smaller neighbor."""
         before = np.concatenate(([np.inf], values[:-1]))
         after = np.concatenate((values[1:], [np.inf]))
         near = np.flatnonzero((values < before) & (values <= after))
@@ -140,11 +140,10 @@ class Sinusoids(ClosedForm):
         return (low + high) / 2
 
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component."""
+        """See `ClosedForm.raised`."""
         return replace(self, offset=added(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
-        """Return the sum without the offset."""
         first, last = self.span
         turns = self.cycles * ((time - first) / (last - first))
         rows = np.zeros((self.signal.orders, self.components, len(time)))
@@ -165,7 +164,7 @@ class Sinusoids(ClosedForm):
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Derivatives of a product, by Leibniz' rule."""
+    """Return value and derivatives of a product, by Leibniz' rule."""
     rows = np.zeros(np.broadcast_shapes(left.shape, right.shape))
     for order, row in enumerate(rows):
         for k in range(order + 1):
@@ -174,10 +173,10 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 MAX_HARMONICS = 100
-"""More are taken for a mistake: identification uses about five."""
+"""Most harmonics; more are considered a mistake, since identification uses about five."""
 
 LEAST_SHARE = 1e-12
-"""Share of the offset that a signal which must be positive may fall to; less is zero but for rounding."""
+"""Share of the offset to which a signal that must be positive may fall; less is zero up to rounding."""
 
 
 class SumOfSinusoids(Formula):
@@ -229,7 +228,7 @@ class SumOfSinusoids(Formula):
                 yield FieldProblem((name,), f"at most {MAX_HARMONICS} harmonics are possible, not {count}")
 
     def over(self, span: tuple[float, float]) -> Sinusoids:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         duration = span[1] - span[0]
         return Sinusoids(
             signal=self.signal,
@@ -254,7 +253,7 @@ class SumOfSinusoids(Formula):
             yield from problems or self._not_positive(duration)
 
     def _not_positive(self, duration: float) -> Iterator[FieldProblem]:
-        """Yield where a signal that must stay positive does not."""
+        """Yield a problem for each component of a signal that must stay positive but does not."""
         if not self.signal.positive:
             return
         lowest, when = self.over((0.0, duration)).lowest()

@@ -1,4 +1,4 @@
-"""Curves one after the other, and levels that are held with rest-to-rest changes between them."""
+"""Sequences of profiles, and constant levels with rest-to-rest changes between them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from vsacli.trajectory.curves.polynomial import AXES, RestToRest
 from vsacli.trajectory.times import stretch
 
 CONTINUOUS = 1e-9
-"""Largest jump that passes for none, relative to the peak of the value or derivative in both parts."""
+"""Largest jump that counts as continuous, relative to the peak of the value or derivative in both parts."""
 
 PROBES = 101
-"""Times at which the peak is looked for in each part."""
+"""Times at which each part is evaluated for its peak."""
 
 
 class Jump(NamedTuple):
@@ -32,8 +32,8 @@ class Jump(NamedTuple):
 
     Attributes:
         part: index of the later part.
-        order: of the derivative, the lowest that jumps there.
-        component: index; the first that jumps, if the value itself is continuous.
+        order: order of the lowest derivative that jumps there; 0 for the value.
+        component: index of the component. For derivatives only the first that jumps is reported.
         before, after: values on both sides of the jump.
     """
 
@@ -46,10 +46,10 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Chain(ClosedForm):
-    """Several profiles, each of which begins when the one before ends.
+    """A sequence of profiles, each of which begins when the previous one ends.
 
     Attributes:
-        parts: of the same signal and components; their spans adjoin and fill that of the whole.
+        parts: profiles of the same signal and components, whose spans are adjacent and fill the chain's.
     """
 
     parts: tuple[ClosedForm, ...]
@@ -64,7 +64,7 @@ class Chain(ClosedForm):
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """See `ClosedForm.components`."""
         return self.parts[0].components
 
     @cached_property
@@ -73,9 +73,9 @@ class Chain(ClosedForm):
         return np.unique(np.concatenate([part.breakpoints for part in self.parts]))
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples).
+        """Return value and derivatives at any times of the span, shape (orders, components, samples).
 
-        Where two parts meet, those of the later one.
+        Where two parts meet, the later one is used.
         """
         starts = [part.span[0] for part in self.parts]
         which = np.searchsorted(starts[1:], time, side="right")
@@ -86,7 +86,7 @@ class Chain(ClosedForm):
         return rows
 
     def stretched(self, factor: float) -> Self:
-        """Return the same profile, every part slower by a factor."""
+        """Return the profile with every part slowed down by a factor."""
 
         def later(span: tuple[float, float]) -> tuple[float, float]:
             start, end = (stretch(time, self.span[0], factor) for time in span)
@@ -96,11 +96,11 @@ class Chain(ClosedForm):
         return replace(self, span=later(self.span), parts=parts)
 
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component of every part."""
+        """See `ClosedForm.raised`."""
         return replace(self, parts=tuple(part.raised(by) for part in self.parts))
 
     def jumps(self, orders: int) -> Iterator[Jump]:
-        """Between which parts the value or a derivative, `orders` functions in all, is discontinuous."""
+        """Yield the jumps between parts, of the value and derivatives of order below `orders`."""
         for index, (before, after) in enumerate(pairwise(self.parts), start=1):
             left, right = before.at(np.array(before.span)), after.at(np.array(after.span))
             difference = np.abs(right[:orders, :, 0] - left[:orders, :, 1])
@@ -113,7 +113,7 @@ class Chain(ClosedForm):
 
 
 def _peaks(profile: ClosedForm) -> FloatArray:
-    """Largest absolute value of each order and component, (orders, components)."""
+    """Return the largest magnitude of each order and component, (orders, components)."""
     peaks: FloatArray = np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2)
     return peaks
 
@@ -125,14 +125,14 @@ def stepwise(
     levels: Sequence[tuple[float, ...]],
     changes: Sequence[tuple[float, float]],
 ) -> Chain:
-    """Levels that are held, with rest-to-rest changes from each to the next.
+    """Return constant levels with rest-to-rest changes between them.
 
     Args:
-        signal: of the steps.
-        span: of the whole, s.
-        degree: of the changes.
-        levels: one value a component each.
-        changes: when each change begins and ends, s; one less than levels.
+        signal: signal of the profile.
+        span: first and last time, s.
+        degree: degree of the changes.
+        levels: values of the components, for each level.
+        changes: start and end of each change, s; one less than levels.
     """
     parts: list[ClosedForm] = []
     held_from = span[0]
@@ -192,7 +192,7 @@ class Steps(Formula):
             yield from super().problems_over(duration)
 
     def over(self, span: tuple[float, float]) -> Chain:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         starts = [span[0] + time for time in self.times]
         ends = [
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])

@@ -1,6 +1,6 @@
-"""Types of declarations in trajectory files, for each signal.
+"""The registry of types of declarations in trajectory files.
 
-A new type is a class like those in this folder, and its row in `TYPES`.
+A new type needs a class like those in this folder, and a row in `TYPES`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ TYPES = {
     "constant": ("vsacli.trajectory.curves.polynomial:Hold", _EVERY),
     "csv": ("vsacli.trajectory.curves.declaration:Recorded", _EVERY),
 }
-"""Types of declarations, each with its home and its uses: position, any commanded signal, wrench."""
+"""Types of declarations, each with module and class, and its uses: position, commanded signals, wrench."""
 
 
 class _Types(LazyRegistry):
-    """The record classes of the types that serve a use."""
+    """The record classes of the types that are possible for a use."""
 
     def __init__(self, use: Use) -> None:
         served = {POSITION: "position", WRENCH: "wrench"}.get(use.signal, "commanded")

@@ -1,4 +1,4 @@
-"""Splines through points, from rest to rest: the curve, and how files declare it."""
+"""Rest-to-rest splines through via points: profile, and its declaration in files."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, added
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
 
 SEAM = 1e-9
-"""Largest jump between the expansions about two neighbouring points, relative to the peak of each derivative:
-well-placed points leave 1e-13."""
+"""Largest jump between the expansions about two neighboring points, relative to the peak of each derivative;
+it is 1e-13 for well-spaced points."""
 
 
 class Extremes(NamedTuple):
-    """The smallest and the largest value of each component, (components,), and when it has them, s."""
+    """The smallest and largest value of each component, (components,), and their times, s."""
 
     lowest: FloatArray
     lowest_at: FloatArray
@@ -38,14 +38,14 @@ class ViaPoints(ClosedForm):
     """The spline through points that begins and ends at rest.
 
     With m = (degree+1)/2, its derivatives up to m-1 vanish at both ends, and those up to degree-1 are
-    continuous. Of all functions through the points that begin and end so, it has the least integral of the
+    continuous. Of all functions through the points with these ends, it has the smallest integral of the
     squared m-th derivative (de Boor, A Practical Guide to Splines, 2001): degree 7 gives the minimum-snap
     motion of Mellinger & Kumar (ICRA 2011). Through two points it is the rest-to-rest polynomial.
 
     Attributes:
-        degree: odd, 3 to 9.
-        shares: when the points are passed, as shares of the span: increasing, from 0 to 1.
-        points: one value a component each, NaN throughout for a component that has none; taken exactly.
+        degree: degree, odd, 3 to 9.
+        shares: times of the points as shares of the span, increasing from 0 to 1.
+        points: values of the components for each point, passed exactly; all NaN for absent components.
     """
 
     degree: int
@@ -67,12 +67,12 @@ class ViaPoints(ClosedForm):
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """See `ClosedForm.components`."""
         return len(self.points[0])
 
     @cached_property
     def breakpoints(self) -> FloatArray:
-        """Times at which the points are passed."""
+        """Times of the points, s."""
         first, last = self.span
         times = first + (last - first) * np.array(self.shares)
         times[-1] = last
@@ -80,25 +80,25 @@ class ViaPoints(ClosedForm):
 
     @cached_property
     def _given(self) -> BoolArray:
-        """Components with values, (components,)."""
+        """Mask of components with values, (components,)."""
         given: BoolArray = ~np.isnan(self.points[0])
         return given
 
     @cached_property
     def _derivatives(self) -> FloatArray:
-        """Value and derivatives by the share of the span, (degree+1, given components, points).
+        """Value and derivatives with respect to the share of the span, (degree+1, given components, points).
 
-        The highest derivative is constant between two points; it stands with the first of them.
+        The highest derivative is constant between two points, and stored for the first of them.
         """
         from scipy.interpolate import make_interp_spline
 
         points, shares = np.array(self.points)[:, self._given], np.array(self.shares)
         vanishing = (self.degree - 1) // 2
         rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
-        with np.errstate(all="ignore"):  # what comes of points that are unfit is refused below
+        with np.errstate(all="ignore"):  # poorly spaced points are refused below
             try:
                 ends: Any = (rest, rest)
-                away = points - points[0]  # so that a component that stands still does so exactly
+                away = points - points[0]  # zero, and so exact, for a component at rest
                 spline = make_interp_spline(shares, away, k=self.degree, bc_type=ends)
             except (np.linalg.LinAlgError, ValueError):
                 raise _unfit(self.degree) from None
@@ -110,9 +110,9 @@ class ViaPoints(ClosedForm):
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples).
+        """Return value and derivatives at any times of the span, shape (orders, components, samples).
 
-        Each is expanded about the nearest point, where it is exact.
+        They are expanded about the nearest point, where they are exact.
 
         Raises:
             InputError: the points are too unevenly spaced in time.
@@ -130,14 +130,14 @@ class ViaPoints(ClosedForm):
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
-        """Return the same profile with a constant added to each component."""
+        """See `ClosedForm.raised`."""
         return replace(self, points=tuple(added(point, by) for point in self.points))
 
     def extremes(self) -> Extremes:
         """Return the smallest and largest values, from the zeros of the first derivative.
 
         Raises:
-            InputError: as `at`.
+            InputError: see `at`.
         """
         times = [np.union1d(self.breakpoints, zeros) for zeros in self._zeros()]
         found = np.full((4, self.components), np.nan)
@@ -148,7 +148,7 @@ class ViaPoints(ClosedForm):
         return Extremes(*found)
 
     def _zeros(self) -> Sequence[FloatArray]:
-        """Times between the ends at which the first derivative of each given component vanishes."""
+        """Return the times, s, at which the first derivative of each given component vanishes."""
         from scipy.interpolate import PPoly
 
         first, last = self.span
@@ -163,13 +163,13 @@ class ViaPoints(ClosedForm):
 def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
     """Return default times of passing points, as shares of the span, (points,).
 
-    The way between two points counts by the square root of their distance (Lee, Computer-Aided Design 21,
-    1989), so that near points are not passed in too short a time; along the whole way time passes as on the
-    rest-to-rest polynomial of that degree, the regularized incomplete beta function.
+    The length between two points is the square root of their distance (Lee, Computer-Aided Design 21, 1989),
+    so that near points do not follow each other too fast. Time along the total length follows the
+    rest-to-rest polynomial of this degree, a regularized incomplete beta function.
 
     Args:
-        points: (points, components); components that are NaN do not count.
-        degree: of the spline.
+        points: points, (points, components); components that are NaN are ignored.
+        degree: degree of the spline.
     """
     from scipy.special import betaincinv
 
@@ -182,9 +182,9 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
 
 
 def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
-    """Return whether the expansions about neighbouring points meet half-way, with that many derivatives.
+    """Return whether expansions about neighboring points agree half-way, below order `orders`.
 
-    Values are compared with those of the points, derivatives with their peaks.
+    Differences of values are relative to the largest point, those of derivatives to their peaks.
     """
     left, right = list(rows[:, :, :-1]), [*rows[:-1, :, 1:], rows[-1, :, :-1]]
     before, after = (
@@ -204,12 +204,12 @@ def _unfit(degree: int) -> InputError:
 
 
 def _taylor_series(derivatives: Sequence[FloatArray], offset: FloatArray, orders: int) -> list[FloatArray]:
-    """Return the polynomial of given derivatives, with its own of order 0 to orders-1, by Horner's rule.
+    """Return a Taylor polynomial and its derivatives of order below `orders`, by Horner's rule.
 
     Args:
-        derivatives: at the centre of each sample, from order 0 to the degree, each (components, samples).
-        offset: from the centre, (samples,).
-        orders: how many are wanted.
+        derivatives: derivatives at the centers, from order 0 to the degree, each (components, samples).
+        offset: offset from the center, (samples,).
+        orders: number of derivatives to return, the value included.
     """
     none = np.zeros_like(derivatives[0])
     return [_horner(derivatives[order:] or [none], offset) for order in range(orders)]
@@ -224,13 +224,13 @@ def _horner(derivatives: Sequence[FloatArray], offset: FloatArray) -> FloatArray
 
 
 OVERSHOOT = 0.1
-"""Share of a joint's range of points beyond which it is said how far the spline goes further."""
+"""Distance of the spline beyond a joint's points, as a share of their range, that causes a warning."""
 
 MAX_POINTS = 1000
-"""More are recorded samples, not points that somebody chose."""
+"""Most points; more are probably recorded samples, not chosen points."""
 
 SHOWN_TIMES = 12
-"""Times that are printed; of more, the first and the last ones."""
+"""Most times that are printed; of more, the first and last ones are."""
 
 _TIMES = (
     "when each point is passed, from the start on, the first 0; the duration follows from the last."
@@ -297,11 +297,11 @@ class Via(Formula):
 
     @property
     def lasts(self) -> float | None:
-        """The last of the times, s."""
+        """Last of the times, s; None without times."""
         return None if self.times is None else self.times[-1]
 
     def over(self, span: tuple[float, float]) -> ViaPoints:
-        """Return the profile from the first to the last time of a span, in s."""
+        """See `Formula.over`."""
         points = tuple(map(numbers, self.points))
         if self.times is None:
             shares = passing_shares(points, self.degree)
@@ -324,12 +324,12 @@ class Via(Formula):
             yield FieldProblem(("points",), message, joint)
 
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
-        """Times that were derived."""
+        """Yield a note on times that were derived from the points."""
         if self.times is None:
             yield f"passes its via points at t = {_listed(self.over(span).breakpoints.tolist())} s"
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
-        """Yield where the spline goes far beyond its points."""
+        """Yield warnings about joints whose spline goes far beyond its points."""
         profile = self.over(span)
         for name, joint_type, points, *extremes in zip(
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True

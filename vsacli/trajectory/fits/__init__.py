@@ -1,4 +1,4 @@
-"""Splines through, or close to, recorded samples: which kind, how many knots, and how far to trust them."""
+"""Splines through recorded samples or near them: choice of the kind and of knots, and uncertainty."""
 
 from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.given import mismatches

@@ -1,4 +1,8 @@
-"""Linear estimation with banded rows in square-root information form: QR block by block."""
+"""Linear estimation with banded rows in square-root information form, by QR factorization block by block.
+
+`sort_rows` sorts rows into blocks, `factorise` makes the triangular factor, and `Posterior` solves for the
+unknowns and their covariances.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,17 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 
 BLOCK = 12
-"""Unknowns of a block. No row may reach further than this: eight coefficients of a B-spline of degree 7, or
-two neighbouring such rows at most two spans apart."""
+"""Number of unknowns of a block, and largest width of a row. A row of B-splines of degree 7 has eight
+coefficients; the difference of two neighboring rows, at most two spans apart, has more."""
 
 
 class Rows(NamedTuple):
     """Rows sorted by the block in which they start.
 
     Attributes:
-        blocks: (blocks, most rows of a block, 2 `BLOCK`); unused ones are zero.
-        block: of each row, (rows,).
-        place: of each row in its block, (rows,).
+        blocks: rows of each block, (blocks, most rows of a block, 2 `BLOCK`); unused ones are zero.
+        block: index of the block of each row, (rows,).
+        place: index of each row in its block, (rows,).
     """
 
     blocks: FloatArray
@@ -29,13 +33,13 @@ class Rows(NamedTuple):
 
 
 class Factor(NamedTuple):
-    """The block-bidiagonal triangular factor of several estimations at a time, and the residuals.
+    """The block-bidiagonal triangular factors of several estimations (candidates), and their residuals.
 
     Attributes:
-        diagonal: (candidates, blocks, `BLOCK`, `BLOCK`).
-        upper: the blocks to the right of these, same shape.
-        right: the transformed right-hand side, (candidates, blocks, `BLOCK`).
-        rest: sum of squares that no choice of unknowns removes, (candidates,).
+        diagonal: diagonal blocks, (candidates, blocks, `BLOCK`, `BLOCK`).
+        upper: blocks to the right of these, same shape.
+        right: transformed right-hand side, (candidates, blocks, `BLOCK`).
+        rest: residual sum of squares, (candidates,).
     """
 
     diagonal: FloatArray
@@ -59,9 +63,9 @@ def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
     """Sort rows into blocks.
 
     Args:
-        first: index of the first unknown that each row concerns, (rows,), never decreasing.
-        rows: (rows, width), at most `BLOCK` wide.
-        unknowns: how many there are.
+        first: index of the first unknown of each row, (rows,), non-decreasing.
+        rows: rows, (rows, width), at most `BLOCK` wide.
+        unknowns: number of unknowns.
     """
     block = first // BLOCK
     place = np.arange(len(first)) - np.searchsorted(block, block)
@@ -73,13 +77,13 @@ def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
 
 
 def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: FloatArray) -> Factor:
-    """Triangular factors of data and prior.
+    """Return the triangular factors of data and prior.
 
     Args:
-        data: rows, (blocks, rows, 2 `BLOCK`).
+        data: data rows, (blocks, rows, 2 `BLOCK`).
         target: right-hand side of the data rows, (blocks, rows).
-        prior: rows that are to give zero, (blocks, `BLOCK`, 2 `BLOCK`).
-        weights: of the prior rows, (candidates, blocks, `BLOCK`).
+        prior: prior rows, whose right-hand side is zero, (blocks, `BLOCK`, 2 `BLOCK`).
+        weights: weights of the prior rows, (candidates, blocks, `BLOCK`).
     """
     candidates, count = weights.shape[:2]
     diagonal = np.empty((candidates, count, BLOCK, BLOCK))
@@ -108,12 +112,12 @@ class Posterior:
         """Invert a triangular factor of the inverse covariance.
 
         Args:
-            diagonal: its blocks, (blocks, `BLOCK`, `BLOCK`).
-            upper: the blocks to the right of these, same shape.
+            diagonal: diagonal blocks of the factor, (blocks, `BLOCK`, `BLOCK`).
+            upper: blocks to the right of these, same shape.
         """
         self._inverse, self._upper = np.linalg.inv(diagonal), upper
         self._roots = np.zeros((len(diagonal) + 1, BLOCK, BLOCK))
-        """Square roots of the covariances of the blocks; behind the last there is nothing to know."""
+        """Square roots of the covariances of the blocks; zero after the last."""
         passed = -self._inverse @ upper
         for k in range(len(diagonal) - 1, -1, -1):
             root = np.hstack([self._inverse[k], passed[k] @ self._roots[k + 1]])
@@ -123,7 +127,7 @@ class Posterior:
         """Return the most probable values of the unknowns.
 
         Args:
-            right: the transformed right-hand side, (blocks, `BLOCK`).
+            right: transformed right-hand side, (blocks, `BLOCK`).
         """
         values = np.zeros((len(right) + 1, BLOCK))
         for k in range(len(right) - 1, -1, -1):
@@ -131,28 +135,28 @@ class Posterior:
         return values[:-1].ravel()
 
     def roots_of(self, rows: FloatArray, block: IndexArray | slice = slice(None)) -> FloatArray:
-        """Square roots of the covariances of values by rows of one block, (..., rows, 2 `BLOCK`).
+        """Return square roots of the covariances of values given by rows, (..., rows, 2 `BLOCK`).
 
         Args:
-            rows: (..., rows, 2 `BLOCK`).
-            block: index of the block in which they start, (...,); by default one after the other.
+            rows: rows, (..., rows, 2 `BLOCK`).
+            block: index of the block in which they start, (...,); by default all blocks in order.
         """
         near = rows[..., :BLOCK] @ self._inverse[block]
         far = (rows[..., BLOCK:] - near @ self._upper[block]) @ self._roots[1:][block]
         return np.concatenate([near, far], axis=-1)
 
     def variances(self, blocks: FloatArray) -> FloatArray:
-        """Return variances of rows, (blocks, rows), for rows as in `Rows.blocks`, or equal for all blocks."""
+        """Return variances of values, (blocks, rows), given by rows as in `Rows.blocks`."""
         return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))
 
 
 def _triangle(rows: FloatArray) -> FloatArray:
-    """Return the triangular factor of rows, (..., rows, columns), as mode "r" gives it in twice the time."""
+    """Return the triangular factor of rows, (..., rows, columns), in half the time of `qr` with mode "r"."""
     from scipy.linalg.lapack import dgeqrf
 
     if rows.ndim > 2 and len(rows) > 1:
         reflected = np.swapaxes(np.linalg.qr(rows, mode="raw")[0], -1, -2)
-    else:  # without what NumPy does for every call
+    else:  # LAPACK without NumPy's overhead per call
         reflected = dgeqrf(rows.reshape(rows.shape[-2:]))[0].reshape(rows.shape)
     height, width = min(rows.shape[-2:]), rows.shape[-1]
     return np.asarray(reflected[..., :height, :] * _upper(height, width))

@@ -1,4 +1,8 @@
-"""Samples as means over equal bins of time, from sums that serve bins of any power of two."""
+"""Means of samples over equal bins of time, from moments that serve bins of all widths by powers of two.
+
+`Moments` of fine bins are summed once, and halved for each coarser resolution. `Bins` has the means and the
+mean B-splines of a resolution, and `Bins.whitened` the rows of a linear estimation with independent errors.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +17,17 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import block_count, sort_rows
 
 BLOCK_SAMPLES = 65536
-"""Samples held at a time: a block that fits into a cache is twice as fast."""
+"""Samples processed at a time; a block that fits into the cache is twice as fast."""
 
 
 class Moments(NamedTuple):
-    """Moments of fine bins, from which those of all resolutions are averaged.
+    """Moments of samples in fine bins, from which those of coarser bins follow.
 
     Attributes:
-        start: of the record, s.
-        width: of a bin, s.
-        powers: sums over the samples of a bin of the powers 0, 1, ... of their place in it, 0 to 1,
-            (powers, bins).
-        time: sums of their times, (bins,).
+        start: start of the recording, s.
+        width: width of a bin, s.
+        powers: sums of powers 0, 1, ... of the places of samples in their bin, from 0 to 1, (powers, bins).
+        time: sums of their times, (bins,), s.
         row: sums of their values, (bins,).
     """
 
@@ -36,13 +39,13 @@ class Moments(NamedTuple):
 
     @classmethod
     def of(cls, time: FloatArray, row: FloatArray, bins: int, degree: int) -> Moments:
-        """Sums over samples.
+        """Return the moments of samples.
 
         Args:
-            time: (samples,), s.
-            row: (samples,).
-            bins: of equal width.
-            degree: of the highest power.
+            time: times, (samples,), s.
+            row: values, (samples,).
+            bins: number of bins of equal width.
+            degree: highest power.
         """
         start, width = float(time[0]), float(time[-1] - time[0]) / bins
         sums = np.zeros((degree + 3, bins))
@@ -61,14 +64,14 @@ class Moments(NamedTuple):
 
     @property
     def halved(self) -> Moments:
-        """Return the moments of half as many bins, twice as wide; their number must be even."""
+        """Moments of half as many bins, twice as wide; the number of bins must be even."""
         powers = merged(self.powers[:, ::2], self.powers[:, 1::2])
         time, row = self.time[::2] + self.time[1::2], self.row[::2] + self.row[1::2]
         return Moments(self.start, 2 * self.width, powers, time, row)
 
 
 def merged(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Sums of the powers of places in a bin twice as wide, from those in its halves, (powers, bins)."""
+    """Return sums of powers of places in bins twice as wide, (powers, bins), from those of halves."""
     count = len(left)
     shift = np.array([[math.comb(k, i) for i in range(count)] for k in range(count)], dtype=np.float64)
     return np.asarray((left + shift @ right) / 2.0 ** np.arange(count)[:, None])
@@ -77,18 +80,18 @@ def merged(left: FloatArray, right: FloatArray) -> FloatArray:
 BINS_PER_SPAN = 2
 
 LONGEST_LINK = 4.001
-"""Bins between two means whose errors are still taken for correlated: a row of the difference of both must
-not reach further than a block of unknowns."""
+"""Largest distance, in bins, of two means whose errors count as correlated: the row of their difference must
+not be wider than a block of unknowns."""
 
 
 class Whitened(NamedTuple):
     """Rows with independent errors of the same size.
 
     Attributes:
-        rows: (blocks, rows, columns), see `information.Rows`.
-        target: (blocks, rows).
-        log_scale: logarithm of the determinant of what the covariance was divided by, twice negative.
-        variance: of the errors, if that of samples is known.
+        rows: rows, (blocks, rows, columns), see `banded_qr.Rows`.
+        target: right-hand side, (blocks, rows).
+        log_scale: minus the logarithm of the determinant of the correlation matrix of the errors.
+        variance: variance of the errors; None if that of samples is unknown.
     """
 
     rows: FloatArray
@@ -99,19 +102,19 @@ class Whitened(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bins:
-    """Means of a record over two bins to a knot span, empty ones left out.
+    """Means of a recording over two bins per knot span, without empty bins.
 
     Attributes:
-        start: of the record, s.
+        start: start of the recording, s.
         span: length of a knot span, s.
-        spans: their number.
-        degree: of the spline.
-        means: (bins,), of the samples.
-        design: (bins, degree + 1), means of the B-splines at the same samples: averaging costs no bias.
+        spans: number of knot spans.
+        degree: degree of the spline.
+        means: means of the samples, (bins,).
+        design: means of the B-splines at these samples, (bins, degree + 1), so that averaging adds no bias.
         first: index of the first of these B-splines, (bins,).
-        gaps: distance from one mean time to the next, in bins, (bins - 1,); infinite where they are unlinked.
-        samples: in a bin, on average.
-        noise: standard deviation of a sample's noise, if it is known.
+        gaps: distance from one mean time to the next, in bins, (bins - 1,); infinite without correlation.
+        samples: mean number of samples in a bin.
+        noise: standard deviation of a sample's noise; None if unknown.
     """
 
     start: float
@@ -127,16 +130,16 @@ class Bins:
 
     @classmethod
     def of(cls, moments: Moments, noise: float | None = None) -> Bins:
-        """Averages of samples.
+        """Return the means of samples from their moments.
 
         Args:
-            moments: of the bins, up to the power of the degree.
-            noise: standard deviation of a sample's noise, if it is known.
+            moments: moments of the bins, up to the power of the degree.
+            noise: standard deviation of a sample's noise; None if unknown.
         """
         count, degree = moments.powers[0], len(moments.powers) - 1
         used = np.flatnonzero(count)
         means, times = moments.row[used] / count[used], moments.time[used] / count[used]
-        # the first and the second half of a span: the other half is empty
+        # A bin is the first or second half of its span: merge it with an empty other half.
         halves, nothing = moments.powers[:, used], np.zeros_like(moments.powers[:, used])
         second = used % BINS_PER_SPAN == 1
         powers = np.where(second, merged(nothing, halves), merged(halves, nothing)) / count[used]
@@ -161,16 +164,16 @@ class Bins:
 
     @property
     def knots(self) -> FloatArray:
-        """Knots of the spline: equally spaced, also beyond both ends."""
+        """Knots of the spline, s, equally spaced, also beyond both ends."""
         places = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
         return self.start + self.span * places
 
     def stretch(self, first: int, spans: int) -> Bins:
-        """Return the bins of some spans, as if nothing else had been recorded.
+        """Return the bins of some spans, as of a recording of its own.
 
         Args:
-            first: index of the first of the spans.
-            spans: their number.
+            first: index of the first span.
+            spans: number of spans.
         """
         start, stop = np.searchsorted(self.first, [first, first + spans])
         return replace(
@@ -184,11 +187,11 @@ class Bins:
         )
 
     def whitened(self, correlation: float) -> Whitened:
-        """Differences of neighbouring means whose errors are independent.
+        """Return differences of neighboring means, scaled so that their errors are independent and equal.
 
         Args:
-            correlation: of the errors of two neighbouring means; those further apart are correlated the less,
-                as those of a process of first order.
+            correlation: correlation of the errors of two means one bin apart; it decreases with the distance
+                as for a first-order process.
         """
         here, before, block, place = self._linked_rows
         lag = np.append(0.0, np.sign(correlation) * np.abs(correlation) ** self.gaps)
@@ -203,7 +206,7 @@ class Bins:
 
     @cached_property
     def _linked_rows(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
-        """The design sorted into blocks, for each bin that of the bin before it, and where each bin is."""
+        """Design rows in blocks, those of the previous bins, and block and place of each bin's row."""
         linked, width = np.isfinite(self.gaps), self.degree + 1
         first = self.first.copy()
         first[1:] = np.where(linked, self.first[:-1], self.first[1:])
@@ -215,10 +218,11 @@ class Bins:
         return here.blocks, before.blocks, here.block, here.place
 
     def _noise_variance(self, correlation: float) -> float | None:
-        """Return the variance of a mean, if that of a sample is known, for noise of first order.
+        """Return the variance of a mean for first-order noise; None if that of samples is unknown.
 
         Args:
-            correlation: of two neighbouring means, from which that of samples follows; if negative, none.
+            correlation: correlation of two neighboring means, which determines that of samples; samples count
+                as uncorrelated if it is negative.
         """
         if self.noise is None:
             return None
@@ -226,7 +230,7 @@ class Bins:
         of_samples = 1 - np.geomspace(1, 1e-6, 200)[1:]
         passed = of_samples**count
         sums = (1 - passed) / (1 - of_samples)
-        # the sum over all pairs of a bin, and that over the pairs of two neighbouring bins
+        # Sums of correlations over all pairs of samples in a bin, and over pairs from two neighboring bins.
         within = (count * (1 + of_samples) - 2 * of_samples * sums) / (1 - of_samples)
         between = of_samples * sums**2
         share = np.interp(correlation, between / within, within / count**2, left=1 / count)
@@ -234,9 +238,9 @@ class Bins:
 
     @cached_property
     def differences(self) -> FloatArray:
-        """Rows of the differences of the coefficients, (blocks, rows, columns), and units behind the last.
+        """Rows of differences of the coefficients, of the order of the degree, (blocks, rows, columns).
 
-        Their order is the degree. The units make the unknowns that fill up the last block zero.
+        Unit rows after the last one make the unknowns zero that fill up the last block.
         """
         order = self.degree
         count, last = block_count(self.coefficients), self.coefficients - order
@@ -251,11 +255,11 @@ class Bins:
 
 
 def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:
-    """Return the B-splines that are not zero on a span, first to last, on knots one apart.
+    """Return the B-splines that are nonzero on a span, first to last, for knots at distance 1.
 
     Args:
-        place: within the span, 0 to 1, (samples,).
-        degree: of the B-splines.
+        place: place within the span, 0 to 1, (samples,).
+        degree: degree of the B-splines.
     """
     values = [np.ones_like(place)]
     for k in range(1, degree + 1):
@@ -270,7 +274,7 @@ def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:
 
 @cache
 def _basis_polynomials(degree: int) -> FloatArray:
-    """Coefficients of the B-splines of a span by powers of the place in it, (powers, degree + 1)."""
+    """Return the coefficients of a span's B-splines by powers of the place in it, (powers, degree + 1)."""
     nodes = np.linspace(0, 1, degree + 1)
     values = np.stack(uniform_basis(nodes, degree), axis=1)
     return np.asarray(np.linalg.solve(np.vander(nodes, increasing=True), values), dtype=np.float64)

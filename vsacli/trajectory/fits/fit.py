@@ -1,4 +1,8 @@
-"""Splines that replace recorded samples, with their errors, or bounds of these."""
+"""Splines that replace recorded samples, with covariances of value and derivatives, or bounds of them.
+
+A `Fit` consists of parts, each a spline for components that share its knots. `Unresolved` and `vibrations`
+give uncertainties that no covariance states.
+"""
 
 from __future__ import annotations
 
@@ -21,23 +25,24 @@ if TYPE_CHECKING:
 
 
 ORDERS = {7: 5, 5: 3}
-"""Value and derivatives that are needed, by the degree of the splines."""
+"""Number of functions that are needed, value and derivatives, by the degree of the splines."""
 
 PROBES = 500
-"""Times of which root mean squares are taken."""
+"""Number of times for root mean squares."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The components that share a spline's knots.
+    """A spline for components that share its knots.
 
     Attributes:
-        members: their indices.
-        spline: with one column a member.
+        members: indices of the components.
+        spline: spline with one column per member.
         exact: whether it goes through the samples, rather than near them.
-        smoothing: judgement of it if it is a smoothing spline, or was compared with one.
+        smoothing: assessment by a smoothing spline, which it is or was compared with; None without one.
         smooth: whether it is a smoothing spline.
-        noise: that it follows, since a filter made it smooth; the deviation in `smoothing` counts it.
+        noise: filtered, and so smooth, noise that the spline follows; the deviation in `smoothing` includes
+            it.
     """
 
     members: IndexArray
@@ -56,31 +61,31 @@ class Part:
     def doubtful(self) -> tuple[float, float]:
         """Times after the start and before the end with unreliable derivatives, s.
 
-        (degree + 1)/2 knot spans, beyond which noise passes into the highest derivative that is needed less
-        than 1.4 times as much as anywhere inside; at the ends themselves it is up to 850 times.
+        They are (degree + 1)/2 knot spans. Beyond, noise in the highest derivative that is needed is less
+        than 1.4 times that anywhere inside; at the ends it is up to 850 times that.
         """
         spans = (self.spline.k + 1) // 2
         return float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
 
     @property
     def inside(self) -> tuple[float, float]:
-        """First and last time, s, of the stretch that is not doubtful; the middle half if that is longer."""
+        """First and last time, s, with reliable derivatives; of the middle half if that is longer."""
         first, last = self.knots[[0, -1]].tolist()
         start, end = np.minimum(self.doubtful, (last - first) / 4).tolist()
         return first + start, last - end
 
     def of_columns(self, columns: IndexArray) -> Part:
-        """Return the part of some of the members, by column of the spline."""
+        """Return the part with only some members, given by columns of the spline."""
         from scipy.interpolate import BSpline
 
         spline = BSpline(self.spline.t, self.spline.c[:, columns], self.spline.k)
         return replace(self, members=self.members[columns], spline=spline)
 
     def at(self, time: FloatArray, orders: int) -> FloatArray:
-        """Value and derivatives, shape (orders, members, samples).
+        """Return value and derivatives, shape (orders, members, samples).
 
-        Within a knot span one polynomial is evaluated, so that neighbouring values share their rounding
-        error; evaluating derivatives of B-splines point by point leaves noise of about eps / step^order.
+        Within a knot span one polynomial is evaluated, so that neighboring values share their rounding error.
+        Evaluating derivatives of B-splines point by point leaves noise of about eps / step^order.
         """
         degree, knots = self.spline.k, self.knots
         span = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
@@ -96,10 +101,10 @@ class Part:
         return rows
 
     def posterior(self, time: FloatArray) -> Posterior | None:
-        """Return the posterior of the coefficients; None if it cannot be stated.
+        """Return the posterior of the coefficients; None if it is unknown.
 
         Args:
-            time: (samples,) of the record, s.
+            time: times of the recording, (samples,), s.
         """
         if self.smoothing is not None and not self.smoothing.resolved:
             return None
@@ -107,11 +112,11 @@ class Part:
             return self.smoothing.posterior
         try:
             return of_least_squares(time, self.spline.t, self.spline.k)
-        except np.linalg.LinAlgError:  # of very uneven times
+        except np.linalg.LinAlgError:  # very uneven times
             return None
 
     def stretched(self, factor: float) -> Part:
-        """Return the same spline, slower by a factor, from the same first time on."""
+        """Return the spline slowed down by a factor, with the same first time."""
         from scipy.interpolate import BSpline
 
         knots = stretch(self.spline.t, self.knots[0], factor)
@@ -124,16 +129,16 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The curves that replace the samples of a signal, with derivatives.
+    """The splines that replace the samples of a signal.
 
     Attributes:
-        components: how many there are; those in no part have no values.
-        degree: of the splines.
-        parts: components that share knots.
+        components: number of components; those in no part have no values.
+        degree: degree of the splines.
+        parts: splines of components that share knots.
         residual: root mean square of sample minus fit, (components,).
         largest: largest |sample - fit|, (components,).
         noise: estimated standard deviation of a sample, (components,).
-        time: (samples,) of the record, s.
+        time: times of the recording, (samples,), s.
     """
 
     components: int
@@ -146,7 +151,7 @@ class Fit:
 
     @property
     def step(self) -> float:
-        """Mean distance of samples, s."""
+        """Mean sampling interval, s."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     @cached_property
@@ -163,37 +168,37 @@ class Fit:
 
     @cached_property
     def exact(self) -> BoolArray:
-        """Components whose splines pass through the samples, (components,); also those without values."""
+        """Mask of components whose splines pass through the samples, or without values, (components,)."""
         exact = np.ones(self.components, dtype=bool)
         for part in self.parts:
             exact[part.members] = part.exact
         return exact
 
     def at(self, time: FloatArray, orders: int) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         rows = np.full((orders, self.components, len(time)), np.nan)
         for part in self.parts:
             rows[:, part.members] = part.at(time, orders)
         return rows
 
     def stretched(self, factor: float) -> Fit:
-        """Return the same spline, slower by a factor, from the same first time on."""
+        """Return the splines slowed down by a factor, with the same first time."""
         parts = tuple(part.stretched(factor) for part in self.parts)
         return replace(self, parts=parts, time=stretch(self.time, self.time[0], factor))
 
     def covariance(self, time: FloatArray) -> FloatArray:
-        """Return covariances of value and derivatives at times, s: (members, orders, orders, samples).
+        """Return covariances of value and derivatives, (components, orders, orders, samples).
 
         Orders go from the value to the highest derivative that the signal needs. Square roots of the diagonal
-        are standard deviations; those of a smoothing spline count, beside noise, what its resolution leaves
-        uncertain. Splines through samples of all digits have deviations of the size of rounding.
+        are standard deviations. Those of a smoothing spline include the uncertainty due to its resolution, in
+        addition to noise. Splines through samples with all digits have deviations of the size of rounding.
 
         Args:
-            time: (samples,), any of the span, s.
+            time: times of the span, (samples,), s.
 
         Returns:
-            NaN where nothing can be said: of components that have no values, and of those for which no two
-            resolutions of a smoothing spline agree.
+            Covariances; NaN for components without values, and for those for which no two resolutions of a
+            smoothing spline agree.
         """
         orders = ORDERS[self.degree]
         found = np.full((self.components, orders, orders, len(time)), np.nan)
@@ -206,17 +211,17 @@ class Fit:
 
     @cached_property
     def _posteriors(self) -> list[Posterior | None]:
-        """Posteriors of the coefficients of each part; None where one cannot be stated."""
+        """Posteriors of the coefficients of each part; None if unknown."""
         return [part.posterior(self.time) for part in self.parts]
 
     def _units(self, part: Part, posterior: Posterior, time: FloatArray) -> FloatArray:
-        """Return the units of the deviations of the posterior, (members, orders or 1, samples or 1)."""
+        """Return the factors of the posterior's deviations, (members, orders or 1, samples or 1)."""
         known = part.smoothing
         if part.smooth and known is not None:
             start, end = part.knots[[0, -1]]
             return known.units_at((time - start) / (end - start))[None]
         units = self.noise[part.members]
-        # relative to the derivative without this error, which the size of this spline's includes
+        # The derivative's size includes this error; relative is its ratio to the derivative without it.
         share = 0.0 if known is None else known.relative / np.hypot(1.0, known.relative)
         share = max(share, 0.0 if part.noise is None else part.noise.share)
         if share > 0:
@@ -239,13 +244,13 @@ def join(
     """Return the fit that consists of parts.
 
     Args:
-        degree: of their splines.
-        parts: each component in at most one.
-        time: (samples,) of the record, s.
+        degree: degree of the splines.
+        parts: parts, with each component in at most one.
+        time: times of the recording, (samples,), s.
         rows: fitted samples, (components, samples).
-        noise: estimated standard deviation of the samples, (components,); that of parts that are not exact
-            is taken from their residual.
-        given: by the user, (components,), NaN where not given.
+        noise: estimated standard deviation of the samples, (components,); replaced by an estimate from the
+            residual for parts that are not exact.
+        given: standard deviation given by the user, (components,); NaN without one.
     """
     components = len(rows)
     residual, largest, noise = np.zeros(components), np.zeros(components), noise.copy()
@@ -261,40 +266,40 @@ def join(
 
 
 CAUTION = 3.2
-"""Factor between what resolutions differ by and what is taken for a standard deviation. With motions of
-minimum jerk or steps of velocity within 50 and 200 ms, and twelve colours of noise, torques that were wrong
-by more than 5 % were so by up to 6.2 times as much: twice this deviation is a little more."""
+"""Factor from the difference between resolutions to the standard deviation. With motions of minimum jerk or
+steps of velocity within 50 and 200 ms, and twelve colors of noise, torques that were wrong by more than 5 %
+were so by up to 6.2 times the difference; twice this deviation is a little more."""
 
 SMOOTH_CAUTION = 1.6
-"""The same if the spectrum of the highest derivative falls, so that it has no impulses. With steps of
-velocity within 200 ms d4q was off by 0.75 to 1.3 times what resolutions differ by."""
+"""The same factor if the spectrum of the highest derivative decreases, so that it has no impulses. With steps
+of velocity within 200 ms, d4q was off by 0.75 to 1.3 times the difference between resolutions."""
 
 SHORTEST_IMPULSE = 5e-4
-"""Duration, s, of an impulse of the highest derivative, as where jerk jumps: the current of a motor hardly
-follows faster."""
+"""Shortest duration, s, of an impulse of the highest derivative, e.g. where jerk jumps: the current of a
+motor hardly follows faster."""
 
 IMPULSES = 0.6
-"""Standard deviation of the highest derivative, in what such an impulse has that a spline spreads: longer by
-a factor, its root mean square is less by the root of it. Of 110 motions of minimum jerk d4q was off by 0.58
-to 1.01 times that."""
+"""Standard deviation of the highest derivative, as a share of the size that such an impulse would have. A
+spline spreads an impulse: if it is longer by a factor, its root mean square is smaller by the root of the
+factor. In 110 motions of minimum jerk, d4q was off by 0.58 to 1.01 times that size."""
 
 
 class Unresolved:
-    """The components of a part of a fit of which no two resolutions agree.
+    """Uncertainty of the components of a part for which no two resolutions agree.
 
     Attributes:
-        members: their indices.
+        members: indices of the components.
     """
 
     def __init__(self, fit: Fit, part: Part, posterior: Posterior, known: Smoothing, orders: int) -> None:
         """Scale a posterior.
 
         Args:
-            fit: of the signal.
-            part: of it.
-            posterior: of the coefficients of the part's spline.
-            known: what resolutions differ by, and over what impulses are spread.
-            orders: value and derivatives that are needed.
+            fit: fit of the signal.
+            part: part of the fit.
+            posterior: posterior of the coefficients of the part's spline.
+            known: difference between resolutions, and duration over which impulses are spread.
+            orders: number of functions that are needed, value and derivatives.
         """
         self.members, self._orders = part.members, orders
         self._knots, self._degree, self._posterior = part.spline.t, fit.degree, posterior
@@ -306,7 +311,7 @@ class Unresolved:
         self._impulses: FloatArray = IMPULSES * np.sqrt(known.spread / SHORTEST_IMPULSE) * size
 
     def covariance(self, time: FloatArray) -> FloatArray:
-        """Return covariances of value and derivatives at times, s: (members, orders, orders, samples)."""
+        """Return covariances of value and derivatives at times, s, (members, orders, orders, samples)."""
         found = self._units[:, None, None, None] ** 2 * self._of_posterior(time)
         found[:, -1, -1] += self._impulses[:, None] ** 2
         return np.asarray(found)
@@ -329,22 +334,22 @@ def unresolved(fit: Fit, orders: int) -> Iterator[Unresolved]:
 def _of_least_squares(fit: Fit, part: Part) -> Posterior | None:
     try:
         return of_least_squares(fit.time, part.spline.t, fit.degree)
-    except np.linalg.LinAlgError:  # of very uneven times
+    except np.linalg.LinAlgError:  # very uneven times
         return None
 
 
 def vibrations(fit: Fit, orders: int) -> Iterator[tuple[int, FloatArray]]:
-    """Components with lines in their spectrum that nobody knows to be motion or noise.
+    """Yield components with lines in their spectrum that may be motion or noise.
 
     Yields:
-        The index of each, and the covariance of value and derivatives, (orders, orders), of lines that were
-        taken for noise, all their power at the highest frequency; NaN if the spline follows the lines.
+        Index of the component, and covariance of value and derivatives, (orders, orders), of lines that count
+        as noise, with all their power at the highest frequency; NaN if the spline follows the lines.
     """
     for part in fit.parts:
         known = part.smoothing
         if known is not None and known.lines.others:
             rate = 2 * np.pi * max(known.lines.others) * np.exp(0.5j * np.pi)
-            line = rate ** np.arange(orders)  # derivatives of a turning phasor
+            line = rate ** np.arange(orders)  # derivatives of a rotating phasor
             covariance = np.real(line[:, None] * line.conj())
             for member in part.members.tolist():
                 power = np.nan if known.follows_lines else known.lines.share * fit.residual[member] ** 2

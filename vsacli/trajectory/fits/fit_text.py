@@ -1,4 +1,4 @@
-"""Sentences of a report on fits: where they are unreliable, which given derivatives disagree with them."""
+"""Sentences of reports on fits: their accuracy, unreliable ends, noise and vibrations, and JSON values."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.fits.spectrum import motion_band
 
 TOLD = 0.01
-"""Share of the highest derivative from which on filtered noise in it is told."""
+"""Share of the highest derivative above which filtered noise is reported."""
 
 LISTED_LINES = 5
-"""Frequencies that a sentence names."""
+"""Most frequencies that a sentence names."""
 
 
 def fit_sentences(
     value: str, fitted: Sequence[str], labels: Sequence[str], time: FloatArray, fit: Fit
 ) -> Iterator[str]:
-    """Yield which numbers come from splines, their distance from the samples, and unreliable ends.
+    """Yield sentences on the values from splines, their distance from the samples, and unreliable ends.
 
     Args:
         value: name of the signal.
-        fitted: the derivatives that come from splines.
-        labels: of the components.
-        time: (samples,), s.
-        fit: of the signal.
+        fitted: names of the derivatives that come from splines.
+        labels: labels of the components.
+        time: times, (samples,), s.
+        fit: fit of the signal.
     """
     if not fitted or not fit.parts:
         return
@@ -61,7 +61,7 @@ def fit_sentences(
 
 
 def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """Yield undetermined derivatives, by the smoothing splines of components."""
+    """Yield sentences on vibrations and undetermined derivatives, as assessed by smoothing splines."""
     for part in fit.parts:
         known = part.smoothing
         if known is None:
@@ -83,7 +83,6 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
 
 
 def _remedy(part: Part) -> str:
-    """Return a sentence on how to determine the highest derivative of a component."""
     if part.noise is not None:
         return (
             f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"
@@ -102,12 +101,12 @@ def _vibration(known: Smoothing) -> str:
 
 
 def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """Yield how noise was understood: unjudged components, and mains hum.
+    """Yield notes on the interpretation of noise: components not assessed, hum, images, filtered noise.
 
     Args:
         value: name of the signal.
-        labels: of the components.
-        fit: of the signal.
+        labels: labels of the components.
+        fit: fit of the signal.
     """
     exact = [part for part in fit.parts if part.exact]
     if exact and len(fit.time) < FEWEST_JUDGED:
@@ -137,8 +136,8 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
 
     Args:
         value: name of the signal.
-        labels: of the components.
-        fit: of the signal.
+        labels: labels of the components.
+        fit: fit of the signal.
     """
     parts = {int(member): part for part in fit.parts for member in part.members}
     return {
@@ -169,7 +168,7 @@ def _band(part: Part, member: int, fit: Fit) -> float | None:
 
 
 def _judgement(part: Part) -> dict[str, Any]:
-    """Return the findings of a smoothing spline and of the spectrum about a component."""
+    """Return the assessment of a component by a smoothing spline and by the spectrum."""
     found: dict[str, Any] = {}
     if part.smoothing is not None:
         found["deviation"] = part.smoothing.relative

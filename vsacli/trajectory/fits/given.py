@@ -1,4 +1,4 @@
-"""Derivatives that were given, compared with those of a fit of the values."""
+"""Comparison of given derivatives with those of a fit of the values."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.selection import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, SMALLEST_SHARE
 
 SHARE = 0.05
-"""Share of the root mean square of a derivative by which a given one may differ: measured ones do."""
+"""Share of the root mean square of a derivative by which a given one may differ, as measured ones do."""
 
 DEVIATIONS = 10.0
-"""Standard deviations by which the derivative of the fit itself may be wrong."""
+"""Number of standard deviations by which the derivative of the fit itself may be wrong."""
 
 OUTLYING = 0.5
-"""Share of the largest derivative of the fit, inside, by which an outlier among given samples is off.
+"""Share of the fit's largest derivative, inside, by which an outlier of the given samples is off.
 
-It stands amid samples that are off by less than an eighth; the response of a spline to a jump is off on both
-sides.
+Its neighbors are off by less than an eighth of it; the response of a spline to a jump is off on both sides.
 """
 
 MOST_OUTLIERS = 10
-"""More than that are no outliers: a derivative taken of an encoder's steps is like that all the time."""
+"""Most outliers; more are none, since differences of an encoder's steps look like outliers all the time."""
 
 FACTORS = {
     180 / math.pi: "degrees instead of radians?",
@@ -35,7 +34,7 @@ FACTORS = {
     1000.0: "milli-units?",
     0.001: "are the values in milli-units?",
 }
-"""Factors by which a given derivative may be too large throughout, with the likely slip."""
+"""Factors by which a given derivative may be too large throughout, with the likely mistake."""
 
 
 def mismatches(
@@ -49,17 +48,17 @@ def mismatches(
 ) -> Iterator[str]:
     """Yield a sentence for each column of given derivatives that does not follow from the fit of the values.
 
-    The doubtful stretches at both ends play no part, or the first and last quarter if these are shorter. A
-    column differs if the root mean square of the difference exceeds 5 % of that of the fit's derivative, plus
-    ten times the error that noise gives the latter.
+    The unreliable ends are ignored, or the first and last quarter if these are shorter. A column differs if
+    the root mean square of the difference exceeds 5 % of that of the fit's derivative, plus ten times the
+    error of the latter due to noise.
 
     Args:
-        names: of the signal and its derivatives.
-        labels: of the components.
-        time: (samples,), s.
-        derivatives: of the signal, each (components, samples) if it is given.
-        fit: of the signal.
-        start: stamp of the time zero, s, with which times are told.
+        names: names of the signal and its derivatives.
+        labels: labels of the components.
+        time: times, (samples,), s.
+        derivatives: derivatives of the signal, each (components, samples); None if not given.
+        fit: fit of the signal.
+        start: stamp of time zero, s, added to reported times.
     """
     first, last = np.minimum(fit.doubtful, (time[-1] - time[0]) / 4)
     inside = (time >= time[0] + first) & (time <= time[-1] - last)
@@ -84,7 +83,7 @@ def mismatches(
 
 
 def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolArray:
-    """Return the components that differ significantly, (components,)."""
+    """Return the mask of components that differ significantly, (components,)."""
     size = _rms(rows[order])
     least = SMALLEST_SHARE * np.nanmax(size, initial=0.0)
     allowed = SHARE * np.maximum(size, least) + DEVIATIONS * _errors(fit, order)
@@ -93,7 +92,7 @@ def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolAr
 
 
 def _errors(fit: Fit, order: int) -> FloatArray:
-    """Standard deviation of a derivative of the fit, inside, due to noise of the samples, (components,)."""
+    """Return the standard deviation of the fit's derivative, inside, due to noise, (components,)."""
     errors = np.zeros(fit.components)
     for part in fit.parts:
         if part.smooth and part.smoothing is not None:
@@ -125,7 +124,7 @@ def _amounts(time: FloatArray, given: FloatArray, expected: FloatArray) -> str:
 
 
 def _outliers(given: FloatArray, expected: FloatArray) -> IndexArray:
-    """Indices of the few samples that are off by far while those on both sides are not."""
+    """Return the indices of samples that are far off while their neighbors are not, if there are few."""
     error = np.abs(given - expected)
     far = np.flatnonzero(error > OUTLYING * np.abs(expected).max())
     if not 0 < len(far) <= MOST_OUTLIERS:
@@ -136,7 +135,7 @@ def _outliers(given: FloatArray, expected: FloatArray) -> IndexArray:
 
 
 def _factor(given: FloatArray, expected: FloatArray) -> float | None:
-    """Return the factor of all expected values, if there is one."""
+    """Return the common factor from expected to given values; None without one."""
     power = float(expected @ expected)
     if power == 0:
         return None

@@ -1,4 +1,4 @@
-"""Least-squares splines: number of knots by cross-validation, and covariance of the coefficients."""
+"""Least-squares splines: number of knots by generalized cross-validation, and covariance of coefficients."""
 
 from __future__ import annotations
 
@@ -16,60 +16,60 @@ if TYPE_CHECKING:
 PENALTY = 1.4
 """Weight of a coefficient in cross-validation.
 
-With 1 it now and then takes far too many knots (Kim & Gu, 2004); twice as many mean 2^4.5 times the noise in
-a fourth derivative.
+With weight 1 it sometimes selects far too many knots (Kim & Gu, 2004); twice as many mean 2^4.5 times the
+noise in a fourth derivative.
 """
 
 BLOCK_SAMPLES = 16384
 """Samples whose B-splines are held in memory at a time."""
 
 COARSE_RATIO = 4
-"""Ratio of successive numbers of spans tried at first, over the whole range: the score may have several
+"""Ratio of successive numbers of spans in the first search, over the whole range: the score may have several
 minima, one for each time scale of the motion."""
 
 FINE_RATIOS = (2.0, 2.0**0.5, 2.0**0.25)
-"""Ratios of the numbers tried then on both sides of the best; the last is finer than the minimum is sharp."""
+"""Ratios of the numbers tried next on both sides of the best; the last is finer than the minimum is sharp."""
 
 
 def most_spans(samples: int, degree: int) -> int:
-    """Return the largest number of spans: half as many coefficients as samples, the rest shows noise."""
+    """Return the largest number of spans, with half as many coefficients as samples; the rest shows noise."""
     return max(1, samples // 2 - degree)
 
 
 def fit_spline(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpline[np.float64]:
-    """Return the spline nearest to samples, with as many samples in each knot span.
+    """Return the least-squares spline of samples, with equal numbers of samples in all knot spans.
 
-    Banded normal equations, solved once more for the residual: that gives back the digits that squaring the
-    condition number costs (corrected seminormal equations, Björck, Numerical Methods for Least Squares
-    Problems, 1996, 6.6.5). They take a fraction of the time of SciPy's `make_lsq_spline`, which grows with
+    The banded normal equations are solved once more for the residual, which restores the digits lost by
+    squaring the condition number (corrected seminormal equations, Björck, Numerical Methods for Least Squares
+    Problems, 1996, 6.6.5). This takes a fraction of the time of SciPy's `make_lsq_spline`, which grows with
     the product of samples and knots.
 
     Args:
-        time: (samples,), s.
-        rows: (components, samples).
+        time: times, (samples,), s.
+        rows: values, (components, samples).
         spans: number of knot spans.
-        degree: of the spline.
+        degree: degree of the spline.
     """
     from scipy.interpolate import make_lsq_spline
 
     try:
         first = _solve(time, rows, spans, degree)
         correction = _solve(time, rows - first(time).T, spans, degree)
-    except np.linalg.LinAlgError:  # of very uneven times
+    except np.linalg.LinAlgError:  # very uneven times
         return make_lsq_spline(time, rows.T, _knots(time, spans, degree), k=degree, method="qr")
     return type(first)(first.t, first.c + correction.c, degree)
 
 
 def best_spans(time: FloatArray, rows: FloatArray, degree: int) -> IndexArray:
-    """Return the number of knot spans for each row, by generalised cross-validation (Craven & Wahba, 1979).
+    """Return the number of knot spans for each row, by generalized cross-validation (Craven & Wahba, 1979).
 
-    It minimises RSS / (1 - 1.4 coefficients/samples)^2, see `PENALTY`. Rows choose for themselves: one knot
-    spacing for all would pass the noise of a slow joint through the knots of the fastest. Of successive
-    samples that are equal, as an encoder of low resolution gives them, only one counts: their errors are not
-    independent, and a score that took them for it would follow the steps.
+    It minimizes RSS / (1 - 1.4 coefficients/samples)^2, see `PENALTY`. The number is chosen for each row:
+    with a common knot spacing, noise of a slow joint would pass through the knots of the fastest. Of
+    successive equal samples, as from an encoder of low resolution, only one counts: their errors are not
+    independent, and a score that assumed so would follow the steps.
 
     Returns:
-        (components,); `most_spans` where it is best to go on towards interpolation.
+        Numbers of spans, (components,); `most_spans` if more, up to interpolation, would be better.
     """
     limit = most_spans(len(time), degree)
     informative = 1 + np.count_nonzero(np.diff(rows), axis=1)
@@ -92,9 +92,10 @@ def best_spans(time: FloatArray, rows: FloatArray, degree: int) -> IndexArray:
 def _score(
     time: FloatArray, rows: FloatArray, informative: IndexArray, spans: int, degree: int
 ) -> FloatArray:
-    """(components,); infinite where more than half of the informative samples would go into coefficients.
+    """Return the scores, (components,).
 
-    And where very uneven times leave spans with samples that are the same to rounding.
+    A score is infinite if there are more coefficients than half of the informative samples, or if very uneven
+    times leave spans whose samples coincide up to rounding.
     """
     share = (spans + degree) / informative
     if np.all(share > 0.5):
@@ -118,17 +119,17 @@ def _solve(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpli
 def normal_equations(
     time: FloatArray, rows: FloatArray, knots: FloatArray, degree: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the normal equations of the spline nearest to samples.
+    """Return the normal equations of the least-squares spline of samples.
 
     Args:
-        time: (samples,), s.
-        rows: (components, samples).
-        knots: of the spline, s.
-        degree: of the spline.
+        time: times, (samples,), s.
+        rows: values, (components, samples).
+        knots: knots of the spline, s.
+        degree: degree of the spline.
 
     Returns:
-        The lower bands of the Gram matrix, (degree + 1, coefficients), and the right-hand sides,
-        (coefficients, components).
+        Lower bands of the Gram matrix, (degree + 1, coefficients); right-hand sides, (coefficients,
+        components).
     """
     coefficients = len(knots) - degree - 1
     bands, sums = np.zeros((degree + 1, coefficients)), np.zeros((coefficients, len(rows)))
@@ -139,19 +140,17 @@ def normal_equations(
 
 
 def _knots(time: FloatArray, spans: int, degree: int) -> FloatArray:
-    """Equally spaced by the count of samples, so that none is without any, and in time if the samples are."""
+    """Return knots equally spaced by the number of samples, so that no span is empty."""
     inner = np.interp(np.linspace(0, len(time) - 1, spans + 1), np.arange(len(time)), time)
     return np.concatenate([np.repeat(time[0], degree), inner, np.repeat(time[-1], degree)])
 
 
 def _add(bands: FloatArray, sums: FloatArray, time: FloatArray, rows: FloatArray, knots: FloatArray) -> None:
-    """Add a block of samples to the normal equations: the lower bands and the right-hand sides."""
+    """Add a block of samples to the lower bands and right-hand sides of the normal equations."""
     from scipy.interpolate import BSpline
 
     width = len(bands)
-    design = BSpline.design_matrix(
-        time, knots, width - 1, extrapolate=True
-    )  # spares a slow check of the span
+    design = BSpline.design_matrix(time, knots, width - 1, extrapolate=True)  # skips a slow check of the span
     basis = np.ascontiguousarray(design.data.reshape(-1, width).T)
     first = design.indices[::width]
     starts = np.flatnonzero(np.diff(first, prepend=-1))
@@ -163,15 +162,15 @@ def _add(bands: FloatArray, sums: FloatArray, time: FloatArray, rows: FloatArray
 
 
 COVARIANCE_BLOCK = 4096
-"""Times whose covariances are computed together: each takes some 5 kB meanwhile."""
+"""Times whose covariances are computed together; each needs about 5 kB."""
 
 
 class LocalBasis(NamedTuple):
-    """The B-splines that are not zero at some times, and their derivatives.
+    """The B-splines that are nonzero at given times, and their derivatives.
 
     Attributes:
-        first: index of the first of them, (times,).
-        rows: (times, orders, degree + 1).
+        first: index of the first nonzero B-spline, (times,).
+        rows: values and derivatives, (times, orders, degree + 1).
     """
 
     first: IndexArray
@@ -179,13 +178,13 @@ class LocalBasis(NamedTuple):
 
 
 def local_basis(knots: FloatArray, degree: int, time: FloatArray, orders: int) -> LocalBasis:
-    """Return the B-splines at times (Cox-de Boor recurrence), or their derivatives by their coefficients.
+    """Return B-splines and their derivatives at times, by the Cox-de Boor recurrence.
 
     Args:
-        knots: all of the spline, those beyond both ends included, s.
-        degree: of the spline.
-        time: (times,) of its span, s.
-        orders: value and derivatives, per s^k.
+        knots: all knots of the spline, those beyond both ends included, s.
+        degree: degree of the spline.
+        time: times of its span, (times,), s.
+        orders: number of functions, value and derivatives, per s^k.
     """
     last = len(knots) - degree - 2
     place = np.clip(np.searchsorted(knots, time, side="right") - 1, degree, last)
@@ -209,11 +208,11 @@ def local_basis(knots: FloatArray, degree: int, time: FloatArray, orders: int) -
 
 
 def of_derivatives(posterior: Posterior, basis: LocalBasis) -> FloatArray:
-    """Covariances of value and derivatives at some times, (orders, orders, times).
+    """Return covariances of value and derivatives at given times, (orders, orders, times).
 
     Args:
-        posterior: of the coefficients.
-        basis: what the derivatives make of them.
+        posterior: posterior of the coefficients.
+        basis: B-splines and their derivatives at the times.
     """
     times, orders, width = basis.rows.shape
     found = np.empty((orders, orders, times))
@@ -234,9 +233,9 @@ def of_least_squares(time: FloatArray, knots: FloatArray, degree: int) -> Poster
     """Return the posterior (X'X)^-1 of the coefficients from samples with independent errors of deviation 1.
 
     Args:
-        time: (samples,), s.
-        knots: of the spline, s.
-        degree: of the spline.
+        time: times, (samples,), s.
+        knots: knots of the spline, s.
+        degree: degree of the spline.
 
     Raises:
         LinAlgError: very uneven times leave coefficients that no sample determines.
@@ -248,7 +247,7 @@ def of_least_squares(time: FloatArray, knots: FloatArray, degree: int) -> Poster
     unknowns = bands.shape[1]
     count = block_count(unknowns)
     filled = np.zeros((degree + 1, count * BLOCK))
-    filled[0] = 1  # what fills up the last block is known
+    filled[0] = 1  # unit pivots for the unknowns that fill up the last block
     filled[:, :unknowns] = bands
     rows, within = np.zeros((count, BLOCK, 2 * BLOCK)), np.arange(BLOCK)
     for distance, band in enumerate(filled):

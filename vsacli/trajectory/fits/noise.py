@@ -1,4 +1,4 @@
-"""Noise of samples: by divided differences before a fit, by lines in the spectrum of its residual."""
+"""Noise of samples: by divided differences before a fit, and by lines in the spectrum of its residual."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ BLOCK_SAMPLES = 16384
 """Samples whose differences are held in memory at a time."""
 
 PROBES = 4096
-"""Differences at each stride that a median is taken of."""
+"""Largest number of differences at each stride whose median is computed."""
 
 ABOVE_FLOOR = 10.0
-"""Factor above the differences of neighbouring samples from which on noise is not white. Below it
-interpolation knows the noise well enough. Of computed samples the factor was up to 3 before motion began to
-show, of noise that was low-pass filtered at 50 Hz or less 10^3 and more."""
+"""Factor over the differences of neighboring samples above which noise is not white. Below it interpolation
+knows the noise well enough. For computed samples the factor was up to 3 before motion became visible; for
+noise with a low-pass filter at 50 Hz or less it was 10^3 and more."""
 
 BELOW_MOTION = 30.0
-"""Factor below the largest differences of any stride beyond which differences are motion: those at strides
-as long as its fastest parts grow slowly, too."""
+"""Factor below the largest differences of any stride, above which differences count as motion: differences at
+strides as long as its fastest parts also grow slowly."""
 
 SLOW_GROWTH = 8.0
-"""Factor of differences from one stride to twice that, below which they are noise. Of 6 motions x 12 seeds at
-4 rates it was 9 and more, mostly 2^8; of filtered noise at some stride below 5."""
+"""Growth of differences from one stride to twice that below which they are noise. For 6 motions x 12 seeds at
+4 rates it was 9 and more, mostly 2^8; for filtered noise it was below 5 at some stride."""
 
 ROUNDING = 10 * np.finfo(float).eps
-"""Share of the largest value below which differences are rounding."""
+"""Share of the largest value below which differences count as rounding."""
 
 
 AT_REST = 1e-6
-"""Share of a record's deviation within which samples rest. An encoder at rest has no noise, and may rest
-most of the time."""
+"""Share of a recording's standard deviation within which samples are at rest. An encoder at rest has no
+noise, and may rest most of the time."""
 
 
 def estimated_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
-    """Standard deviation of independent noise.
+    """Return the standard deviation of independent noise.
 
     Args:
-        time: (samples,), s.
-        rows: (components, samples).
-        order: of the differences.
+        time: times, (samples,), s.
+        rows: values, (components, samples).
+        order: order of the differences.
 
     Returns:
-        (components,), zero if there are too few samples to tell.
+        Standard deviations, (components,); zero if there are too few samples.
     """
     count = len(time) - order
     power = np.zeros(len(rows))
@@ -56,15 +56,15 @@ def estimated_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArra
 
 
 def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
-    """Return whether there is noise that a filter hides from neighbouring samples, (components,).
+    """Return whether there is noise that a filter hides from neighboring samples, (components,).
 
     Differences of every second, fourth, ... sample grow by 2^order each time as long as motion is smooth over
     this many samples, those of filtered noise by less and less.
 
     Args:
-        time: (samples,), s.
-        rows: (components, samples).
-        order: of the differences.
+        time: times, (samples,), s.
+        rows: values, (components, samples).
+        order: order of the differences.
     """
     if len(time) <= order:
         return np.zeros(len(rows), dtype=bool)
@@ -76,23 +76,23 @@ def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
 
 
 def typical_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
-    """Standard deviation of independent noise in most places, (components,), whatever motion jumps in others.
+    """Return the standard deviation of independent noise, (components,), robust to jumps of motion.
 
     Args:
-        time: (samples,), s.
-        rows: (components, samples).
-        order: of the differences.
+        time: times, (samples,), s.
+        rows: values, (components, samples).
+        order: order of the differences.
     """
     return _typical(time, rows, order, 1) if len(time) > order else np.zeros(len(rows))
 
 
 def _strides(samples: int, order: int) -> list[int]:
-    """Powers of two as long as three such differences fit into the record side by side."""
+    """Return powers of two, as long as three such differences fit into the recording one after the other."""
     return [2**power for power in range(max(1, (samples // (3 * order)).bit_length()))]
 
 
 def _typical(time: FloatArray, rows: FloatArray, order: int, stride: int) -> FloatArray:
-    """Return the standard deviation of normal differences with the same median, in motion, (components,)."""
+    """Return the standard deviation of differences in motion by their median, (components,)."""
     last = len(time) - 1 - order * stride
     first = np.unique(np.linspace(0, last, min(PROBES, last + 1)).astype(int))
     sizes = np.abs(_differences(time, rows, order, first, stride))
@@ -105,7 +105,7 @@ def _typical(time: FloatArray, rows: FloatArray, order: int, stride: int) -> Flo
 def _differences(
     time: FloatArray, rows: FloatArray, order: int, first: IndexArray, stride: int
 ) -> FloatArray:
-    """Return differences of samples `stride` apart, the first of each given, (components, differences)."""
+    """Return normalized divided differences of samples `stride` apart, (components, differences)."""
     nodes = [time[first + i * stride] for i in range(order + 1)]
     span = nodes[-1] - nodes[0]
     weights = np.ones((order + 1, len(first)))
@@ -120,64 +120,62 @@ def _differences(
 
 
 LINE_RATIO = 100.0
-"""Ratio of the power at a frequency to the median near it, from which on it is a line.
+"""Ratio of the power at a frequency to the median near it above which it is a line.
 
-White noise never reaches it. Of 40 recordings without lines none exceeded 10, with lines the least was 150;
-the remainder that a filter left of the rounding of an encoder, under a motion that is symmetric in time,
-reached 45.
+White noise never reaches it. Of 40 recordings without lines none exceeded 10; the smallest with lines was
+150. Filtered rounding of an encoder, under a motion that is symmetric in time, reached 45.
 """
 
 LEAST_EFFECT = 0.1
-"""Share of the highest derivative that a line must have to count."""
+"""Smallest share of the highest derivative for a line to count."""
 
 MOST_LINES = 20
-"""More are the rounding error of an encoder under a periodic motion, whose period they have: some hundred of
-a motion that was repeated ten times."""
+"""Most lines; more are the rounding of an encoder under a periodic motion, which has its period: some hundred
+lines for a motion that is repeated ten times."""
 
 NEIGHBOURS = 40
-"""Frequencies on each side that the median is taken of."""
+"""Number of frequencies on each side whose median is computed."""
 
 FEW_NEIGHBOURS = 10
-"""The same of frequencies that have fewer below them: a slow sine that a coarse spline leaves out."""
+"""The same number for low frequencies, with fewer below them: slow sines left by a coarse spline."""
 
 BLOCK_FREQUENCIES = 16384
-"""Frequencies whose medians are taken at a time, to bound the memory."""
+"""Frequencies whose medians are computed at a time, to bound the memory."""
 
 LEAKAGE = 3
-"""Frequencies beside a line that a Hann window leaks into."""
+"""Number of frequencies on each side of a line into which a Hann window leaks."""
 
 MAINS = (50.0, 60.0)
-"""Hz."""
+"""Mains frequencies, Hz."""
 
 MAINS_RTOL = 0.005
-"""Networks keep their frequency to 0.2 Hz; clocks of data loggers to less."""
+"""Relative tolerance of a mains frequency: 0.2 Hz for the grid, and the clock of the data logger."""
 
 UNEVEN = 0.2
-"""Share of a step by which stamps may be uneven for a periodogram."""
+"""Share of a sampling interval by which stamps may be uneven for a periodogram."""
 
 
 CLOSE_LINES = 2.0
-"""Lines of a spectrum within which frequencies are the same."""
+"""Distance, in frequencies of the spectrum, within which two lines are the same."""
 
 FAR = 10.0
-"""Least ratio of the middle of two images to their distance from it. Harmonics of a motion are closer."""
+"""Smallest ratio of the middle of two images to their distance. Harmonics of a motion have a smaller one."""
 
 STEP_TOLERANCE = 0.01
-"""Share of an encoder's step by which values may miss its multiples, as they were printed."""
+"""Share of an encoder's step by which values may differ from its multiples, due to printed digits."""
 
 ROUNDING_RATIO = 1.5
-"""Ratio of the power of a residual to that of rounding to an encoder's steps, up to which it is all
-rounding."""
+"""Largest power of a residual that is only rounding to an encoder's steps, over the power of rounding."""
 
 
 class Lines(NamedTuple):
     """Frequencies that stand out of the residual of a fit.
 
     Attributes:
-        hum: those of mains, Hz.
-        others: which may be motion, Hz.
-        share: of the residual's power that the others carry.
-        resampled: rate from which resampling left images of the motion, Hz; 0 if there are none.
+        hum: lines of mains hum, Hz.
+        others: other lines, which may be motion, Hz.
+        share: share of the residual's power in the others.
+        resampled: original sample rate, Hz, if resampling left images of the motion; 0 otherwise.
     """
 
     hum: tuple[float, ...] = ()
@@ -186,7 +184,7 @@ class Lines(NamedTuple):
     resampled: float = 0.0
 
     def stretched(self, factor: float) -> Lines:
-        """Return the lines of the same motion, slower by a factor."""
+        """Return the lines of the motion slowed down by a factor."""
         hum = tuple(frequency / factor for frequency in self.hum)
         others = tuple(frequency / factor for frequency in self.others)
         return Lines(hum, others, self.share, self.resampled / factor)
@@ -195,15 +193,15 @@ class Lines(NamedTuple):
 def spectral_lines(
     time: FloatArray, residual: FloatArray, order: int, size: float, bandwidth: float | None = None
 ) -> Lines:
-    """Frequencies that stand out of the residual of a fit, from its periodogram with a Hann window.
+    """Return the frequencies that stand out of a fit's residual, by its periodogram with a Hann window.
 
     Args:
-        time: (samples,), s; nothing is said of records with uneven stamps.
-        residual: (samples,).
-        order: of the highest derivative that is needed.
-        size: of that derivative of the fit, root mean square; lines that would add less than 10 % to it do
-            not count, as what a coarse spline leaves of a motion has lines too.
-        bandwidth: above which there is no motion, Hz, if it is known: lines above it are noise.
+        time: times, (samples,), s; no lines are returned for uneven stamps.
+        residual: sample minus fit, (samples,).
+        order: order of the highest derivative that is needed.
+        size: root mean square of this derivative of the fit. Lines that would add less than 10 % to it are
+            ignored, since the part of a motion that a coarse spline does not follow has lines, too.
+        bandwidth: frequency above which there is no motion, Hz; lines above it are noise. None if unknown.
     """
     steps = np.diff(time)
     step = float(np.mean(steps))
@@ -211,10 +209,10 @@ def spectral_lines(
         return Lines()
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
     narrow, wide = _standing_out(power, FEW_NEIGHBOURS), _standing_out(power, NEIGHBOURS)
-    slow = NEIGHBOURS + LEAKAGE  # below it there are fewer neighbours
+    slow = NEIGHBOURS + LEAKAGE  # lower frequencies have fewer neighbors
     found = np.concatenate([narrow[narrow < slow], wide])
     frequencies = found / (len(time) * step)
-    # a Hann window leaves a quarter of a line's amplitude times the number of samples
+    # With a Hann window the magnitude at a line is a quarter of amplitude times number of samples.
     derivatives = 4 * np.sqrt(power[found] / 2) / len(time) * (2 * np.pi * frequencies) ** order
     matter = derivatives > LEAST_EFFECT * size
     found, frequencies = found[matter], frequencies[matter]
@@ -232,13 +230,13 @@ def spectral_lines(
 
 
 def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
-    """Return indices of lines among the frequencies with that number of neighbors on both sides."""
+    """Return the indices of lines among frequencies with this number of neighbors on both sides."""
     windows = np.lib.stride_tricks.sliding_window_view(power, neighbours)
     starts = range(0, len(windows), BLOCK_FREQUENCIES)
     medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
     centre = np.arange(neighbours + LEAKAGE, len(power) - neighbours - LEAKAGE)
     below = medians[centre - neighbours - LEAKAGE]
-    # of a spectrum that falls steeply, the side below has the larger median
+    # In a steeply falling spectrum the lower side has the larger median.
     beside = np.maximum(below, medians[centre + LEAKAGE + 1])
     here = power[centre]
     peak = (here >= power[centre - 1]) & (here >= power[centre + 1])
@@ -246,7 +244,7 @@ def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
 
 
 def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:
-    """Return which lie in pairs about a line of mains: side bands of hum that grows and fades."""
+    """Return the mask of pairs about a line of mains: side bands of hum with varying amplitude."""
     found = np.zeros(len(frequencies), dtype=bool)
     for middle in frequencies[mains]:
         mirrored = 2 * middle - frequencies
@@ -255,9 +253,10 @@ def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolA
 
 
 def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
-    """Return which are images that resampling left, pairs about a rate and about its double; and the rate.
+    """Return the mask of images left by resampling, and the original rate, Hz; 0 without images.
 
-    What interpolates samples of another rate repeats the motion's lines on both sides of its multiples.
+    Interpolation of samples of another rate repeats the motion's lines on both sides of multiples of that
+    rate. Images are pairs about a rate and about its double.
     """
     first, second = np.triu_indices(len(frequencies), 1)
     far = (frequencies[first] + frequencies[second]) > FAR * (frequencies[second] - frequencies[first])
@@ -275,11 +274,11 @@ def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
-    """Return whether steps of an encoder explain a residual: at constant velocity they are lines.
+    """Return whether rounding to steps of an encoder explains a residual; it has lines at constant velocity.
 
     Args:
         row: recorded samples, (samples,).
-        residual: (samples,), of its fit.
+        residual: sample minus fit, (samples,).
     """
     values = np.unique(row)
     step = float(np.diff(values).min())
@@ -289,7 +288,6 @@ def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
 
 
 def _mains(frequencies: FloatArray) -> BoolArray:
-    """Return the multiples of a mains frequency."""
     near = np.zeros(len(frequencies), dtype=bool)
     for mains in MAINS:
         harmonic = mains * np.round(frequencies / mains)

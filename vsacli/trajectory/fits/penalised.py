@@ -1,4 +1,8 @@
-"""Penalised splines of one resolution, and how much motion there is just below their cut-off."""
+"""Penalized splines of one resolution, their likelihood, and the power of the motion below their cut-off.
+
+A `Model` has a penalty for each difference of coefficients, constant in segments, i.e. a Gaussian prior whose
+variance is the inverse penalty. Its posterior gives spline and variances.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +26,15 @@ LEAST_PENALTY, LARGEST_PENALTY = 1e-8, 1e22
 LARGEST_STEP = 2.3
 """Largest step of the logarithm of a penalty: a decade.
 
-Without a limit the updates ran away on filtered noise.
+Without a limit the updates diverged on filtered noise.
 """
 
 KINK = 1e3
-"""Ratio of penalties of neighbouring segments from which on motion starts or stops there. In a sweep the
-ratio is some 20, at the ends of pauses 10^9."""
+"""Ratio of penalties of neighboring segments above which motion starts or stops there. In a sweep the ratio
+is about 20, at the ends of pauses 10^9."""
 
 ENDS = 0.05
-"""Share of the record at each end that does not count for deviations and comparisons."""
+"""Share of the recording at each end that is ignored in deviations and comparisons."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +42,10 @@ class Model:
     """The model of a recording at one resolution.
 
     Attributes:
-        bins: of the record.
-        correlation: of the noise of neighbouring means.
-        penalties: of each difference of coefficients, relative to 1/variance of the noise.
-        segments: in which they are constant.
+        bins: means of the recording.
+        correlation: correlation of the noise of neighboring means.
+        penalties: penalty of each difference of coefficients, relative to 1/variance of the noise.
+        segments: number of segments in which penalties are constant.
     """
 
     bins: Bins
@@ -60,7 +64,7 @@ class Model:
 
     @cached_property
     def whitened(self) -> Whitened:
-        """The means, with independent errors."""
+        """Means with independent errors."""
         return self.bins.whitened(self.correlation)
 
     @cached_property
@@ -74,13 +78,13 @@ class Model:
 
     @cached_property
     def noise_variance(self) -> float:
-        """Variance of a whitened mean: known from the recording, or else of maximum likelihood."""
+        """Variance of a whitened mean: known, or else of maximum likelihood."""
         known = self.whitened.variance
         return float(self._factor.rest[0]) / _freedom(self.bins) if known is None else known
 
     @cached_property
     def posterior(self) -> Posterior:
-        """Posterior of the coefficients; its unit of variance is that of the noise."""
+        """Posterior of the coefficients, with variances in units of the noise variance."""
         return Posterior(self._factor.diagonal[0], self._factor.upper[0])
 
     @cached_property
@@ -90,28 +94,28 @@ class Model:
 
     @property
     def spline(self) -> BSpline[np.float64]:
-        """The most probable one, with one column."""
+        """Most probable spline, with one column."""
         from scipy.interpolate import BSpline
 
         return BSpline(self.bins.knots, self.coefficients[:, None], self.bins.degree)
 
     @cached_property
     def freedoms(self) -> FloatArray:
-        """Freedom of each difference of coefficients: 1 if the samples determine it, 0 if the prior does."""
+        """Degree of freedom of each difference of coefficients: 1 by the samples, 0 by the prior alone."""
         certain = self.posterior.variances(self.bins.differences).ravel()[: len(self.penalties)]
         return np.clip(1 - certain * self.penalties, 0, 1)
 
     @property
     def piece(self) -> float:
-        """Mean length of what the samples determine one coefficient of, s: a knot span, or longer."""
+        """Mean length, s, for which the samples determine one coefficient: a knot span, or longer."""
         bins = self.bins
         return bins.span * bins.spans / (bins.degree + float(np.sum(self.freedoms)))
 
     def updated(self, step: float) -> Model:
-        """Return the model with the penalties that the found spline suggests.
+        """Return the model with penalties updated by its spline.
 
         Args:
-            step: share of the logarithmic step that is taken.
+            step: share of the full logarithmic step.
         """
         segment = self._segment
         free = np.maximum(np.bincount(segment, self.freedoms), 1e-4 * np.bincount(segment))
@@ -123,9 +127,9 @@ class Model:
 
     @cached_property
     def cautious(self) -> Posterior:
-        """Posterior of the coefficients with the ends of segments uncertain by a segment.
+        """Posterior of the coefficients if the ends of segments are uncertain by a segment.
 
-        Each difference has the smallest penalty of its own and the neighbouring segments. Most of the error
+        Each difference has the smallest penalty of its own and the neighboring segments. Most of the error
         comes from ends of pauses that lie within a segment.
         """
         if self.segments == 1:
@@ -143,50 +147,50 @@ class Model:
         """Return the variances of a derivative in the middle of both bins of each span, (2 spans,).
 
         Args:
-            order: of the derivative.
-            posterior: of the coefficients; None: that of the model.
+            order: order of the derivative.
+            posterior: posterior of the coefficients; None for that of the model.
         """
         places = np.array([0.25, 0.75])
         rows = _derivative_rows(places, self.bins.degree, order) / self.bins.span**order
-        # spans of a block have the same B-splines, each one further
+        # All spans of a block have the same B-splines, shifted by one from span to span.
         block = sort_rows(np.repeat(np.arange(BLOCK), 2), np.tile(rows, (BLOCK, 1)), BLOCK).blocks
         variances = (posterior or self.posterior).variances(block)
         return variances.ravel()[: 2 * self.bins.spans]
 
     @property
     def kinks(self) -> BoolArray:
-        """Return which `probes` lie in segments with a penalty far from that of a neighbour."""
+        """Mask of `probes` in segments with a penalty far from that of a neighbor."""
         far = np.abs(np.diff(np.log(self.each_penalty))) > np.log(KINK)
         segments: BoolArray = np.append(far, False) | np.append(False, far)
         return segments[segment_of(2 * self.bins.spans, self.segments)]
 
     @property
     def probes(self) -> FloatArray:
-        """The times of `variances`, s."""
+        """Times of `variances`, s."""
         bins = self.bins
         return np.asarray(bins.start + bins.span / 2 * (np.arange(2 * bins.spans) + 0.5))
 
     @property
     def inside(self) -> BoolArray:
-        """Return which of them are away from the ends."""
+        """Mask of `probes` away from the ends."""
         share = np.linspace(0, 1, 2 * self.bins.spans)
         inside: BoolArray = (share > ENDS) & (share < 1 - ENDS)
         return inside
 
 
 def segment_of(count: int, segments: int) -> IndexArray:
-    """Index of the segment of each of a number of differences, (count,)."""
+    """Return the index of the segment of each of `count` differences, (count,)."""
     return (np.arange(count) * segments) // count
 
 
 class Evidence(NamedTuple):
-    """The evidence for several penalties, for a recording or a stretch of it.
+    """The terms of the restricted likelihood of several candidates, for a recording or a stretch of it.
 
     Attributes:
-        rest: sum of squares that the splines leave, penalties included, (candidates,).
+        rest: residual sum of squares, penalties included, (candidates,).
         volume: logarithms of the determinants, (candidates,).
-        freedom: means less the coefficients of the polynomial that costs no penalty.
-        variance: of a whitened mean, if it is known.
+        freedom: number of means minus that of coefficients of the polynomial without penalty.
+        variance: variance of a whitened mean; None if unknown.
     """
 
     rest: FloatArray
@@ -196,14 +200,14 @@ class Evidence(NamedTuple):
 
 
 def evidence(bins: Bins, whitened: Whitened, penalties: FloatArray, factor: Factor | None = None) -> Evidence:
-    """Return the evidence for several penalties, (candidates, differences)."""
+    """Return the evidence for penalties of several candidates, (candidates, differences)."""
     factor = factor or _factors(bins, whitened, penalties)
     volume = factor.log_determinants - np.sum(np.log(penalties), axis=1) - whitened.log_scale
     return Evidence(factor.rest, volume, _freedom(bins), whitened.variance)
 
 
 def deviances(stretches: Sequence[Evidence]) -> FloatArray:
-    """Minus twice the logarithms of the restricted likelihoods of all stretches together, (candidates,)."""
+    """Return minus twice the log restricted likelihoods of all stretches together, (candidates,)."""
     rest = np.sum([each.rest for each in stretches], axis=0)
     freedom, known = sum(each.freedom for each in stretches), stretches[0].variance
     if known is None:
@@ -225,7 +229,7 @@ def _freedom(bins: Bins) -> int:
 
 
 def _derivative_rows(places: FloatArray, degree: int, order: int) -> FloatArray:
-    """Return a derivative of the B-splines of a span whose knots are one apart, (places, degree + 1)."""
+    """Return a derivative of the B-splines of a span, for knots at distance 1, (places, degree + 1)."""
     lower = np.stack(uniform_basis(places, degree - order), axis=1)
     for _ in range(order):
         lower = -np.diff(lower, prepend=0, append=0, axis=1)
@@ -233,24 +237,24 @@ def _derivative_rows(places: FloatArray, degree: int, order: int) -> FloatArray:
 
 
 STEP = 2.4
-"""Step of log t from one spline to the next: a sixth of the frequency with differences of order seven."""
+"""Step of log t from one spline to the next: a sixth in frequency with differences of order seven."""
 
 
 BANDS = 4
-"""Over which a spectrum is looked at; their frequencies go down to the half."""
+"""Number of bands in which a spectrum is evaluated, down to half of the cut-off frequency."""
 
 FALLING = 25.0
-"""Ratio of the power in the lowest to that in the highest of them, from which on a spectrum falls towards the
-cut-off. With jumps of jerk that of d4q is flat: on 180 records the ratio was 0.2 to 20. Of steps of velocity
-within 200 ms it was 17 to 120, unless noise hid how smooth they are."""
+"""Ratio of the power in the lowest band to that in the highest above which a spectrum falls towards the
+cut-off. With jumps of jerk the spectrum of d4q is flat: on 180 recordings the ratio was 0.2 to 20. For steps
+of velocity within 200 ms it was 17 to 120, unless noise hid their smoothness."""
 
 
 class MotionPower(NamedTuple):
-    """Power of a derivative of the motion between neighbouring cut-offs, the highest first.
+    """Power of a derivative of the motion between neighboring cut-offs, highest first.
 
     Attributes:
-        found: what splines differ by, less what noise makes of that, in units of its variance, (bands,).
-        expected: the same by the prior, (bands,).
+        found: squared difference of splines minus the part due to noise, in units of its variance, (bands,).
+        expected: power expected by the prior, in the same units, (bands,).
     """
 
     found: FloatArray
@@ -265,10 +269,10 @@ def motion_power(model: Model, order: int, bands: int, weight: FloatArray) -> Mo
     Products of gains are differences: H1 H2 (t1 - t2) = t1 H1 - t2 H2.
 
     Args:
-        model: the spline, t = 1.
-        order: of the derivative.
-        bands: how many.
-        weight: of each of `Model.probes`.
+        model: model of the spline, t = 1.
+        order: order of the derivative.
+        bands: number of bands.
+        weight: weights of `Model.probes`.
     """
     logarithms = STEP * np.arange(bands + 1)
     splines = [model.stiffened(each) for each in logarithms.tolist()]
@@ -284,6 +288,6 @@ def motion_power(model: Model, order: int, bands: int, weight: FloatArray) -> Mo
 
 
 def falls(model: Model, order: int) -> bool:
-    """Return whether the spectrum of a derivative falls towards the cut-off, as that of no impulse does."""
+    """Return whether the spectrum of a derivative falls towards the cut-off, unlike that of impulses."""
     lowest_last = motion_power(model, order, BANDS, model.inside / np.sum(model.inside)).found
     return bool(lowest_last[-1] > FALLING * max(lowest_last[0], 0.0))

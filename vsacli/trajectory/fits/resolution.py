@@ -1,6 +1,7 @@
-"""The resolution of a smoothing spline: coarse to fine, until the next one confirms it.
+"""The resolution of a smoothing spline: from coarse to fine, until the next one confirms it.
 
-At each resolution the penalties and the correlation of the noise are those that make the record most likely.
+At each resolution, `most_likely` searches penalties and correlation of the noise of maximum restricted
+likelihood. `find_resolution` compares the highest derivative of successive resolutions.
 """
 
 from __future__ import annotations
@@ -16,26 +17,26 @@ from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
 from vsacli.trajectory.fits.penalised import Model, deviances, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
-"""Correlations of the noise of neighbouring means tried at first."""
+"""Correlations of the noise of neighboring means in the first search."""
 
 SMALL_CORRELATIONS = np.array([0.01, 0.03, 0.1])
-"""Tried, too, if the noise of samples is known: that of means then depends on them."""
+"""Further correlations if the noise of samples is known, since that of means then depends on them."""
 
 FINER_CORRELATIONS = np.array([-0.3, -0.1, 0.0, 0.1, 0.3])
-"""Added to the inverse hyperbolic tangent of the best, twice."""
+"""Steps around the best correlation, of its inverse hyperbolic tangent; they are applied twice."""
 
 FIRST_DECADES = np.arange(-6.0, 19.0)
-"""Penalties tried at the coarsest resolution, as powers of ten: from none to a polynomial."""
+"""Penalties at the coarsest resolution, as powers of ten: from no penalty to a polynomial."""
 
 NEAR_DECADES = np.arange(-5.0, 5.0)
-"""Penalties tried around those of the coarser resolution."""
+"""Factors to penalties of the coarser resolution, as powers of ten."""
 
 NEAR_CORRELATION = 1.2
-"""Distance of inverse hyperbolic tangents within which correlations are tried around it."""
+"""Largest distance from the correlation of the coarser resolution, of inverse hyperbolic tangents."""
 
 MOST_SPANS_OF_GRID = 2048
-"""Spans from which on stretches are tried instead, since only a start is needed: that saves half of the
-time."""
+"""Number of spans above which the grid is evaluated on stretches only, since it gives an initial model: that
+saves half of the time."""
 
 STRETCHES = 8
 
@@ -45,15 +46,15 @@ FEWEST_DIFFERENCES = 4
 
 UPDATES = 30
 LEAST_GAIN = 0.05
-"""Smallest gain of twice the log likelihood by which an update is followed by another."""
+"""Smallest gain of twice the log likelihood after which updates continue."""
 
 
 def most_likely(bins: Bins, coarser: Model | None) -> Model:
-    """Return the model of the largest restricted likelihood that the search finds.
+    """Search for the model of maximum restricted likelihood.
 
     Args:
-        bins: of the record.
-        coarser: result with half as many spans, around which to search; None: everywhere.
+        bins: means of the recording.
+        coarser: model with half as many spans, around which to search; None to search everywhere.
     """
     model = _segmented(_improved(_best_of_grids(bins, _grids(bins, coarser))))
     for _ in range(1 if _long(bins) else 2):
@@ -62,12 +63,12 @@ def most_likely(bins: Bins, coarser: Model | None) -> Model:
 
 
 class _Grid(NamedTuple):
-    """Models that are tried together.
+    """A grid of models.
 
     Attributes:
-        correlations: of the noise of neighbouring means.
-        shape: logarithms of the penalties of segments to the base 10, (segments,).
-        decades: added to these.
+        correlations: correlations of the noise of neighboring means.
+        shape: common logarithms of the penalties of segments, (segments,).
+        decades: numbers that are added to `shape`.
     """
 
     correlations: FloatArray
@@ -81,7 +82,7 @@ class _Grid(NamedTuple):
 
 
 def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
-    """Return grids with one penalty throughout; for long recordings also with those of the coarser model."""
+    """Return the grids to search: near the coarser model, with its segments if long, and everywhere."""
     tried = CORRELATIONS if bins.noise is None else np.append(CORRELATIONS, SMALL_CORRELATIONS)
     level = np.zeros(1)
     if coarser is None:
@@ -89,15 +90,15 @@ def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
     near = np.abs(np.arctanh(tried) - np.arctanh(coarser.correlation)) <= NEAR_CORRELATION
     found = np.log10(coarser.each_penalty if _long(bins) else coarser.penalties)
     shape = found if _long(bins) else np.mean(found, keepdims=True)
-    # differences of order n of a given function shrink by 2^n, noise of a mean by 2^(-1/2)
+    # With half the span, differences of order n shrink by 2^n, noise of a mean grows by 2^(1/2).
     growth = (2 * bins.degree - 1) * np.log10(2)
-    # what passed for noise on coarser bins, as a sweep does, may be resolved now: look everywhere too
+    # A motion that counted as noise on coarser bins, e.g. a sweep, may be resolved now: search everywhere.
     everywhere = _Grid(CORRELATIONS[::3], level, FIRST_DECADES[::3])
     return [_Grid(tried[near], shape + growth, NEAR_DECADES), everywhere]
 
 
 def _best_of_grids(bins: Bins, grids: Sequence[_Grid]) -> Model:
-    """Return the model of largest likelihood; of long recordings by distant stretches, as a start."""
+    """Return the model of largest likelihood on the grids; for long recordings by distant stretches only."""
     differences = bins.coefficients - bins.degree
     spans = MOST_SPANS_OF_GRID // STRETCHES if _long(bins) else bins.spans
     firsts = np.linspace(0, bins.spans - spans, STRETCHES if _long(bins) else 1).astype(int).tolist()
@@ -120,7 +121,7 @@ def _long(bins: Bins) -> bool:
 
 
 def _improved(model: Model) -> Model:
-    """After updates of its penalties, each accepted if it makes the data more likely."""
+    """Return the model after updates of its penalties, each accepted if it increases the likelihood."""
     step = 1.0
     for _ in range(UPDATES):
         candidate = model.updated(step)
@@ -137,9 +138,9 @@ def _improved(model: Model) -> Model:
 
 
 def _segmented(model: Model) -> Model:
-    """Return the model with twice as many segments as long as the likelihood gains.
+    """Return the model with segments halved as long as the likelihood increases.
 
-    Each additional segment must gain more than its own parameter can by chance.
+    Each additional segment must gain more than its parameter would by chance.
     """
     most = min(MOST_SEGMENTS, len(model.penalties) // FEWEST_DIFFERENCES)
     trial = model
@@ -151,7 +152,7 @@ def _segmented(model: Model) -> Model:
 
 
 def _recorrelated(model: Model) -> Model:
-    """Return the model with the most likely correlation of the noise near its own."""
+    """Return the model with the most likely correlation near its own."""
     centre = np.arctanh(model.correlation)
     candidates = np.clip(np.tanh(centre + FINER_CORRELATIONS), -0.6, 0.985)
     models = [Model(model.bins, each, model.penalties, model.segments) for each in candidates.tolist()]
@@ -159,53 +160,54 @@ def _recorrelated(model: Model) -> Model:
 
 
 FIRST_SPANS, FIRST_SPANS_SHORT = 32, 4
-"""Spans of the coarsest resolution; fewer for recordings of fewer than `SHORT` samples."""
+"""Number of spans of the coarsest resolution, and of that for recordings of fewer than `SHORT` samples."""
 
 SHORT = 256
 
 FEWEST_SAMPLES, ALWAYS_SPANS, MOST_SPANS = 3, 128, 32768
-"""Samples of a span; spans that there may be also with fewer, and never more of. Noise of fewer samples in a
-row has spoilt what a finer resolution would show, and time grows with the spans."""
+"""Fewest samples per span; number of spans that is possible with fewer; largest number of spans. Noise of
+fewer successive samples hides what a finer resolution would show, and computing time grows with the spans."""
 
 NEGLIGIBLE = 0.02
-"""Relative change of the highest derivative from one resolution to the next that asks for no finer one. If
-noise does not explain it, the next is taken. With a fifth of this, filtered noise was followed in a sweep."""
+"""Relative change of the highest derivative from one resolution to the next that requires no finer one. If
+noise does not explain it, the next is used. With a fifth, splines followed filtered noise in a sweep."""
 
 CONFIRMED = 1.0
-"""Deviations by which that derivative may change then. With more, half the knots were accepted of motions
-from rest to rest, and the true error was beyond two deviations in up to 30 % of the samples."""
+"""Number of standard deviations by which this derivative may change if a resolution is confirmed. With more,
+half the necessary knots were accepted for rest-to-rest motions, and the true error exceeded two deviations in
+up to 30 % of the samples."""
 
 KINK_CAUTION = 5.0
-"""Factor of the variance where motion starts or stops when resolutions are compared: errors are up to 2.2
-deviations there, root mean square."""
+"""Factor of the variance where motion starts or stops, in the comparison of resolutions: root mean square
+errors are up to 2.2 deviations there."""
 
 ACCEPTED = 0.25
-"""Largest relative deviation of the highest derivative with which a resolution is accepted. Motions whose
-fast parts pass for noise had 0.3 and more."""
+"""Largest relative deviation of the highest derivative of an accepted resolution. It was 0.3 and more for
+motions whose fast parts counted as noise."""
 
 CLOSE = 3.0
-"""Factor above the least residual of all resolutions, up to which one is considered if none is accepted. A
-coarse one may state the least deviation of a derivative that it does not see: with a factor of 100, steps of
-velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques 17 % off where 7 % were stated."""
+"""Largest residual of a resolution that is considered if none is accepted, over the smallest of all. A coarse
+one may state the smallest deviation of a derivative that it does not resolve: with a factor of 100, steps of
+velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques were off by 17 % with a stated 7 %."""
 
 MISSED = 0.3
-"""Share of the record's deviation that a residual may have. A larger one is motion that no resolution but the
-finest follows, which none confirms."""
+"""Largest residual over the recording's standard deviation. A larger one is motion that only the finest
+resolution follows, which no other confirms."""
 
 PROBES = 16384
-"""Samples, about, of which a residual is taken."""
+"""Approximate number of samples from which a residual is computed."""
 
 SPANS_PER_PERIOD = 4.0
-"""Spans per period of the highest frequency of a motion of known bandwidth: of a sine of that frequency
-the spline of degree 7 misses less than 1 % of the fourth derivative."""
+"""Spans per period of the highest frequency of a motion of known bandwidth: for a sine of that frequency the
+fourth derivative of a spline of degree 7 is off by less than 1 %."""
 
 
 class KnownNoise(NamedTuple):
     """Noise and bandwidth of a component as given by the user.
 
     Attributes:
-        deviation: standard deviation of a sample's noise; None: it is estimated.
-        bandwidth: above which there is no motion, Hz; None: the record tells.
+        deviation: standard deviation of a sample's noise; None to estimate it.
+        bandwidth: frequency above which there is no motion, Hz; None to determine it from the recording.
     """
 
     deviation: float | None = None
@@ -213,15 +215,15 @@ class KnownNoise(NamedTuple):
 
 
 class Resolution(NamedTuple):
-    """A resolution, compared with the next.
+    """A resolution in comparison with the next.
 
     Attributes:
-        model: the coarser of both, or the finer if noise does not explain the change.
-        deviation: of the highest derivative by noise, relative.
-        change: of that derivative from one to the other, relative.
-        unexplained: what of the change noise does not explain, in units of the row per s^order.
-        residual: of the model, root mean square.
-        given: whether it follows from a bandwidth.
+        model: model of the coarser one, or of the finer if noise does not explain a negligible change.
+        deviation: relative standard deviation of the highest derivative due to noise.
+        change: relative change of this derivative from one to the other.
+        unexplained: part of the change that noise does not explain, in units of the row per s^order.
+        residual: root mean square residual of the model.
+        given: whether it follows from a given bandwidth.
     """
 
     model: Model
@@ -233,12 +235,12 @@ class Resolution(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Both together, as an unresolved part is an error like any other."""
+        """Deviation and change combined, since an unresolved part is an error, too."""
         return float(np.hypot(self.deviation, self.change))
 
     @property
     def accepted(self) -> bool:
-        """Whether the next resolution changes no more than noise does, and both are small."""
+        """Whether the change to the next resolution does not exceed that by noise, and both are small."""
         confirmed = self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
         return self.given or (confirmed and self.total < ACCEPTED)
 
@@ -253,20 +255,20 @@ def find_resolution(
 ) -> Resolution | None:
     """Return the first resolution that the next one confirms, or that of a given bandwidth.
 
-    Coarse to fine, since it is the band that counts: above the frequency at which the motion falls below the
-    noise, whatever colour this has does not matter, and only a resolution beyond it would have to know it.
+    The search goes from coarse to fine, since the color of the noise does not matter above the frequency at
+    which the motion falls below the noise; only a finer resolution would depend on it.
 
     Args:
-        time: (samples,), s.
-        row: (samples,), of mean 0 and deviation 1.
-        degree: of the spline.
-        order: of the highest derivative that is needed.
-        known: given noise and bandwidth, the deviation in units of the row.
-        below: a frequency in Hz that no resolution that is tried may follow.
+        time: times, (samples,), s.
+        row: values of mean 0 and standard deviation 1, (samples,).
+        degree: degree of the spline.
+        order: order of the highest derivative that is needed.
+        known: given noise, in units of the row, and bandwidth.
+        below: frequency, Hz, that no resolution may follow.
 
     Returns:
-        If none is confirmed, that with the least deviation among those close to the samples; the finest if
-        none is; None if there is none.
+        The resolution. If none is confirmed, that with the smallest deviation among those close to the
+        samples; the finest if none is close; None if there is none.
     """
     if known.bandwidth is not None:
         return _given(time, row, degree, order, known)
@@ -298,7 +300,7 @@ def _given(
 
 
 def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> list[Moments]:
-    """Return the moments of the tried resolutions, coarse to fine."""
+    """Return the moments of all resolutions, from coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
     most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
@@ -311,7 +313,7 @@ def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> li
 
 
 def _models(moments: Iterable[Moments], known: KnownNoise) -> Iterator[Model]:
-    """Yield the most likely model of each resolution, coarse to fine."""
+    """Yield the most likely model of each resolution, from coarse to fine."""
     model: Model | None = None
     for each in moments:
         bins = Bins.of(each, known.deviation)
@@ -329,26 +331,25 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
     model = fine if not explained and change < NEGLIGIBLE * size else coarse
     deviation = deviation if model is coarse else _deviation(fine, order)
     residual = _residual(time, row, model)
-    # the finer of two splines near the same samples is the coarser plus what is independent of it
+    # The finer of two splines near the same samples is the coarser plus an independent part.
     more, less = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
     unexplained = float(np.sqrt(max(0.0, change**2 - abs(more - less))))
     return Resolution(model, deviation / size, change / size, unexplained, residual)
 
 
 def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
-    """Return the root mean square of the residual of a model."""
     some = slice(None, None, 1 + len(time) // PROBES)
     return _rms(row[some] - model.spline(time[some])[:, 0])
 
 
 def _deviation(model: Model, order: int) -> float:
-    """Return the deviation of a derivative by the posterior, away from the ends; see `calibration`."""
+    """Return the standard deviation of a derivative by the posterior, away from the ends."""
     factor = np.where(model.kinks, KINK_CAUTION, 1.0)
     return float(np.sqrt(_mean_variance(model, factor * model.variances(order, model.cautious))))
 
 
 def _mean_variance(model: Model, variances: FloatArray) -> float:
-    """Away from the ends, (2 spans,) to one."""
+    """Return the mean variance away from the ends, from (2 spans,) in units of the noise variance."""
     return float(np.mean(variances[model.inside])) * model.noise_variance
 
 

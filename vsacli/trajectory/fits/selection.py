@@ -1,6 +1,7 @@
-"""Selection of the spline that stands for samples: through them, or a smoother one near them.
+"""Selection of the spline that replaces samples: through them, by least squares, or a smoothing spline.
 
-Splines through samples, or near them by least squares, are judged by a smoothing spline.
+`fit_samples` fits all components through the samples, or by least squares; where noise may matter, a
+smoothing spline assesses the result, or replaces it.
 """
 
 from __future__ import annotations
@@ -25,35 +26,34 @@ if TYPE_CHECKING:
 
 
 SUSPECT = 0.01
-"""Share of the highest derivative of the interpolating spline that noise may make up without being judged."""
+"""Share of noise in the highest derivative of an interpolating spline above which it is assessed."""
 
 DISAGREEMENT, DISAGREEING_DEVIATIONS = 0.1, 3.0
-"""Share of the highest derivative that an interpolating spline may be off by, and deviations of a smoothing
-one that it may differ from it by."""
+"""Share of the highest derivative by which an interpolating spline may be off, and number of deviations of a
+smoothing spline by which it may differ from that."""
 
 PROBES = 4000
-"""Samples, about, at which they are compared; between samples far apart neither is known."""
+"""Approximate number of samples at which splines are compared; between distant samples neither is known."""
 
 VIBRATION = 0.5
-"""Share of the power of a residual in lines from which on it is a vibration rather than noise. The
-faint line at 358 Hz that an encoder's steps left beside filtered noise must not count."""
+"""Share of the power of a residual in lines above which it is a vibration rather than noise. A faint line,
+such as one of an encoder's steps at 358 Hz in addition to filtered noise, must not count."""
 
 PASSING = 2.0
-"""Factor between the frequency of a vibration and the bandwidth with which a spline follows it."""
+"""Bandwidth with which a spline follows a vibration, over the frequency of the vibration."""
 
 
 class Record(NamedTuple):
     """The fitted recording.
 
     Attributes:
-        time: (samples,), s.
-        values: (components, samples).
-        spoilt: share of the highest derivative of an interpolating spline that white noise makes up,
-            (components,).
-        filtered: whether there is noise that was filtered, (components,).
-        order: of the highest derivative that is needed.
-        known: noise of each component as given by the user.
-        least: derivative below which a component rests beside others that move, root mean square.
+        time: times, (samples,), s.
+        values: values, (components, samples).
+        spoilt: share of white noise in the highest derivative of an interpolating spline, (components,).
+        filtered: whether there is filtered noise, (components,).
+        order: order of the highest derivative that is needed.
+        known: noise and bandwidth of each component as given by the user.
+        least: root mean square derivative below which a component counts as at rest while others move.
     """
 
     time: FloatArray
@@ -66,7 +66,7 @@ class Record(NamedTuple):
 
 
 def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | None = None) -> Part:
-    """Return a smoothing spline of one component; a polynomial by least squares if there can be none."""
+    """Return a smoothing spline of one component; a polynomial by least squares if that is impossible."""
     row, members = record.values[member], np.array([member])
     found = smoothing_spline(record.time, row, degree, record.order, known or record.known[member])
     if found is None:
@@ -77,16 +77,16 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
 
 
 def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
-    """Yield parts whose fit may follow noise, with the judgement of them, or their replacements.
+    """Yield parts whose fit may follow noise, with their assessment, or replacements for them.
 
-    Suspect are least squares, whose number of knots has a bias, and splines through noisy samples. A
-    smoothing spline is the judge: the difference from it counts as a deviation.
+    Such fits are least-squares splines, whose number of knots has a bias, and splines through noisy samples.
+    They are assessed by a smoothing spline, the difference from which counts as a deviation.
 
     Args:
-        record: the fitted one.
-        fit: by least squares, or through the samples.
-        bar: on which the samples of each component are counted when it is judged.
-        chosen: whether the user chose it, so that it stays.
+        record: recording.
+        fit: fit by least squares, or through the samples.
+        bar: progress bar, advanced by the samples of each component.
+        chosen: whether the user chose the fit, so that it is not replaced.
     """
     for part in fit.parts:
         for column in range(len(part.members)):
@@ -97,7 +97,7 @@ def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part
 
 
 def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part | None:
-    """Return the replacement of a component of a part; None if it needs no judge, or there is none."""
+    """Return the replacement of a component of a part; None if it needs no assessment, or has none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
     single = part.of_columns(np.array([column]))
@@ -111,7 +111,7 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     difference = _difference(part, column, judge, record)
     if wanted or (not chosen and _better(judge, difference, record, filtered)):
         return judge
-    # noise alone speaks against a spline through the samples
+    # Only noise is a reason to doubt a spline through the samples.
     if judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or filtered or not part.exact:
         relative = float(np.hypot(judge.smoothing.relative, difference))
         known = replace(judge.smoothing, relative=relative, follows_lines=True)
@@ -120,7 +120,7 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
 
 
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
-    """Return the noise that the part of one component follows."""
+    """Return the filtered noise that a part of one component follows."""
     step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
     bandwidth = record.known[int(part.members[0])].bandwidth
     noise = followed_noise(part.spline, part.inside, step, record.order, bandwidth)
@@ -130,7 +130,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
 
 
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
-    """Return the part of one component with the noise that it follows, an error like any other."""
+    """Return a part of one component whose assessment includes the noise that it follows."""
     known = part.smoothing
     if known is None or noise.relative <= known.relative:
         return part
@@ -138,12 +138,12 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
 
 
 def _size(part: Part, order: int) -> float:
-    """Return the root mean square of a derivative of one component, away from the ends."""
+    """Return the root mean square of a derivative of one component away from the ends."""
     return float(np.sqrt(np.mean(part.spline(np.linspace(*part.inside, PROBES), nu=order) ** 2)))
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:
-    """Return the smoothing spline of a component; one that follows a vibration, which may be motion."""
+    """Return the smoothing spline of a component; it follows a strong vibration, which may be motion."""
     judge = smooth_part(record, member, degree)
     known, lines = record.known[member], judge.smoothing and judge.smoothing.lines
     if not lines or lines.share < VIBRATION or known.bandwidth is not None:
@@ -155,10 +155,10 @@ def _judge(record: Record, member: int, degree: int) -> Part:
 
 
 def _better(judge: Part, difference: float, record: Record, filtered: bool) -> bool:
-    """Return whether a smoothing spline is to stand for a component instead of one through its samples.
+    """Return whether a smoothing spline should replace a spline through the samples of a component.
 
-    If no resolution is accepted, noise must spoil the latter. If noise was filtered, it must differ by more
-    than the smoothing spline's own deviation explains.
+    If no resolution is accepted, noise must dominate more in the latter. If noise was filtered, both must
+    differ by more than the smoothing spline's own deviation explains.
     """
     known, member = judge.smoothing, judge.members[0]
     if known is None:
@@ -169,7 +169,7 @@ def _better(judge: Part, difference: float, record: Record, filtered: bool) -> b
 
 
 def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
-    """Between the highest derivatives of a fit and a smoothing spline, relative, away from the ends."""
+    """Return the relative difference of the highest derivatives of a fit and a smoothing spline, inside."""
     time, order = record.time, record.order
     start, end = smooth.doubtful
     inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
@@ -181,7 +181,7 @@ def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
 
 
 def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
-    """Return all parts, some components taken out of them and put in again by themselves."""
+    """Return all parts, with some components replaced by parts of their own."""
     taken = np.concatenate([part.members for part in instead])
     kept: list[Part] = []
     for part in parts:
@@ -202,9 +202,9 @@ class FitChoice:
     """The choice of the spline of a signal by the user.
 
     Attributes:
-        method: as in `fit_samples`.
-        noise: standard deviation of the samples of each component, None where it is estimated.
-        bandwidth: above which there is no motion, Hz; None: the record tells.
+        method: see `fit_samples`.
+        noise: standard deviation of the samples of each component; None to estimate it.
+        bandwidth: frequency above which there is no motion, Hz; None to determine it from the recording.
     """
 
     method: str | None = None
@@ -213,33 +213,33 @@ class FitChoice:
 
     @property
     def deviations(self) -> FloatArray | None:
-        """The noise, NaN where it is estimated."""
+        """Noise of each component, (components,); NaN where it is estimated."""
         return None if self.noise is None else np.array(self.noise, dtype=np.float64)
 
     def stretched(self, factor: float) -> FitChoice:
-        """Return the choice for the same motion, slower by a factor."""
+        """Return the choice for the motion slowed down by a factor."""
         return replace(self, bandwidth=None if self.bandwidth is None else self.bandwidth / factor)
 
 
 AS_IT_ASKS_FOR = FitChoice()
-"""Nothing is said: the noise of the samples decides."""
+"""Default: the noise of the samples decides."""
 
 INTERPOLATION_GAIN = {7: (1.0, 1.481, 4.628, 6.957, 37.415), 5: (1.0, 1.376, 4.798)}
-"""Gain by degree for each derivative k: standard deviation at the samples, times step^k, of a spline
+"""Noise gain by degree, for each derivative k: standard deviation at the samples, times step^k, of a spline
 through equally spaced samples with independent noise of standard deviation 1."""
 
 LEAST_SQUARES_GAIN = {7: (1.0, 1.823, 4.484, 12.11, 34.37), 5: (1.0, 1.829, 4.538)}
-"""Gain by degree for each derivative k: root mean square over a knot span, times span^k sqrt(samples in a
-span), of a least-squares spline near many such samples, far from its ends."""
+"""Noise gain by degree, for each derivative k: root mean square over a knot span, times span^k sqrt(samples
+in a span), of a least-squares spline near many such samples, far from its ends."""
 
 
 FEWEST_JUDGED = 32
-"""Samples from which on differences tell noise from motion; through fewer, as of a table of set points, the
-spline goes whatever they are."""
+"""Fewest samples with which differences distinguish noise from motion; fewer, e.g. a table of set points, are
+always interpolated."""
 
 SMALLEST_SHARE = 1e-3
-"""Share of the largest component's derivative against which smaller ones are measured: what is below may be
-nothing but rounding of a component that rests."""
+"""Share of the largest component's derivative that replaces smaller ones as the reference for noise: they may
+be only rounding of a component at rest."""
 
 
 def fit_samples(
@@ -256,16 +256,16 @@ def fit_samples(
     """Fit splines to samples.
 
     Args:
-        time: (samples,) in s, strictly increasing, more than `degree`.
-        values: (components, samples); a component that is NaN throughout gets no spline.
-        degree: of the splines, 5 or 7.
-        order: of the highest derivative that is needed.
-        method: `LEAST_SQUARES`, `INTERPOLATE`, `SMOOTH`, or None: for each component by its noise. Splines go
-            through samples whose noise, as estimated from their differences, makes up less than 1 % of the
-            highest derivative; for others, and where noise was filtered, stands a smoothing spline.
-        noise: standard deviation of the samples of each component, (components,), NaN where none is known.
-        bandwidth: above which there is no motion, Hz, if it is known; by default smoothing splines have it.
-        progress: opens a bar over the samples of all components.
+        time: times, (samples,), s, strictly increasing, more than `degree`.
+        values: values, (components, samples); a component that is all NaN has no spline.
+        degree: degree of the splines, 5 or 7.
+        order: order of the highest derivative that is needed.
+        method: `LEAST_SQUARES`, `INTERPOLATE`, `SMOOTH`, or None to choose for each component by its noise: a
+            spline through the samples if noise, estimated from their differences, is less than 1 % of the
+            highest derivative; else, and if noise was filtered, a smoothing spline.
+        noise: standard deviation of the samples of each component, (components,); NaN if unknown.
+        bandwidth: frequency above which there is no motion, Hz; None to let smoothing splines determine it.
+        progress: function that opens a progress bar over the samples of all components.
     """
     present = np.flatnonzero(~np.all(np.isnan(values), axis=1))
     given = np.full(len(values), np.nan) if noise is None else noise
@@ -312,10 +312,10 @@ def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, de
 def _spoilt(
     spline: BSpline[np.float64], time: FloatArray, rows: FloatArray, noise: FloatArray, order: int
 ) -> tuple[FloatArray, float]:
-    """Share of the highest derivative of a spline through samples that noise makes up, (components,).
+    """Return the share of noise in the highest derivative of a spline through samples.
 
     Returns:
-        It, and the least derivative that counts as one, root mean square.
+        Shares, (components,), and the smallest root mean square derivative that counts as motion.
     """
     degree, duration = spline.k, time[-1] - time[0]
     step = duration / (len(time) - 1)

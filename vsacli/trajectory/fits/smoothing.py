@@ -1,4 +1,4 @@
-"""Smoothing splines for noise of any colour, and how far they are off: by noise, and by a bias."""
+"""Smoothing splines for noise of any color, and their errors: variance due to noise, and bias."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
 
 
 STEP = 0.35
-"""Step of log t to both sides, between which derivatives by it are taken."""
+"""Step of log t to both sides, for finite differences with respect to it."""
 
 KINK_VARIANCE = 2.5
-"""Factor of the variance where motion starts or stops: there one difference of coefficients carries what the
-penalty spreads over a segment. On 32 records from rest to rest errors were 0.7 to 2.1 deviations there. With
-this, deviations are 0.7 to 1.5 times the errors, all over a record; with twice as much up to 2.0."""
+"""Factor of the variance where motion starts or stops: there a single difference of coefficients carries what
+the penalty spreads over a segment. On 32 rest-to-rest recordings errors were 0.7 to 2.1 deviations there.
+With this factor deviations are 0.7 to 1.5 times the errors over a recording; with twice as much up to 2.0."""
 
 LEAST_SHARE = 0.3
-"""Smallest share of the expected bias. Its measure is off by some 0.4 from recording to recording."""
+"""Smallest share of the expected bias; its estimate varies by about 0.4 from recording to recording."""
 
 
 FEW_SAMPLES = 2.0
 """Factor from the posterior deviation of a spline with several penalties to its error, both root mean square.
-A few samples at the ends of pauses have most of that, so that nearly all samples are right within twice their
-deviation, and the sum of all squares is larger all the same. On 150 records it was up to 2.4 times."""
+A few samples at the ends of pauses have most of the error: nearly all samples are within twice their
+deviation, and yet the sum of squares is larger. On 150 recordings the factor was up to 2.4."""
 
 
 class Calibration(NamedTuple):
     """Standard deviations of a spline and its derivatives.
 
     Attributes:
-        deviations: at `Model.probes`, (orders, probes).
-        units: the same relative to those of the posterior `Model.cautious`, (orders, probes).
+        deviations: standard deviations at `Model.probes`, (orders, probes).
+        units: standard deviations over those of the posterior `Model.cautious`, (orders, probes).
     """
 
     deviations: FloatArray
@@ -49,20 +49,20 @@ class Calibration(NamedTuple):
 
 
 def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
-    """Return the deviations of value and derivatives.
+    """Return the standard deviations of value and derivatives.
 
     Args:
-        model: the spline.
-        orders: of the value and its derivatives.
-        unexplained: how much the highest derivative changes from one resolution to the next beyond what noise
-            explains, root mean square away from the ends.
+        model: model of the spline.
+        orders: number of functions, value and derivatives.
+        unexplained: change of the highest derivative from one resolution to the next that noise does not
+            explain, root mean square away from the ends.
     """
     near = [model.stiffened(-STEP), model.stiffened(STEP)]
     share = _bias_share(model, orders - 1)
     cautious = np.array([model.variances(order, model.cautious) for order in range(orders)])
     softer, stiffer = (np.array([each.variances(order) for order in range(orders)]) for each in near)
     bias = (softer - stiffer) / (2 * STEP)
-    # the difference that stands for the derivative may exceed the variance, of which bias is a part
+    # The finite difference may exceed the variance, although bias is a part of that: bound it.
     found = np.maximum(cautious - (1 - share) * bias, min(share, 1.0) * cautious)
     found = np.where(model.kinks, np.maximum(found, KINK_VARIANCE * cautious), found)
     found *= 1 + unexplained**2 / float(np.mean(found[-1, model.inside]) * model.noise_variance)
@@ -72,18 +72,18 @@ def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
 
 
 def posterior_error(model: Model, order: int) -> float:
-    """Return the root mean square error of a derivative away from the ends, by the posterior alone."""
+    """Return the root mean square error of a derivative away from the ends, by the posterior only."""
     variance = np.mean(model.variances(order, model.cautious)[model.inside]) * model.noise_variance
     return float((FEW_SAMPLES if model.segments > 1 else 1.0) * np.sqrt(variance))
 
 
 def _bias_share(model: Model, order: int) -> float:
-    """Return the squared bias of a derivative as a share of the prior, by the motion at the cut-off.
+    """Return the squared bias of a derivative as a share of the prior's, from the motion at the cut-off.
 
-    What lies above the cut-off is extrapolated: if the spectrum falls more slowly than the prior's, it is
-    more again.
+    Motion above the cut-off is extrapolated: the share is larger again if the spectrum falls more slowly than
+    the prior's.
     """
-    weight = model.inside / model.variances(order)  # each part of the record counts alike
+    weight = model.inside / model.variances(order)  # equal weight of all parts of the recording
     power = motion_power(model, order, 2, weight)
     exists = power.expected > 0  # a straight line has no cut-off
     share = float(np.max(power.found[exists] / power.expected[exists], initial=0.0))
@@ -91,27 +91,28 @@ def _bias_share(model: Model, order: int) -> float:
 
 
 DETERMINED = 0.074
-"""Expected relative error of the highest derivative up to which it counts as right to 10 %. Of 1260 records
-with seven motions and twelve noises three with 0.077 were wrong by 10.0 to 10.4 %, none with less."""
+"""Largest expected relative error of the highest derivative with which it counts as accurate to 10 %. Of 1260
+recordings with seven motions and twelve noises, three with 0.077 were off by 10.0 to 10.4 %, none with
+less."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:
-    """The judgement of a smoothing spline.
+    """The assessment of a fit by a smoothing spline.
 
     Attributes:
         deviations: standard deviation of the value and each derivative, root mean square away from the ends,
             (orders,).
-        relative: error that must be expected of the highest derivative that is needed, over this derivative's
-            own root mean square; rather more than the deviation.
-        resolved: whether two successive resolutions agree on that derivative.
-        spread: length over which it has what may be impulses, s; zero if it is resolved, or its spectrum
-            falls.
+        relative: expected error of the highest derivative that is needed, over this derivative's own root
+            mean square; somewhat more than the deviation.
+        resolved: whether two successive resolutions agree on this derivative.
+        spread: duration over which the spline spreads possible impulses of it, s; zero if it is resolved, or
+            if its spectrum falls.
         lines: frequencies that stand out of the residual.
-        posterior: of the coefficients.
-        units: of the posterior's deviations of the value and each derivative, at equal steps of the spline's
-            span, (orders, steps).
-        follows_lines: whether the spline follows those that are not of mains.
+        posterior: posterior of the coefficients.
+        units: factors of the posterior's deviations of the value and each derivative, at equal steps of the
+            spline's span, (orders, steps).
+        follows_lines: whether the spline follows lines other than mains hum.
     """
 
     deviations: FloatArray
@@ -125,17 +126,17 @@ class Smoothing:
 
     @property
     def determined(self) -> bool:
-        """Whether the record determines the highest derivative to 10 %."""
+        """Whether the recording determines the highest derivative to 10 %."""
         return self.resolved and self.relative <= DETERMINED
 
     def following(self, noise: FollowedNoise, size: float) -> Smoothing:
-        """Return the judgement of a spline that follows noise, too.
+        """Return the assessment of a spline that also follows filtered noise.
 
         Args:
-            noise: in its highest derivative.
-            size: of this derivative, root mean square away from the ends.
+            noise: noise in its highest derivative.
+            size: root mean square of this derivative away from the ends.
         """
-        # of what is unresolved the error is relative to the spline's derivative with all that it follows
+        # If unresolved, the error is relative to the spline's derivative including the noise.
         relative = float(np.hypot(self.relative, noise.relative if self.resolved else noise.share))
         factor = max(1.0, noise.share * size / max(self.deviations[-1], np.finfo(float).tiny))
         return replace(
@@ -146,16 +147,16 @@ class Smoothing:
         )
 
     def units_at(self, place: FloatArray) -> FloatArray:
-        """Units of the posterior's deviations, (orders, places).
+        """Return the factors of the posterior's deviations, (orders, places).
 
         Args:
-            place: of the spline's span, 0 to 1, (places,).
+            place: places in the spline's span, 0 to 1, (places,).
         """
         steps = self.units.shape[1]
         return np.array([np.interp(place * steps - 0.5, np.arange(steps), row) for row in self.units])
 
     def stretched(self, factor: float) -> Smoothing:
-        """Return the judgement for the same motion, slower by a factor."""
+        """Return the assessment for the motion slowed down by a factor."""
         return replace(
             self,
             deviations=self.deviations / factor ** np.arange(len(self.deviations)),
@@ -167,18 +168,18 @@ class Smoothing:
 def smoothing_spline(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> tuple[BSpline[np.float64], Smoothing] | None:
-    """Return the smoothing spline near samples at the resolution that the record asks for.
+    """Return the smoothing spline of samples, at the resolution that the recording determines.
 
     Args:
-        time: (samples,), s.
-        row: (samples,).
-        degree: of the spline.
-        order: of the highest derivative that is needed.
+        time: times, (samples,), s.
+        row: values, (samples,).
+        degree: degree of the spline.
+        order: order of the highest derivative that is needed.
         known: given noise and bandwidth.
 
     Returns:
-        The spline, with one column, and its judgement; None for a constant recording, or one too short or
-        uneven for any.
+        The spline, with one column, and its assessment; None if the recording is constant, too short or too
+        uneven.
     """
     from scipy.interpolate import BSpline
 
@@ -213,7 +214,7 @@ def smoothing_spline(
 def _found(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> Resolution | None:
-    """Return the resolution of the recording, without mains hum, which a fine one follows like a motion."""
+    """Return the resolution below mains hum, which a finer one would follow like a motion."""
     found = find_resolution(time, row, degree, order, known)
     if found is None or found.given:
         return found

@@ -1,10 +1,10 @@
-"""Noise that a fit follows since a filter made it smooth: the spectrum of the highest derivative shows it.
+"""Filtered noise that a fit follows, detected in the spectrum of its highest derivative.
 
 Below the cut-off of a steep low-pass, random noise is as smooth as a motion, and a spline follows both. In
-the spectrum of the samples it is a plateau, from where motion falls below it to the cut-off. In that of the
-k-th derivative, which grows by f^2k, it is a second hump behind a valley. Motion makes humps, too: sines are
-lines, steps of velocity are bursts in time, and between the parts of a motion the spectrum of the samples
-rises again. A hump counts as noise if it is none of these.
+the spectrum of the samples such noise is a plateau, from the frequency where motion falls below it to the
+cut-off. In the spectrum of the k-th derivative, which is f^2k times as large, it is a second hump after a
+valley. Motion makes humps, too: sines are lines, steps of velocity are bursts in time, and between the parts
+of a motion the spectrum of the samples rises again. A hump counts as noise if it is none of these.
 """
 
 from __future__ import annotations
@@ -20,70 +20,70 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 SEGMENT_SAMPLES, MOST_SEGMENTS = 16384, 8
-"""Samples of a spectrum, and stretches of a longer record that have one."""
+"""Most samples of a spectrum, and most stretches of a longer recording with a spectrum each."""
 
 FIRST_LINE = 4
-"""Lowest frequency that is looked at, in cycles of a stretch."""
+"""Lowest frequency of the bands, in cycles per stretch."""
 
 BAND, HALF_WIDTH, LEAST_LINES = 0.04, 0.12, 7
-"""Width of a band, and to how far on both sides its median is taken, relative to its frequency; at least so
-many lines of a spectrum on both sides, so that no line of a sine moves it."""
+"""Width of a band, and range of its median on both sides, relative to its frequency; fewest lines of the
+spectrum in that range on each side, so that a sine does not change the median."""
 
 RISE = 4.0
-"""Rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise differ by
-less than a factor of 2.2 in 19 of 20 cases."""
+"""Smallest rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise
+differ by less than a factor of 2.2 in 19 of 20 cases."""
 
 NO_RISE = 4.0
-"""Factor by which the density of the samples may rise beyond a valley: that of filtered noise does not."""
+"""Largest rise of the samples' density beyond a valley; that of filtered noise does not rise."""
 
 SMALL = 0.01
-"""Share of the samples' power that noise may have which hides the motion in the derivative, so that there is
-no valley: it still is small beside the motion itself."""
+"""Largest share of the samples' power of noise that hides the motion in the derivative, so that there is no
+valley: it is still small compared with the motion itself."""
 
 FLAT = 0.2
-"""Density of the samples at the top of such noise relative to where it begins; that of motion falls."""
+"""Smallest density of the samples at the top of such noise, over that at its start; for motion it falls."""
 
 HUMP = 0.1
-"""Share of the largest density of a hump that its lines have at least."""
+"""Smallest density of the lines of a hump, over its largest density."""
 
 FEWEST_LINES, FEW_LINES = 16, 12
-"""Lines of a hump that is distinguished from a few sines; of a high hump."""
+"""Fewest lines of a hump that can be distinguished from a few sines; fewest of a high hump."""
 
 PEAKED = 2.5
-"""Power of a hump over its medians, from which on lines make it up."""
+"""Power of a hump over that of its medians above which it consists of sines."""
 
 SCATTER = (0.6, 1.8)
-"""Standard deviation of the logarithms of a hump's lines about their medians; 1.28 of Gaussian noise."""
+"""Range of the standard deviation of a hump's log power about the medians; Gaussian noise has 1.28."""
 
 BURSTS, RESTING = 5.0, 15.0
-"""Kurtosis of a hump's course in time from which on it happens now and then; 3 of Gaussian noise. That of an
-encoder rests when the joint does, which a high hump may."""
+"""Kurtosis over time above which a hump consists of bursts, and the same for a high hump; Gaussian noise has
+3. Noise of an encoder stops when the joint rests, which is allowed for a high hump."""
 
 HIGH = 30.0
-"""Rise of a high hump; the square of it, if no motion is seen in the bands below. Humps of a smooth motion
-were seen to rise by 6, and by 550 beyond the slowest lines."""
+"""Smallest rise of a high hump; its square if there is no motion in the bands below. Humps of a smooth motion
+rose by 6, and by 550 beyond the slowest lines."""
 
 LINE_RATIO = 30.0
-"""Ratio of the power of a line to the medians near it, from which on it is motion."""
+"""Ratio of the power of a line to the medians near it above which it is motion."""
 
 TAPERED = 10
-"""Share of a stretch at each end, one over this, where a window is too small to be undone."""
+"""Inverse of the share of a stretch at each end where the window is too small to divide by."""
 
 
 WITHIN = 0.99
-"""Share of a derivative's power that its band has."""
+"""Share of a derivative's power within its band."""
 
 LEAST_REST = 0.01
-"""Share of a derivative's power that is taken for motion at least."""
+"""Smallest share of a derivative's power that counts as motion."""
 
 
 class FollowedNoise(NamedTuple):
     """Random noise in the highest derivative of a fit.
 
     Attributes:
-        share: of the derivative's root mean square.
-        above: frequency above which it is more than the motion, Hz.
-        peak: frequency at which its density is largest, Hz.
+        share: root mean square of the noise over that of the derivative.
+        above: frequency above which noise exceeds the motion, Hz.
+        peak: frequency at which the density of the noise is largest, Hz.
     """
 
     share: float = 0.0
@@ -92,11 +92,11 @@ class FollowedNoise(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Root mean square relative to that of the derivative without it."""
+        """Root mean square over that of the derivative without the noise."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
 
     def stretched(self, factor: float) -> FollowedNoise:
-        """Return the noise of the same motion, slower by a factor."""
+        """Return the noise for the motion slowed down by a factor."""
         return FollowedNoise(self.share, self.above / factor, self.peak / factor)
 
 
@@ -104,11 +104,11 @@ class _Spectrum(NamedTuple):
     """The spectrum of a derivative, in stretches of a recording.
 
     Attributes:
-        frequency: of the lines, Hz.
-        lines: complex, weighted by a Hann window, (stretches, lines).
-        power: of each line, (stretches, lines).
-        weight: f^2k by which the density of the derivative exceeds that of the samples, (lines,).
-        samples: of a stretch.
+        frequency: frequencies of the lines, Hz, (lines,).
+        lines: complex lines, with a Hann window, (stretches, lines).
+        power: power of each line, (stretches, lines).
+        weight: ratio f^2k of the derivative's density to that of the samples, (lines,).
+        samples: number of samples of a stretch.
     """
 
     frequency: FloatArray
@@ -119,11 +119,11 @@ class _Spectrum(NamedTuple):
 
 
 class _Bands(NamedTuple):
-    """Medians of a spectrum that neither lines nor gaps between them move.
+    """Medians of a spectrum in bands, robust to sines and gaps between them.
 
     Attributes:
         line: index of the line in the middle of each band, (bands,).
-        width: number of lines of each, (bands,).
+        width: number of lines of each band, (bands,).
         samples: density of the samples, (bands,).
         derivative: density of the derivative, (bands,).
         slowest: largest density of the derivative in the lines below all bands.
@@ -143,14 +143,14 @@ def followed_noise(
     order: int,
     bandwidth: float | None = None,
 ) -> FollowedNoise:
-    """Find filtered noise in a derivative of a spline; fewer than some hundred samples show none.
+    """Find filtered noise in a derivative of a spline; none is found in fewer than about a hundred samples.
 
     Args:
-        spline: near or through the samples, with one column.
-        inside: first and last time of the stretch that is not doubtful, s.
-        step: mean distance of samples, s.
-        order: of the derivative.
-        bandwidth: up to which there is motion, Hz, if it is known: what is below is no noise.
+        spline: spline near or through the samples, with one column.
+        inside: first and last time with reliable derivatives, s.
+        step: mean sampling interval, s.
+        order: order of the derivative.
+        bandwidth: frequency up to which humps are motion, Hz; None if unknown.
     """
     time = _stretches(inside, step)
     spectrum = _spectrum(spline, time, step, order)
@@ -158,7 +158,7 @@ def followed_noise(
     if not total or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
         return FollowedNoise()
     bands = _bands(spectrum)
-    # of several humps that pass for noise the one from the lowest valley on has them all
+    # Of several humps of noise, the one from the lowest valley on includes all others.
     valleys, descends = _valleys(bands, _power_of_motion(spline, time, order))
     for valley in np.flatnonzero(valleys).tolist():
         top = valley + int(np.argmax(bands.derivative[valley:]))
@@ -179,14 +179,14 @@ def motion_band(
     order: int,
     below: float = np.inf,
 ) -> float:
-    """Return the frequency up to which 99 % of the power of a derivative lies, Hz; NaN at rest.
+    """Return the frequency below which 99 % of the power of a derivative lies, Hz; NaN at rest.
 
     Args:
-        spline: near or through the samples, with one column.
-        inside: first and last time of the stretch that is not doubtful, s.
-        step: mean distance of samples, s.
-        order: of the derivative.
-        below: frequency from which on it is noise, Hz.
+        spline: spline near or through the samples, with one column.
+        inside: first and last time with reliable derivatives, s.
+        step: mean sampling interval, s.
+        order: order of the derivative.
+        below: frequency above which there is noise, Hz.
     """
     spectrum = _spectrum(spline, _stretches(inside, step), step, order)
     power = np.where(spectrum.frequency < below, np.sum(spectrum.power, axis=0), 0.0)
@@ -195,7 +195,7 @@ def motion_band(
 
 
 def _stretches(inside: tuple[float, float], step: float) -> FloatArray:
-    """Return times of stretches all over a recording, (stretches, samples), s."""
+    """Return the times of stretches spread over a recording, (stretches, samples), s."""
     first, last = inside
     samples = int((last - first) / step) + 1
     count = max(2, min(samples, SEGMENT_SAMPLES))
@@ -213,7 +213,7 @@ def _spectrum(spline: BSpline[np.float64], time: FloatArray, step: float, order:
 
 
 def _power_of_motion(spline: BSpline[np.float64], time: FloatArray, order: int) -> float:
-    """Return the power of the samples about their mean, of a stretch, as density times number of lines."""
+    """Return the mean power of a stretch's samples about their mean, as density times number of lines."""
     values = spline(time)[..., 0]
     power = np.abs(np.fft.rfft(np.hanning(time.shape[1]) * (values - values.mean()))) ** 2
     return (2 * np.pi) ** (2 * order) * float(np.sum(power)) / len(time)
@@ -232,17 +232,18 @@ def _bands(spectrum: _Spectrum) -> _Bands:
     for band, middle in enumerate(line.tolist()):
         reach = max(LEAST_LINES, int(HALF_WIDTH * middle))
         near = density[:, max(1, middle - reach) : middle + reach + 1]
-        medians[band] = np.median(near) / np.log(2)  # the mean of what is exponentially distributed
+        medians[band] = np.median(near) / np.log(2)  # mean of an exponential distribution by its median
     medians = np.maximum(medians, np.finfo(float).tiny)
     slowest = float(np.mean(spectrum.power[:, 1:FIRST_LINE], axis=0).max())
     return _Bands(line, count, medians, medians * spectrum.weight[line], slowest)
 
 
 def _valleys(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
-    """Return bands from which the derivative's density rises and the samples' does not, (bands,).
+    """Return the bands from which on the derivative's density rises while the samples' does not.
 
     Returns:
-        These, and those to which the derivative's density descends; to others motion is hidden by the noise.
+        Mask of these bands, (bands,), and mask of bands to which the derivative's density descends, (bands,);
+        below others, noise hides the motion.
     """
     here, samples = bands.derivative, bands.samples
     near = np.lib.stride_tricks.sliding_window_view(np.pad(here, 2, constant_values=np.inf), 5).min(axis=1)
@@ -262,7 +263,7 @@ def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> Float
 
 
 def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> float:
-    """Return the frequency, Hz, of a valley, or of a later line of motion, which medians pass over."""
+    """Return the frequency, Hz, of a valley, or of a later line of motion, which medians ignore."""
     first, last = int(bands.line[valley]), int(bands.line[top]) + 1
     power = spectrum.power[:, first:last].mean(axis=0)
     lines = np.flatnonzero(power > LINE_RATIO * _medians(spectrum, bands, first, last))
@@ -270,7 +271,7 @@ def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) ->
 
 
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
-    """Return whether the hump beyond a valley is random and lasts."""
+    """Return whether the hump beyond a valley is random, and present all the time."""
     density = bands.derivative
     motion = np.max(density[:valley], initial=0.0)
     rise = density[top] / density[valley]

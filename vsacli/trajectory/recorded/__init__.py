@@ -1,1 +1,1 @@
-"""Signals recorded in a laboratory: columns of a CSV table."""
+"""Signals recorded in a laboratory: reading of CSV tables, checks, and profiles from samples."""

@@ -1,4 +1,4 @@
-"""Samples from arrays."""
+"""Recorded profiles from arrays of samples, with the same checks as for files."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from vsacli.trajectory.times import RecordedTimes
 def profiles_of_arrays(
     time: npt.ArrayLike, given: Mapping[Signal, Sequence[npt.ArrayLike | None]], fit: str | None
 ) -> tuple[RecordedTimes, dict[str, SampledProfile], tuple[str, ...]]:
-    """Times, profiles by the keys of their signals, and warnings, from arrays of samples.
+    """Return times, profiles by signal key, and warnings, from arrays of samples.
 
     Args:
-        time: (samples,), s.
-        given: of each signal value and derivatives, (samples, components) each, None where there is none.
-        fit: the method of all fits, as in `fit_samples`.
+        time: times, (samples,), s.
+        given: value and derivatives of each signal, (samples, components) each; None if not given.
+        fit: method of all fits, see `fit_samples`.
 
     Raises:
-        InputError: `fit` is no method; or naming each array that does not fit, by index.
+        InputError: `fit` is unknown, or arrays have wrong shapes or values; names each, with the index.
     """
     if fit not in (None, *METHODS):
         raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
@@ -46,7 +46,6 @@ def profiles_of_arrays(
 def _recorded(
     signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
 ) -> Iterator[Samples]:
-    """Yield the samples of a signal, if there are any."""
     if values is not None:
         yield samples_of_arrays(signal, times, values, *derivatives)
     elif any(given is not None for given in derivatives):
@@ -57,10 +56,10 @@ def _recorded(
 def samples_of_arrays(
     signal: Signal, time: FloatArray, values: npt.ArrayLike, *derivatives: npt.ArrayLike | None
 ) -> Samples:
-    """Samples from arrays of the shape (samples, components).
+    """Return samples from arrays of the shape (samples, components).
 
     Raises:
-        InputError: an array holds something else than numbers, or has another shape.
+        InputError: an array is not numeric, or has a wrong shape.
     """
     name, *names = signal.names
     rows = by_joint(checked_array(name, values, len(time), signal.components))
@@ -76,7 +75,7 @@ def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatA
     """Return the array as float64; None in the shape stands for any length.
 
     Raises:
-        InputError: the array holds something else than numbers, or has another shape.
+        InputError: the array is not numeric, or has a wrong shape.
     """
     try:
         found = np.asarray(array, dtype=np.float64)

@@ -1,4 +1,7 @@
-"""Assignment of the columns of a recorded trajectory to quantities of joints, with units."""
+"""Assignment of the columns of a table to quantities of joints and axes, with conversion of units.
+
+`column_layout` reports all problems of a header together.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
 
 Naming = dict[str, dict[int, str]]
-"""Names of the columns of each quantity, by index of the joint (wrench axis)."""
+"""Names of the columns of each quantity, by index of the joint or wrench axis."""
 
 _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
@@ -29,7 +32,7 @@ _WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name i
 RATE_INSTEAD = "rows at equal steps need their rate instead: rate in a trajectory or columns file"
 
 MOST_NAMED = 3
-"""Unknown columns, up to which all are named."""
+"""Most unknown columns of which all are named."""
 
 _PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
@@ -39,9 +42,9 @@ class Column:
     """A column of a table.
 
     Attributes:
-        index: its place, from 0.
-        name: from the header, without the unit.
-        factor: of its numbers to SI units.
+        index: index in the table, from 0.
+        name: name in the header, without the unit.
+        factor: factor from its numbers to SI units.
     """
 
     index: int
@@ -51,12 +54,12 @@ class Column:
 
 @dataclass(frozen=True)
 class ColumnLayout:
-    """The places of quantities in a table.
+    """The columns of quantities in a table.
 
     Attributes:
-        time: the column of the times.
-        quantities: for each quantity that the table has, e.g. `dq`, the columns by index of the joint (axis).
-        unused: names of the columns of joints that do not take their signal, by the key of the signal.
+        time: column of the times.
+        quantities: columns of each quantity in the table, e.g. `dq`, by index of the joint or axis.
+        unused: names of columns of joints that their signal does not command, by signal key.
     """
 
     time: Column
@@ -65,12 +68,12 @@ class ColumnLayout:
 
 
 def known_columns(joints: CommandedJoints) -> set[str]:
-    """Return every name that a column of a recorded trajectory of these joints may have."""
+    """Return all possible column names of a recorded trajectory of these joints."""
     return _known(_of_every_joint(joints))
 
 
 def _of_every_joint(joints: CommandedJoints) -> list[Naming]:
-    """Return both ways to name columns, as if each joint took every signal."""
+    """Return both namings of columns, as if every signal commanded all joints."""
     return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
 
 
@@ -85,21 +88,21 @@ def column_layout(
     file: str,
     line: int = 1,
 ) -> ColumnLayout:
-    """Return the places of the quantities in a table.
+    """Return the columns of the quantities in a table.
 
-    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one naming
-    throughout. Those of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
+    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1, in one way
+    throughout. Columns of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
 
     Args:
-        header: names of all columns, none twice.
-        joints: those commanded; each must have a column of each quantity that any joint has, but needs none
-            of signals that it does not take: such columns are admitted, but not in the layout.
-        wanted: signals whose values must be there; their derivatives are optional.
-        file: named in errors.
-        line: of the header, as above.
+        header: names of all columns, without duplicates.
+        joints: commanded joints. Each must have a column of each quantity that any joint has, except of
+            signals that do not command it; such columns are allowed, but not in the layout.
+        wanted: signals whose values are required; their derivatives are optional.
+        file: path of the file, for messages.
+        line: line of the header, for messages.
 
     Raises:
-        InputError: all that is wrong with the header.
+        InputError: the header has problems; lists each.
     """
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
@@ -141,7 +144,7 @@ def _layout(
     naming: Naming,
     of_signals: Mapping[str, Collection[str]],
 ) -> ColumnLayout:
-    """Return the places of quantities, once all columns of the joints that take a signal are found."""
+    """Return the columns of quantities of which no column is missing."""
     return ColumnLayout(
         time=columns[TIME],
         quantities={
@@ -157,7 +160,6 @@ def _layout(
 
 
 def _columns(pattern: str, joints: CommandedJoints) -> Naming:
-    """Return the columns of the joints, those of each signal for the joints that take it."""
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1)
@@ -175,7 +177,7 @@ def _all(naming: Naming) -> list[str]:
 def _strangers(
     header: Sequence[str], expected: Sequence[str], known: Collection[str], file: str
 ) -> Iterator[str]:
-    """Columns that are not known: each that may be a slip, and all others in one sentence."""
+    """Yield problems of unknown columns: one for each probable misspelling, and one for all others."""
     missing, others = [column for column in expected if column not in header], []
     for column in header:
         unit = _PARENTHESISED.fullmatch(column)
@@ -195,7 +197,7 @@ def _strangers(
 
 
 def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
-    """Return whether only the time is known, and other names are no slips of known ones."""
+    """Return whether at most the time is known, and some other name is not a misspelling of a known one."""
     columns = [name for name in names if name != TIME]
     signals = [name for name in known if name != TIME]
     none_known = not any(name in known for name in columns)
@@ -203,7 +205,6 @@ def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
 
 
 def _remedy(file: str) -> str:
-    """Return the advice on columns with other people's names."""
     return (
         f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
         f" ignore: {REST} there leaves out those without use"
@@ -234,7 +235,7 @@ def _measured(
     joints: CommandedJoints,
     problems: list[str],
 ) -> Iterator[tuple[str, Column]]:
-    """Yield the columns that are used, by name; notes units that cannot be converted."""
+    """Yield names and columns that are used; add units that cannot be converted to `problems`."""
     types = tuple(joints.types.values())
     expected = {TIME: VARIABLES[TIME].quantity.unit("")}
     for quantity, columns in naming.items():
@@ -251,7 +252,7 @@ def _measured(
 
 
 def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:
-    """Return the unit of one column; the axes of a wrench are forces, then moments."""
+    """Return the unit of a column; the axes of a wrench are forces, then moments."""
     if name not in WRENCH.names:
         return quantity.unit(joint_types[index])
     return quantity.prismatic if WRENCH_AXES[index].startswith("f") else quantity.revolute

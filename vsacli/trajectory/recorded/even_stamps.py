@@ -1,4 +1,4 @@
-"""Stamps of even samples that were rounded: to decimals, or to floating-point numbers since 1970."""
+"""Recovery of even sample times from stamps rounded to decimals, or to floating-point seconds since 1970."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from vsacli.trajectory.recorded.thresholds import ENOUGH_ROWS
 MOST_DECIMALS = 9
 
 EVEN = 1e-6
-"""Deviations from even stamps, in steps, that matter to no derivative."""
+"""Deviation from even stamps, in sampling intervals, that affects no derivative."""
 
 LOST = 1.5
-"""Steps, in median ones, over which rows are missing."""
+"""Interval, in median ones, above which rows are missing."""
 
 DIGITS = 17
-"""Digits that tell any two floating-point numbers apart."""
+"""Digits that distinguish any two floating-point numbers."""
 
 COARSEST = 0.5
-"""Resolution, in steps, up to which stamps show whether samples are even."""
+"""Coarsest resolution, in sampling intervals, with which stamps show whether samples are even."""
 
 
 def elapsed_times(stamps: FloatArray) -> FloatArray:
-    """Times from the first of some stamps on, (samples,) in s, as even as their resolution admits.
+    """Return times from the first stamp on, (samples,), s, made even if their resolution allows it.
 
-    Rounded stamps of even samples are noise of the motion, a periodic one even, which no fit could tell from
-    a vibration. Rows may be missing.
+    Rounded stamps of even samples act like noise of the motion, even periodic noise, which no fit could
+    distinguish from a vibration. Rows may be missing.
     """
     elapsed = stamps - stamps[:1]
     if len(stamps) < ENOUGH_ROWS or not np.all(np.diff(stamps) > 0):
@@ -35,14 +35,14 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
     deviation = float(np.abs(even - elapsed).max())
     if deviation <= EVEN * step:
         return elapsed
-    digit, rounding = resolution(stamps), _rounding(stamps)  # half of each by a stamp, half by both ends
+    digit, rounding = resolution(stamps), _rounding(stamps)  # half of each from a stamp, half from both ends
     if deviation <= rounding or (deviation <= digit + rounding and digit <= COARSEST * step):
         return even
     return elapsed
 
 
 def _even(elapsed: FloatArray) -> FloatArray:
-    """Return the nearest multiples of a step that is the last time over a whole number."""
+    """Return the nearest multiples of an interval that divides the last time into an integer number."""
     steps = np.diff(elapsed)
     step = float(np.mean(steps[steps < LOST * np.median(steps)]))
     places = np.round(elapsed / (elapsed[-1] / np.round(elapsed[-1] / step)))
@@ -50,7 +50,7 @@ def _even(elapsed: FloatArray) -> FloatArray:
 
 
 def resolution(stamps: FloatArray) -> float:
-    """Return the last digit of stamps, s: of their decimals, or of their floating-point numbers."""
+    """Return the resolution of stamps, s: their last decimal, or the spacing of floating-point numbers."""
     few = stamps[:: max(1, len(stamps) // 1000)]
     rounding = _rounding(stamps)
     for decimals in range(MOST_DECIMALS + 1):
@@ -60,14 +60,14 @@ def resolution(stamps: FloatArray) -> float:
 
 
 def _rounding(stamps: FloatArray) -> float:
-    """Distance of the floating-point numbers that stamps are, s."""
+    """Return the spacing of floating-point numbers at the stamps, s."""
     return float(np.spacing(np.abs(stamps).max()))
 
 
 def even_rate(stamps: FloatArray) -> float | None:
-    """Return the samples per second of even stamps that miss none, (samples,) in s; None of others.
+    """Return the sample rate, 1/s, of even stamps, (samples,), s, without missing rows; None for others.
 
-    Of all rates that the rounding of the stamps admits it is the one of fewest digits.
+    Of all rates that are possible with the rounding of the stamps it has the fewest digits.
     """
     steps = len(stamps) - 1
     elapsed = elapsed_times(stamps)
@@ -75,13 +75,13 @@ def even_rate(stamps: FloatArray) -> float | None:
         return None
     even = elapsed[-1] * np.arange(steps + 1) / steps
     off = float(np.abs(stamps - stamps[0] - even).max()) + _rounding(stamps)
-    rate, allowed = steps / float(elapsed[-1]), 2 * off / float(elapsed[-1])  # off at either end
+    rate, allowed = steps / float(elapsed[-1]), 2 * off / float(elapsed[-1])  # both ends may be off
     rounded = (float(f"{rate:.{digits}g}") for digits in range(1, DIGITS))
     return next((each for each in rounded if abs(each - rate) <= allowed * rate), rate)
 
 
 def rounding_notes(stamps: FloatArray) -> tuple[str, ...]:
-    """Return the note that rounded stamps were taken for even ones, if they were."""
+    """Return a note if rounded stamps were replaced by even ones."""
     elapsed = elapsed_times(stamps)
     off = float(np.abs(elapsed - (stamps - stamps[:1])).max(initial=0.0))
     if off == 0:

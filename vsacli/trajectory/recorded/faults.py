@@ -1,4 +1,7 @@
-"""Faults of a column of samples: outliers, frozen and saturated stretches, wrapped angles."""
+"""Faults of a column of samples: outliers, frozen and saturated stretches, wrapped angles.
+
+Outliers stand out of fourth-order divided differences; a polynomial through their neighbors confirms them.
+"""
 
 from __future__ import annotations
 
@@ -36,17 +39,17 @@ from vsacli.trajectory.recorded.thresholds import (
 )
 
 END_WEIGHTS = np.append(1.0, -np.vander([0.0], 4) @ np.linalg.pinv(np.vander(np.arange(1.0, 11.0), 4)))
-"""Weights of a sample and the next ten, for the error of the prediction by a cubic through these."""
+"""Weights of a sample and the next ten, for the error of its prediction by a cubic through these."""
 
 
 @dataclass(frozen=True, eq=False)
 class Faults:
-    """Samples, or stretches of them, that no sensor of a moving robot gives.
+    """Samples, or stretches of them, that no sensor of a moving robot returns.
 
     Attributes:
-        first: index of each, or of the first sample of each stretch, ascending; at least one.
-        last: of the last sample of each stretch.
-        sizes: the error of a sample, or the length of a stretch in s.
+        first: index of each sample, or of the first sample of each stretch, ascending; at least one.
+        last: index of the last sample of each stretch.
+        sizes: error of each sample, or duration of each stretch, s.
     """
 
     first: IndexArray
@@ -55,7 +58,7 @@ class Faults:
 
     @property
     def at(self) -> int:
-        """Index of the first of all."""
+        """Sample index of the first fault."""
         return int(self.first[0])
 
     @property
@@ -65,12 +68,12 @@ class Faults:
 
     @property
     def worst(self) -> int:
-        """Index of the worst."""
+        """Index of the worst fault."""
         return int(np.argmax(self.sizes))
 
 
 def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
-    """Samples, or up to three together, that a smooth curve through their neighbours misses by far."""
+    """Return samples, up to three together, that are far off a smooth curve through their neighbors."""
     size = np.abs(quantization.differences)
     centres = np.arange(len(size)) + ORDER // 2
     off = size > _noticeable(quantization, centres)
@@ -88,7 +91,7 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
 
 
 class _Event(NamedTuple):
-    """Samples first to last that have to do with differences that are too large, and the largest of those."""
+    """Samples first to last that enter differences that are too large, and the largest of those."""
 
     first: int
     last: int
@@ -96,7 +99,7 @@ class _Event(NamedTuple):
 
 
 def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
-    """Return the largest."""
+    """Return the `MOST_EVENTS` largest events."""
     if not centres.size:
         return []
     starts = np.flatnonzero(np.append(True, np.diff(centres) > ORDER))
@@ -108,7 +111,7 @@ def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
 
 
 def _at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
-    """Yield the first and the last sample if the next ones predict it far worse than they do each other."""
+    """Yield the first or last sample if the next ones predict it far worse than they do each other."""
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
@@ -122,7 +125,7 @@ def _at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[i
 def _isolated(
     time: FloatArray, values: FloatArray, event: _Event, quantization: Quantization
 ) -> list[tuple[int, float]]:
-    """Return outliers: samples off the polynomial through all others near them, with their distances."""
+    """Return the outliers of an event, which are off the polynomial through all others near, with errors."""
     if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
@@ -141,18 +144,18 @@ def _isolated(
         if np.all(np.abs(residual) >= sure, where=~kept):
             samples = first + np.flatnonzero(~kept)
             found = list(zip(samples.tolist(), np.abs(residual[~kept]).tolist(), strict=True))
-    unconfirmed = {0, len(values) - 1}  # nothing lies beyond the ends
+    unconfirmed = {0, len(values) - 1}  # the ends have neighbors on one side only
     return [] if unconfirmed & dict(found).keys() else found
 
 
 def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Values minus the polynomial through those kept, and the leverage of each: its variance per noise."""
+    """Return values minus the polynomial fitted to those kept, and leverages: variance per noise variance."""
     inverse = np.linalg.pinv(powers[kept])
     return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
 
 
 def held(values: FloatArray, quantization: Quantization) -> int:
-    """Return the number of rows that repeat each value; 1 if it is not always the same."""
+    """Return the number of rows in which each value is repeated; 1 if that varies."""
     changes = np.flatnonzero(values[1:] != values[:-1])
     rows = np.diff(changes)
     if len(rows) < HELD_CHANGES:
@@ -164,7 +167,7 @@ def held(values: FloatArray, quantization: Quantization) -> int:
 
 
 def frozen(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
-    """Stretches of equal samples in a motion that goes on meanwhile, as a jump or an abrupt stop shows."""
+    """Return stretches of equal samples while the motion goes on, as a jump or an abrupt stop shows."""
     first, last = _equal_runs(values, FROZEN_STEPS)
     ends = (first == 0) | (last == len(values) - 1)
     inner = (first >= SPEED_SAMPLES) & (last + 1 + SPEED_SAMPLES < len(values))
@@ -178,7 +181,7 @@ def frozen(time: FloatArray, values: FloatArray, quantization: Quantization) -> 
 def _catches_up(
     time: FloatArray, values: FloatArray, quantization: Quantization, first: IndexArray, last: IndexArray
 ) -> BoolArray:
-    """Return whether after each run the signal jumps to where the speeds before and after it lead."""
+    """Return whether the jump after each run fits the speeds before and after it."""
     after = last + 1
     before_speed = _speed(time, values, first - SPEED_SAMPLES, first)
     after_speed = _speed(time, values, after, after + SPEED_SAMPLES)
@@ -197,7 +200,7 @@ def _speed(time: FloatArray, values: FloatArray, start: IndexArray, stop: IndexA
 
 
 def _stops_abruptly(values: FloatArray, quantization: Quantization, first: int, last: int) -> bool:
-    """Return whether a run at an end of the record begins, or ends, at full speed."""
+    """Return whether a run at an end of the recording begins, or ends, at full speed."""
     reach = SPEED_SAMPLES + 1
     near = values[max(0, first - reach) : first + 1] if first else values[last : last + reach + 1][::-1]
     steps = np.diff(near)
@@ -209,7 +212,7 @@ def _stops_abruptly(values: FloatArray, quantization: Quantization, first: int, 
 
 
 def saturated(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
-    """Stretches at the largest or smallest value that are cut out of a motion which goes on beyond it."""
+    """Return stretches at the largest or smallest value where a motion beyond it is cut off."""
     first, last = _equal_runs(values, SATURATED_STEPS)
     extreme = (values[first] == values.max()) | (values[first] == values.min())
     inner = extreme & (first >= 3) & (last + 3 < len(values))
@@ -221,10 +224,10 @@ def saturated(time: FloatArray, values: FloatArray, quantization: Quantization) 
 
 
 def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray:
-    """Return how much farther a motion would go that slows down towards an edge, seen from it.
+    """Return the distance by which a motion that slows down towards an edge would exceed it.
 
-    Steps s1 (cut short), s2, s3 away from the edge; slowing down by c = s3 - s2 a step, it would go on by
-    s2^2 / (2 c) - s2/2 beyond the sample before the edge.
+    Its steps, away from the edge, are s1 (cut short), s2, s3. Slowing down by c = s3 - s2 per step, it would
+    continue by s2^2 / (2 c) - s2/2 beyond the sample before the edge.
     """
     at = [values[edge + outward * step] for step in range(4)]
     sign = np.sign(at[0] - at[1])
@@ -236,7 +239,7 @@ def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray
 
 
 def wraps(values: FloatArray) -> Faults | None:
-    """Jumps by about 2 pi amid small steps."""
+    """Return jumps by about 2 pi amid small steps."""
     steps = np.abs(np.diff(values))
     near = np.abs(steps - 2 * np.pi) < WRAP_TOLERANCE
     around = np.pad(steps, 1)
@@ -246,12 +249,12 @@ def wraps(values: FloatArray) -> Faults | None:
 
 
 def _noticeable(quantization: Quantization, samples: IndexArray) -> FloatArray:
-    """Return the smallest change above noise and steps of the numbers near samples."""
+    """Return the smallest changes that exceed noise and quantization near samples."""
     return np.maximum(NOISE_DEVIATIONS * quantization.noise_at(samples), QUANTA * quantization.quantum)
 
 
 def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:
-    """First and last sample of each run of equal values with at least this many steps."""
+    """Return first and last sample of each run of equal values with at least `least` steps."""
     same = np.concatenate(([False], values[1:] == values[:-1], [False]))
     edges = np.flatnonzero(same[1:] != same[:-1])
     first, last = edges[::2], edges[1::2]

@@ -1,6 +1,6 @@
-"""The health of a recording, judged before anything is fitted to it: faults of sensors and log files.
+"""The health of a recording, checked before it is fitted: faults of sensors and log files.
 
-A warning sums up a column: how often, when first, how badly at most, and advice.
+A warning summarizes a kind of fault in a column: number, first time, largest size, and advice.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
 def health(
     stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()
 ) -> Iterator[SampleProblem]:
-    """Yield findings of a usable recording that are hardly meant.
+    """Yield probable faults of a usable recording.
 
     Args:
-        stamps: (samples,) in s, as recorded.
-        records: the signals that are used, without problems.
-        types: of the joints, "revolute" or "prismatic", for units; empty if they are not known.
+        stamps: recorded stamps, (samples,), s.
+        records: signals that are used, without problems.
+        types: joint types, "revolute" or "prismatic", for units; empty if unknown.
     """
     if len(stamps) <= ORDER:
         return
@@ -42,11 +42,11 @@ def health(
 
 
 def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
-    """Positions too large for rad or m.
+    """Yield positions that are too large for rad or m.
 
     Args:
-        records: the signals that are used.
-        types: of the joints in question, "revolute" or "prismatic", by index: those without a unit.
+        records: signals that are used.
+        types: types, "revolute" or "prismatic", of joints without a unit in the header, by index.
     """
     for record in records:
         for index, kind in types.items() if record.signal is POSITION else ():
@@ -61,14 +61,14 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
 def column_faults(
     stamps: FloatArray, time: FloatArray, values: FloatArray, unit: str = "", *, angle: bool = False
 ) -> Iterator[tuple[int, str]]:
-    """Yield for each kind of fault of a column, (samples,), the first sample and a sentence without subject.
+    """Yield the first sample of each kind of fault of a column, and a sentence without its subject.
 
     Args:
-        stamps: as recorded, s.
-        time: from the first sample on, s.
-        values: the column, more than four samples.
-        unit: of its values, with a blank before it.
-        angle: whether it may be an angle that was wrapped.
+        stamps: recorded stamps, (samples,), s.
+        time: times from the first sample on, (samples,), s.
+        values: column, (samples,), more than four samples.
+        unit: unit of its values, after a space.
+        angle: whether the values may be wrapped angles.
     """
     if np.ptp(values) == 0:
         return
@@ -108,7 +108,7 @@ def column_faults(
 
 
 def _unit(quantity: Quantity, component: int, types: Sequence[str]) -> str:
-    """Return the unit with a space before it; "" where it is not known."""
+    """Return the unit after a space; "" if unknown."""
     if isinstance(quantity, WrenchQuantity):
         return f" {quantity.of_axis(component)}"
     return f" {quantity.unit(types[component])}" if types else ""
@@ -119,7 +119,7 @@ def _write(unit: str) -> str:
 
 
 def _occasions(faults: Faults, stamps: FloatArray) -> str:
-    """Return when, or how often and when first."""
+    """Return a phrase with the time of a fault, or the number of faults and the first time."""
     when = f"at t = {time_text(float(stamps[faults.first[0]]))}"
     return when if faults.count == 1 else f"{faults.count} times, first {when}"
 
@@ -129,7 +129,7 @@ def _lasting(faults: Faults, stamps: FloatArray) -> str:
 
 
 def _extent(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
-    """Return the size of the only one, or of the worst with its time."""
+    """Return the size of a single fault, or of the worst with its time."""
     size = sizes[faults.worst]
     when = time_text(float(stamps[faults.first[faults.worst]]))
     return size if faults.count == 1 else f"up to {size} (at t = {when})"

@@ -1,10 +1,10 @@
-"""The function through samples of which all derivatives are given, and whether these belong together.
+"""Hermite interpolation of samples with all derivatives given, and a check whether these are consistent.
 
-Between two samples the third derivative from the top is the polynomial of degree 5 with its values and two
-derivatives at both; what is below is its integral from the earlier sample on. To determine a position by all
-five numbers at both ends would multiply the rounding of stored values by 2500/h^4 in the fourth derivative,
-which is as large as that of a slow motion at 1 kHz; this way the factor is 60/h^2 of the second derivative,
-and the integrals miss the next sample by h^7.
+Between two samples the third highest function is the polynomial of degree 5 with the given values and two
+derivatives at both; lower functions are its integrals from the earlier sample on. Interpolating a position
+with all five numbers at both ends would multiply the rounding of stored values by 2500/h^4 in the fourth
+derivative, which is as large as that of a slow motion at 1 kHz. Here the factor is 60/h^2 of the second
+derivative, and the integrals miss the next sample by h^7.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import Signal
 
 MATCHED = 3
-"""Highest derivatives, with the function they are of, that are met at both ends of a piece."""
+"""Number of highest functions that are matched at both ends of a piece."""
 
 FROM_ENDS = np.array([[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]])
 """Value, slope and second derivative at x = 1 of x^3, x^4, x^5."""
 
 AGREEING = 0.05
 """Largest difference of the highest derivative within a piece from the line between its ends, relative to its
-peak; and of a lower one at the end of a piece, relative to its largest change over one. Smooth motions of
-0.25 s leave 1e-3 at 500 Hz and 0.03 at 100 Hz; second derivatives of six digits at 1 kHz leave 0.2."""
+peak; and of a lower function at the end of a piece, relative to its largest change over a piece. Smooth
+motions of 0.25 s have 1e-3 at 500 Hz and 0.03 at 100 Hz; second derivatives of six digits 0.2 at 1 kHz."""
 
 LOOKED_AT = 0.25
-"""Share of a piece at which that is looked for: there a wrong change of the function from end to end shows
-most, while half-way it does not show at all."""
+"""Place in a piece, as a share, at which the highest derivative is compared: there a wrong change of the
+function from end to end has the largest effect, while half-way it has none."""
 
 TOGETHER = 2**14
-"""Pieces that are looked at together."""
+"""Number of pieces that are checked together."""
 
 ROUNDINGS = 16
-"""Units in the last place that may be rounding of given values."""
+"""Allowed rounding of given values, in units in the last place."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HermiteSpline:
-    """A profile through samples with all their derivatives, which belong together.
+    """A profile through samples with all their derivatives, which are consistent.
 
     Attributes:
-        signal: the described signal.
-        time: of the samples, ascending from zero, (samples,) in s.
+        signal: described signal.
+        time: times of the samples, ascending from zero, (samples,), s.
         rows: value and all derivatives, (orders, components, samples).
     """
 
@@ -61,24 +61,24 @@ class HermiteSpline:
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
         return int(self.rows.shape[1])
 
     @property
     def breakpoints(self) -> FloatArray:
-        """The times of the samples."""
+        """Times of the samples."""
         return self.time
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         return interpolated(self.time, self.rows, time)
 
     def samples(self, start: int, stop: int, _time: FloatArray, /) -> FloatArray:
-        """Return the same at the samples start..stop-1, as given."""
+        """Return the given values at samples start..stop-1."""
         return self.rows[:, :, start:stop]
 
     def stretched(self, factor: float) -> HermiteSpline:
-        """Return the same profile, slower by a factor."""
+        """Return the profile slowed down by a factor."""
         scale = factor ** np.arange(len(self.rows))[:, None, None]
         return replace(self, time=factor * self.time, rows=self.rows / scale)
 
@@ -87,9 +87,9 @@ def interpolated(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArr
     """Return value and derivatives at any times, (orders, components, times).
 
     Args:
-        time: of the samples, ascending, (samples,) in s.
+        time: times of the samples, ascending, (samples,), s.
         rows: value and all derivatives at the samples, (orders, components, samples).
-        at: times of the span, (times,) in s.
+        at: times of the span, (times,), s.
     """
     piece = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     width = time[piece + 1] - time[piece]
@@ -99,13 +99,13 @@ def interpolated(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArr
 
 
 def belong_together(time: FloatArray, rows: FloatArray) -> bool:
-    """Return whether samples with all their derivatives are those of one smooth function.
+    """Return whether samples and all their derivatives are consistent, i.e. of one smooth function.
 
-    Derivatives that were measured, or rounded to a few digits, are not: the polynomials between them swing.
+    Derivatives that were measured, or rounded to few digits, are not: polynomials between them oscillate.
 
     Args:
-        time: as of `interpolated`.
-        rows: as above; components that are NaN throughout do not count.
+        time: see `interpolated`.
+        rows: see `interpolated`; components that are all NaN are ignored.
     """
     given = rows[:, ~np.isnan(rows[0]).all(axis=1)]
     peaks = np.abs(given).max(axis=2)
@@ -113,12 +113,12 @@ def belong_together(time: FloatArray, rows: FloatArray) -> bool:
     lower = AGREEING * changes + ROUNDINGS * np.spacing(peaks[:-MATCHED])
     allowed = np.concatenate([lower, AGREEING * peaks[-1:]])
     parts = (slice(first, first + TOGETHER + 1) for first in range(0, len(time) - 1, TOGETHER))
-    with np.errstate(all="ignore"):  # what overflows does not belong together
+    with np.errstate(all="ignore"):  # NaN after overflow counts as inconsistent
         return all(np.all(_missed(time[part], given[:, :, part]) <= allowed) for part in parts)
 
 
 def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return by how much integrals miss the next samples, and the highest derivative strays between them."""
+    """Return errors of integrals at the next samples, and of the highest derivative between samples."""
     width = np.diff(time)
     coefficients = _coefficients(rows[:, :, :-1], rows[:, :, 1:], width)
     one, highest = np.ones_like(width), rows[-1]
@@ -133,23 +133,23 @@ def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:
 
 
 def _coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> FloatArray:
-    """Return coefficients of powers of the share of a piece, (powers, components, pieces), from its ends."""
+    """Return coefficients of powers of the place in a piece, (powers, components, pieces), from its ends."""
     orders = len(left)
     scaled = left * width ** np.arange(orders)[:, None, None]
     lowest = orders - MATCHED
-    # the expansion about the left end misses the right one by this, which three more powers make up for
+    # Errors of the expansion about the left end at the right one, which three more powers remove.
     value, slope, bend = scaled[lowest:]
     end = right[lowest:] * width ** np.arange(lowest, orders)[:, None, None]
     missed = np.stack([end[0] - value - slope - bend / 2, end[1] - slope - bend, end[2] - bend])
     higher = np.tensordot(np.linalg.inv(FROM_ENDS), missed, axes=1)
     powers = [row / math.factorial(order) for order, row in enumerate(scaled)]
-    # integrated as often as there are lower rows
+    # These powers are integrated once for each lower row.
     powers += [row / math.perm(power + lowest, lowest) for power, row in enumerate(higher, MATCHED)]
     return np.stack(powers)
 
 
 def _derivative(coefficients: FloatArray, order: int, share: FloatArray) -> FloatArray:
-    """Return a derivative of polynomials with coefficients (powers, components, times), by Horner's rule."""
+    """Return a derivative of polynomials with coefficients, (powers, components, times), by Horner's rule."""
     total: FloatArray = np.zeros_like(coefficients[0])
     for power in range(len(coefficients) - 1, order - 1, -1):
         total = total * share + math.perm(power, order) * coefficients[power]

@@ -1,4 +1,4 @@
-"""Problems that keep recorded samples from being used."""
+"""Problems that prevent the use of recorded samples."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.recorded.samples import Samples
 
 LARGEST_VALUE = 1e100
-"""Values beyond are no motion of a robot, and their squares, which a fit takes, would overflow."""
+"""Largest value; larger ones are no motion of a robot, and their squares, which fits need, may overflow."""
 
 
 @dataclass(frozen=True)
 class SampleProblem:
-    """Something wrong with recorded samples: first at the index `sample` (None: concerns all)."""
+    """A problem of recorded samples, at first at the index `sample`; None if it concerns all."""
 
     quantity: str
     message: str
@@ -31,7 +31,7 @@ class SampleProblem:
 
 
 def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
-    """Yield the problem, if any, of times, (samples,) in s, that no trajectory can have."""
+    """Yield the first problem of times, (samples,), s, if any."""
     finite, rising = np.isfinite(time), time[1:] > time[:-1]
     if not finite.all():
         sample = int(np.argmin(finite))
@@ -47,7 +47,7 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
 
 
 def value_problems(samples: Samples) -> Iterator[SampleProblem]:
-    """Yield the problems of values: too few, not finite, or not positive where they must be."""
+    """Yield the problems of values: too few, not finite, too large, or not positive where required."""
     signal, degree = samples.signal, samples.signal.spline_degree
     name, count = signal.names[0], len(samples.time)
     if count <= degree:
@@ -68,7 +68,7 @@ def value_problems(samples: Samples) -> Iterator[SampleProblem]:
 def _breach(
     quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
 ) -> Iterator[SampleProblem]:
-    """Yield the first sample at which a requirement does not hold, and how many there are."""
+    """Yield a problem with the first sample that violates a requirement, and the number of such samples."""
     if holds.all():
         return
     first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))

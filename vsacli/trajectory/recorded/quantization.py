@@ -1,4 +1,4 @@
-"""Resolution of a column of samples: the steps of its numbers, and the noise near each sample."""
+"""The resolution of a column of samples: quantum of its numbers, and noise near each sample."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from vsacli.trajectory.recorded.thresholds import BLOCK
 
 ORDER = 4
 NORMAL_MEDIAN = 0.6745
-"""Median of |x| of a normal distribution of deviation 1."""
+"""Median of |x| for a standard normal distribution."""
 
 ROUNDING = 8 * np.finfo(float).eps
-"""Share of the largest value below which changes are rounding of equal ones."""
+"""Share of the largest value below which changes count as rounding of equal values."""
 
 FINEST = 0.01
-"""Quantile of the changes of steps that stands for the step of an encoder; smaller ones may be accidents."""
+"""Quantile of second differences that counts as the step of an encoder; smaller ones may be accidental."""
 
 UNRESOLVED = 1e-8
-"""Share of the largest value that no sensor resolves, and no single-precision number; columns that were
-computed, such as suggested profiles, have errors of solvers of a fifth of it."""
+"""Share of the largest value that neither sensors nor single-precision numbers resolve. Computed columns,
+such as profiles of fixes, have solver errors of a fifth of it."""
 
 CHUNK = 1024 * BLOCK
-"""Samples whose differences are weighted at a time."""
+"""Number of samples whose differences are computed at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quantization:
-    """The meaningless changes of a column.
+    """Quantization and noise of a column.
 
     Attributes:
-        differences: (samples - 4,) divided differences of fourth order, scaled so that noise passes with its
-            own deviation; the motion, if sampled fast enough, hardly at all.
+        differences: divided differences of fourth order, (samples - 4,), scaled so that noise keeps its
+            standard deviation; a motion that is sampled fast enough contributes little.
         quantum: step of the numbers, of an encoder or of printed digits.
-        noise: (blocks,) standard deviation near each `BLOCK` of differences: by medians, which no outlier
-            changes, the largest of three blocks, as noise may begin with a motion.
+        noise: standard deviation near each `BLOCK` of differences, (blocks,), by medians, which outliers do
+            not change; the largest of three blocks, since noise may begin with a motion.
     """
 
     differences: FloatArray
@@ -54,13 +54,13 @@ class Quantization:
         return cls(differences, _quantum(values), noise)
 
     def noise_at(self, samples: IndexArray) -> FloatArray:
-        """Standard deviation of the noise near samples."""
+        """Return the standard deviation of the noise near samples."""
         blocks = np.maximum(samples - ORDER // 2, 0) // BLOCK
         return np.asarray(self.noise[np.minimum(blocks, len(self.noise) - 1)])
 
 
 def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Chunk by chunk, since the weights are as many as five columns."""
+    """Return divided differences; computed in chunks, since the weights need the memory of five columns."""
     count = len(values) - ORDER
     found = np.empty(count)
     for start in range(0, count, CHUNK):
@@ -79,7 +79,7 @@ def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _quantum(values: FloatArray) -> float:
-    """Small changes from sample to sample above rounding and the resolution of sensors."""
+    """Return the smallest typical change between samples above rounding and the resolution of sensors."""
     largest = float(np.abs(values).max())
     changes = np.abs(np.diff(values, n=2))
     changes = changes[changes > ROUNDING * largest]

@@ -1,4 +1,4 @@
-"""Recorded trajectories: the columns of a CSV table as position and stiffness of joints, and wrench."""
+"""Recorded trajectories: columns of a CSV table as position and commanded signals of joints, and wrench."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
 
 NEEDED = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
-"""The signals of joints that a table must have if it is all there is."""
+"""Signals of joints that a table must have if it is the whole trajectory."""
 
 MOST_NAMED = 5
-"""Columns that are ignored, up to which all are named."""
+"""Most ignored columns that are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +42,13 @@ class Recording:
     """The content of a CSV file.
 
     Attributes:
-        times: the column `time`.
-        profiles: one for each signal that was asked for, in that order.
-        warnings: faults by a sensor or a log file.
-        notes: unused parts of the file, and samples taken out.
-        source: the file.
-        lines: those of its rows.
-        first_stamp: subtracted from its times, see `Table`.
+        times: times of the column `time`.
+        profiles: profile of each requested signal, in that order.
+        warnings: faults of sensors or log files.
+        notes: unused parts of the file, and jumps removed.
+        source: file that was read.
+        lines: lines of its rows.
+        first_stamp: stamp that was subtracted from its times, see `Table`.
         rated: whether its times follow from a rate, see `Table`.
     """
 
@@ -65,11 +65,11 @@ class Recording:
         """Return the times of a recorded trajectory: those of the samples, or equally spaced ones.
 
         Args:
-            rate: samples per second; None if the recorded times are meant.
-            file: where that is said.
+            rate: sample rate, 1/s; None for the recorded times.
+            file: path of the file with the rate, for messages.
 
         Raises:
-            InputError: there are too many or too few at this rate.
+            InputError: there would be too many or too few samples.
         """
         if rate is None or self.rated:
             return self.times
@@ -79,10 +79,10 @@ class Recording:
             raise InputError.one(f"rate: {error}", file) from None
 
     def check_times(self, other: Recording) -> None:
-        """Refuse another recording that is to be combined with this one if its times differ.
+        """Raise an error if another recording, to be combined with this one, has other times.
 
         Raises:
-            InputError: naming the first row of `other` whose time is not the one here.
+            InputError: times differ; names the first such row of `other`.
         """
         here, there = self.times.time, other.times.time
         common = min(len(here), len(there))
@@ -112,17 +112,17 @@ def read_recording(
     """Read signals from a CSV file.
 
     Args:
-        path: a file with the columns `time` and those of `column_layout`.
-        joints: those that are commanded.
-        wanted: the signals to read, each with the choice of its spline; all of joints if None, those of
-            devices if they are there, each fitted as its noise asks for.
+        path: path of a file with the columns `time` and those of `column_layout`.
+        joints: commanded joints.
+        wanted: signals to read, each with the choice of its spline. None for all signals of joints, and those
+            of devices that are in the file, with splines chosen by their noise.
         mapping: assignment of columns with other names.
-        resampled: whether the steps will be other times than the recorded ones.
-        unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
-        progress: opens a bar over the samples that splines are fitted to.
+        resampled: whether samples will be at other times than the recorded ones.
+        unwrap: whether to remove jumps by 2 pi from the positions of revolute joints.
+        progress: function that opens a progress bar over the samples to fit.
 
     Raises:
-        InputError: with file and line of everything that does not fit.
+        InputError: the file has problems; lists each with its line.
     """
     table = read_table(path, mapping, known_columns(joints), empty_cells=bool(mapping)).without_empty_rows()
     file = table.source.path
@@ -148,7 +148,7 @@ def read_recording(
     clauses = (*turns, *_understood(table), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
     source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated
-    del table  # as large as the records, which may be fitted now
+    del table  # frees as much memory as the samples need, before they are fitted
     profiles = tuple(
         SampledProfile.of(each, wanted[each.signal], resampled=resampled and not rated, progress=progress)
         for each in records
@@ -158,7 +158,7 @@ def read_recording(
 
 
 def _check_filled(table: Table) -> None:
-    """Refuse empty cells beside others that are not: all signals are taken from the same rows."""
+    """Raise an error for empty cells in rows with numbers, since all signals use the same rows."""
     empty = np.isnan(table.values)
     if empty.any():
         row, column = (int(place[0]) for place in np.nonzero(empty))
@@ -171,7 +171,6 @@ def _check_filled(table: Table) -> None:
 
 
 def _understood(table: Table) -> Iterator[str]:
-    """Yield the parts of the file that were left out, and shifts of its times."""
     if table.first_stamp is not None:
         yield f"times count from its first stamp, {table.first_stamp}"
     if table.kept is not None:
@@ -204,7 +203,7 @@ def _samples(
 
 
 def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[str]:
-    """Take jumps by 2 pi out of the positions of revolute joints, and say of how many."""
+    """Remove jumps by 2 pi from the positions of revolute joints; yield clauses on their number."""
     for record in records:
         for index, (joint, kind) in enumerate(joints.types.items() if record.signal is POSITION else ()):
             row = record.values[index]
@@ -226,7 +225,7 @@ def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -
 
 
 def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
-    """(components, samples), NaN where a component has no column."""
+    """Return columns in SI units, (components, samples); NaN for components without a column."""
     rows = np.full((components, len(table.values)), np.nan)
     for component, column in columns.items():
         rows[component] = _si(table, column)
@@ -234,12 +233,12 @@ def _rows(table: Table, columns: Mapping[int, Column], components: int) -> Float
 
 
 def _si(table: Table, column: Column) -> FloatArray:
-    """Return a column in SI; divided rather than multiplied where that is exact, so that 3 ms are 0.003 s."""
+    """Return a column in SI units; by division if that is exact, so that 3 ms are 0.003 s."""
     values = np.ascontiguousarray(table.values[:, column.index])
     divisor = round(1 / column.factor)
     if divisor > 1 and math.isclose(divisor * column.factor, 1, rel_tol=1e-14):
         return values / divisor
-    with np.errstate(over="ignore"):  # infinite is a problem of its own
+    with np.errstate(over="ignore"):  # infinite values are reported as problems
         return values * column.factor
 
 
@@ -257,16 +256,16 @@ def recorded_trajectory(
     progress: Progress = unseen,
     rate: float | None = None,
 ) -> Trajectory:
-    """Return a trajectory whose position and commanded signals come from one CSV file, named after the file.
+    """Return a trajectory with position and commanded signals from one CSV file, named after the file.
 
     Args:
-        path: the file.
-        joints: as of `read_recording`.
-        progress: as above.
-        rate: samples per second: of the file if it has no times, else of the trajectory.
+        path: path of the file.
+        joints: see `read_recording`.
+        progress: see `read_recording`.
+        rate: sample rate, 1/s, of the file if it has no times, else of the trajectory.
 
     Raises:
-        InputError: as `read_recording`, or of the rate.
+        InputError: see `read_recording`; or the rate is not possible.
     """
     mapping, resampled = ColumnMapping(rate=rate), rate is not None
     recording = read_recording(path, joints, mapping=mapping, resampled=resampled, progress=progress)

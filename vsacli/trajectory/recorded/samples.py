@@ -1,4 +1,4 @@
-"""Recorded samples of a signal, and the profile they make: given columns, and a fit for the others."""
+"""Recorded samples of a signal, and their profile: given columns, and a fit for missing derivatives."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from vsacli.trajectory.times import stretch
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """A signal at recorded times; `time_problems` and `value_problems` give reasons against its use.
+    """A signal at recorded times; `time_problems` and `value_problems` check whether it can be used.
 
     Attributes:
-        signal: the described signal.
-        time: (samples,) in s, from the first sample on: stamps since 1970 are too coarse for splines.
-        values: (components, samples); NaN throughout if the signal is optional and a component has none.
-        derivatives: for each derivative of the signal the given values, (components, samples), or None.
+        signal: described signal.
+        time: times from the first sample on, (samples,), s: stamps since 1970 are too coarse for splines.
+        values: values, (components, samples); all NaN for a component without an optional signal.
+        derivatives: given values of each derivative, (components, samples); None if not given.
         labels: names of the components in sentences.
         start: stamp of the first sample, s.
     """
@@ -49,7 +49,7 @@ class Samples:
         derivatives: tuple[FloatArray | None, ...],
         labels: tuple[str, ...],
     ) -> Samples:
-        """Samples by their stamps, (samples,) in s, from whatever instant these count."""
+        """Return samples from stamps, (samples,), s, counted from any instant."""
         start = float(stamps[0]) if len(stamps) else 0.0
         return cls(
             signal=signal,
@@ -62,7 +62,7 @@ class Samples:
 
     @property
     def given(self) -> BoolArray:
-        """Components with values, (components,)."""
+        """Mask of components with values, (components,)."""
         absent: BoolArray = np.all(np.isnan(self.values), axis=1)
         return ~absent if self.signal.optional else np.ones_like(absent)
 
@@ -73,23 +73,23 @@ class Samples:
 
     @cached_property
     def rows(self) -> FloatArray:
-        """Value and all derivatives, (orders, components, samples), where all are given."""
+        """Value and all derivatives, (orders, components, samples), if all are given."""
         return np.stack([self.values, *(given for given in self.derivatives if given is not None)])
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """The derivatives that are not given."""
+        """Names of the derivatives that are not given."""
         pairs = zip(self.signal.names[1:], self.derivatives, strict=True)
         return tuple(name for name, given in pairs if given is None)
 
     @property
     def columns(self) -> dict[str, FloatArray]:
-        """Values and given derivatives by their names, (components, samples)."""
+        """Values and given derivatives by name, (components, samples)."""
         pairs = zip(self.signal.names, (self.values, *self.derivatives), strict=True)
         return {name: rows for name, rows in pairs if rows is not None}
 
     def warnings(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
-        """Yield which numbers at the samples are estimates, and which given derivatives disagree."""
+        """Yield sentences on estimated values at the samples, and on given derivatives that disagree."""
         value, *names = self.signal.names
         yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
         if not resampled:
@@ -98,7 +98,7 @@ class Samples:
             )
 
     def stretched(self, factor: float) -> Samples:
-        """Return the same values further apart; given derivatives become smaller."""
+        """Return the samples further apart by a factor, with given derivatives scaled accordingly."""
         derivatives = tuple(
             None if given is None else given / factor**order
             for order, given in enumerate(self.derivatives, start=1)
@@ -108,18 +108,18 @@ class Samples:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SampledProfile:
-    """A signal known at recorded times.
+    """The profile of a recorded signal.
 
-    At these times its derivatives are the given ones, and those of a fit where none are given; its values are
-    the samples where all derivatives are given or the fit goes through the samples, else those of the fit.
-    Between them it is the function that samples with all derivatives determine, if they do, else the fit.
+    At recorded times its derivatives are the given ones, or else those of a fit. Its values are the samples
+    if all derivatives are given, or if the fit goes through the samples, else those of the fit. Between
+    recorded times it is the Hermite spline if all derivatives are given and consistent, else the fit.
 
     Attributes:
-        record: the recording.
-        fit: of the values.
-        choice: of the fit.
-        resampled: whether the steps are not the recorded times; only the fit counts then.
-        warnings: which numbers are estimates, and given derivatives that do not follow from the values.
+        record: recorded samples.
+        fit: fit of the values.
+        choice: choice of the fit by the user.
+        resampled: whether samples are at other times than the recorded ones; only the fit is used then.
+        warnings: sentences on estimated values, and on given derivatives that do not follow from the values.
     """
 
     record: Samples
@@ -140,15 +140,15 @@ class SampledProfile:
         """Fit samples that have no problems.
 
         Args:
-            record: the samples.
-            choice: of the fit; see `fit_samples`.
-            resampled: whether the steps are not the recorded times.
-            progress: opens a bar over the samples of all components.
+            record: recorded samples.
+            choice: choice of the fit; see `fit_samples`.
+            resampled: whether samples are at other times than the recorded ones.
+            progress: function that opens a progress bar over the samples of all components.
         """
         signal = record.signal
         with np.errstate(
             over="ignore", invalid="ignore"
-        ):  # a range of 1e100 in 1e-30 s is judged by the robot
+        ):  # extreme values, e.g. 1e100 in 1e-30 s, may overflow
             fit = fit_samples(
                 record.time,
                 record.values,
@@ -169,12 +169,12 @@ class SampledProfile:
 
     @property
     def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
+        """Number of components: one per joint, or six of a wrench."""
         return len(self.record.values)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on noise that is no motion, and on given derivatives without use."""
+        """Notes on the interpretation of noise, and on given derivatives that are not used."""
         record = self.record
         of_fit = tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
         given = [name for name in record.signal.names[1:] if name not in record.missing]
@@ -185,16 +185,16 @@ class SampledProfile:
 
     @property
     def fitted(self) -> bool:
-        """Whether any number at the steps comes from the fit."""
+        """Whether any value at the samples comes from the fit."""
         return self.resampled or not self.record.complete
 
     @property
     def estimate(self) -> SampledProfile | None:
-        """The profile itself if any number at the steps comes from the fit, else None."""
+        """This profile if any value at the samples comes from the fit, else None."""
         return self if self.fitted else None
 
     def summary(self) -> dict[str, Any]:
-        """Return the fit in JSON values, for the report: see `describe`."""
+        """Return the properties of the fit as JSON values; see `describe`."""
         return describe(self.record.signal.names[0], self.record.labels, self.fit)
 
     @property
@@ -206,18 +206,18 @@ class SampledProfile:
 
     @property
     def known_between(self) -> bool:
-        """Whether `at` continues the samples: all derivatives come from the fit, or from one function."""
+        """Whether `at` agrees with the samples: all derivatives come from the fit, or are consistent."""
         nothing_given = all(given is None for given in self.record.derivatives)
         return self.resampled or nothing_given or self._through_all
 
     @cached_property
     def _through_all(self) -> bool:
-        """Whether given derivatives determine the values between the samples."""
+        """Whether all derivatives are given and consistent, so that they determine values between samples."""
         record = self.record
         return not self.resampled and record.complete and hermite.belong_together(record.time, record.rows)
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """Return value and derivatives at the samples start..stop-1: as given, and for the rest the fit."""
+        """Return value and derivatives at samples start..stop-1: given ones, and the fit for others."""
         record = self.record
         if self.resampled:
             return self.at(time)
@@ -234,22 +234,22 @@ class SampledProfile:
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         if self._through_all:
             return hermite.interpolated(self.record.time, self.record.rows, time)
         return self.fit.at(time, self.record.signal.orders)
 
     @property
     def estimated(self) -> tuple[str, ...]:
-        """Names of value and derivatives that come, at the steps, from the fit."""
+        """Names of value and derivatives that come from the fit at the samples."""
         value, *derivatives = self.signal.names
         return value, *(derivatives if self.resampled else self.record.missing)
 
     def covariance(self, time: FloatArray) -> FloatArray:
         """Return covariances of value and derivatives at times, (components, orders, orders, samples).
 
-        Zero for given derivatives; NaN for components of which nothing can be said, as where the spline
-        follows a vibration that may be noise. Of those that are not `stated` it is no more than a bound.
+        It is zero for given derivatives, and NaN for components of unknown uncertainty, e.g. if the spline
+        follows a vibration that may be noise. For components that are not `stated` it is only a bound.
         """
         found = self.fit.covariance(time)
         for each in self._unresolved:
@@ -263,7 +263,7 @@ class SampledProfile:
 
     @cached_property
     def stated(self) -> BoolArray:
-        """Components with a standard deviation that may be stated, (components,)."""
+        """Mask of components with a reliable standard deviation, (components,)."""
         stated = np.ones(self.components, dtype=bool)
         for part in self.fit.parts:
             known = part.smoothing
@@ -275,7 +275,7 @@ class SampledProfile:
         return list(unresolved(self.fit, self.signal.orders))
 
     def stretched(self, factor: float) -> SampledProfile:
-        """Return the same profile, slower by a factor; the warnings are those about the record."""
+        """Return the profile slowed down by a factor; its warnings still refer to the recording."""
         return replace(
             self,
             record=self.record.stretched(factor),

@@ -1,4 +1,4 @@
-"""Faults of the stamps of a recording: gaps, jitter, another unit than seconds."""
+"""Faults of the stamps of a recording: gaps, jitter, a unit other than seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.trajectory.recorded.thresholds import (
 
 
 def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
-    """Yield the faults of stamps, (samples,) in s and ascending, as sentences."""
+    """Yield the faults of ascending stamps, (samples,), s."""
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= usual <= LONGEST_STEP:
@@ -51,7 +51,7 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
 
 
 def step_text(step: float) -> str:
-    """Return a short time in its unit."""
+    """Return the text of a short time with a suitable unit."""
     size, unit = (step, "s") if step >= 1 else (1e3 * step, "ms") if step >= 9.9e-4 else (1e6 * step, "us")
     return f"{size:.3g} {unit}"
 
@@ -66,7 +66,7 @@ def _of_another_unit(usual: float, duration: float) -> str:
 
 
 def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:
-    """Median change from step to step, in steps, beyond what digits that were cut off explain."""
+    """Return the median change of successive intervals, in intervals, beyond that due to their resolution."""
     if len(steps) < 2:
         return 0.0
     change = float(np.median(np.abs(np.diff(steps))))
