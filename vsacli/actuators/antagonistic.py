@@ -18,7 +18,7 @@ from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs.joints import beta, determinant, solve  # here `solve` applies A^-1
+from vsacli.actuators.pairs.joints import beta, determinant, solve_decoupling
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
 from vsacli.actuators.spring_elements import SpringElement
@@ -163,10 +163,10 @@ class Antagonistic(Actuator):
         )
         det_a = determinant(one, two)  # (67)
         divisor = np.where(reached.singular, np.nan, det_a)
-        dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
+        dphi = solve_decoupling(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
         # dphi and ddtheta solve the same system A x = b, (19) and (23).
         right = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
-        ddtheta = solve(one, two, divisor, *right)  # (72)
+        ddtheta = solve_decoupling(one, two, divisor, *right)  # (72)
         return {
             "stiffness": command.commanded["stiffness"],
             "dstiffness": command.commanded["dstiffness"],
@@ -227,7 +227,7 @@ class Antagonistic(Actuator):
         return PairElasticity(pairs) if coupling is None else CoupledPairs(pairs, coupling)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """Solve (14) on the branch that the actuator's preload selects."""
+        """Solve (14) for the deflections (61) on the branch that the actuator's preload selects."""
         return self.pair.solve(tau_e, stiffness)
 
     @property
@@ -243,7 +243,7 @@ class Antagonistic(Actuator):
         """Return A^-1 (tau_e', sigma'), (19)-(20)."""
         one, two = self.pair.states(*phi)
         right = command.dtau_e, command.commanded["dstiffness"]
-        return np.stack(solve(one, two, determinant(one, two), *right))
+        return np.stack(solve_decoupling(one, two, determinant(one, two), *right))
 
     def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
         """Return det A (67)."""

@@ -97,7 +97,9 @@ class Run:
         self._internal = _internal_motions(robot, trajectory)
         inside = () if self._internal is None else self._internal.joints
         integrated = self._deflections is not None
-        self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
+        self._kernel = BalancedDynamics(
+            robot, frame, near_singular=near_singular, integrated=integrated, internal=inside
+        )
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)

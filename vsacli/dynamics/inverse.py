@@ -137,7 +137,7 @@ class InverseDynamics(RowKernel):
     def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
         """Return the variables of each joint by name, without those that it does not have."""
         links, given = self.links, self.arguments.unpack(rows)
-        demanded = links(rows[: links.inputs])  # (36)-(60); `arguments` begins with the inputs of `links`
+        demanded = links(links.arguments.pack(given))  # (36)-(60)
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
         of_all = {**given, **torques}
         names = Command.names(signal.key for signal in self.robot.signals)

@@ -149,7 +149,7 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
     p = Vector(link.a, mul(state.d, link.sin_alpha), mul(state.d, link.cos_alpha))
 
     angular = _angular_motion(rotation, turning, previous.angular)
-    v_p = _fixed_point(angular, p)
+    v_p = _point_rates(angular, p)
     slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
     frame = Frame(
         angular,
@@ -157,7 +157,7 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
         j=rotation.undo(previous.j) + v_p.third + slide.j,  # (42)
         s=rotation.undo(previous.s) + v_p.fourth + slide.s,  # (44)
     )
-    v_c = _fixed_point(angular, link.com)
+    v_c = _point_rates(angular, link.com)
     a_c, j_c, s_c = frame.a + v_c.second, frame.j + v_c.third, frame.s + v_c.fourth  # (41) (43) (45)
     return Body(
         rotation=rotation,
@@ -188,7 +188,7 @@ def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _An
     )  # fmt: skip
 
 
-def _fixed_point(angular: _Angular, r: Vector) -> _PointRates:
+def _point_rates(angular: _Angular, r: Vector) -> _PointRates:
     # Derivatives of r' = omega x r, each from those before; expanded, the terms of (41), (43), (45).
     w, g, i, s = angular
     first = cross(w, r)
@@ -200,7 +200,7 @@ def _fixed_point(angular: _Angular, r: Vector) -> _PointRates:
 
 def _slide(angular: _Angular, sliding: Sequence[Scalar], z: Vector) -> _Slide:
     d1, d2, d3, d4 = sliding
-    v_z = _fixed_point(angular, z)
+    v_z = _point_rates(angular, z)
     return _Slide(
         dp=z * d1,
         a=z * d2 + v_z.first * (2 * d1),  # of (40)
@@ -234,7 +234,7 @@ def _tip_reaction(tip: TipLoad, bodies: Sequence[Body]) -> _Reaction:
         f, df, ddf = _turning(angular, *tip.force)
         m, dm, ddm = _turning(angular, *tip.moment)
 
-    v_r = _fixed_point(angular, tip.point)
+    v_r = _point_rates(angular, tip.point)
     r, dr, ddr = tip.point, v_r.first, v_r.second
     n = m + cross(r, f)
     dn = dm + cross(dr, f) + cross(r, df)
@@ -264,21 +264,21 @@ def _backward(
     return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)
 
 
-def _reaction(body: Body, tip: _Reaction) -> _Reaction:
+def _reaction(body: Body, beyond: _Reaction) -> _Reaction:
     (c, dc, ddc), (p, dp, ddp) = body.c, body.p
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
 
-    # `tip` holds the reaction on link k+1, already in frame k.
-    f = tip.f[0] + force  # (52)
-    df = tip.f[1] + dforce  # (53)
-    ddf = tip.f[2] + ddforce  # (54)
-    n = tip.n[0] + cross(c, force) + cross(p, f) + moment  # (55)
+    # `beyond` is the reaction on link k+1, already in frame k.
+    f = beyond.f[0] + force  # (52)
+    df = beyond.f[1] + dforce  # (53)
+    ddf = beyond.f[2] + ddforce  # (54)
+    n = beyond.n[0] + cross(c, force) + cross(p, f) + moment  # (55)
     dn = (  # (56)
-        tip.n[1] + cross(dc, force) + cross(c, dforce) + cross(dp, f) + cross(p, df) + dmoment
+        beyond.n[1] + cross(dc, force) + cross(c, dforce) + cross(dp, f) + cross(p, df) + dmoment
     )
     ddn = (  # (57)
-        tip.n[2] + cross(ddc, force) + cross(dc, dforce) * 2 + cross(c, ddforce)
+        beyond.n[2] + cross(ddc, force) + cross(dc, dforce) * 2 + cross(c, ddforce)
         + cross(ddp, f) + cross(dp, df) * 2 + cross(p, ddf) + ddmoment
     )  # fmt: skip
     return _Reaction((f, df, ddf), (n, dn, ddn))

@@ -22,7 +22,7 @@ def determinant(one: SpringState, two: SpringState) -> FloatArray:
     return one.sigma * two.zeta - two.sigma * one.zeta
 
 
-def solve(
+def solve_decoupling(
     one: SpringState, two: SpringState, divisor: FloatArray, torque_row: FloatArray, stiffness_row: FloatArray
 ) -> Sides:
     """Return A^-1 times a right-hand side, as in (68) and (72).
@@ -149,7 +149,7 @@ class _PairStates(ElasticState):
         sides = dphi[..., 0], dphi[..., 1]
         right = beta(self._one, self._two, sides, ddtau_e, ddstiffness, ddq)
         ddtheta = np.empty_like(dphi)
-        ddtheta[..., 0], ddtheta[..., 1] = solve(self._one, self._two, divisor, *right)
+        ddtheta[..., 0], ddtheta[..., 1] = solve_decoupling(self._one, self._two, divisor, *right)
         return ddtheta
 
     def determinant(self) -> FloatArray:
