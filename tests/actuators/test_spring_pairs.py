@@ -97,10 +97,10 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
     refused = ~(gap >= -SINGULAR_MARGIN)
     elsewhere = (gap > 1e-3) & ~(error < 1e-6)
     # A finer scan knows better where the coarse one saw no turn.
-    for doubtful in (refused, elsewhere):
-        for index in np.flatnonzero(doubtful):
+    for unclear in (refused, elsewhere):
+        for index in np.flatnonzero(unclear):
             cut = slice(index, index + 1)
-            doubtful[index] = oracle.on_branch(tau_1[cut], tau_e[cut], nodes=20_000)[0]
+            unclear[index] = oracle.on_branch(tau_1[cut], tau_e[cut], nodes=20_000)[0]
     sure = (gap > 1e-3) & (error < 1e-6)
     return RoundTrip(
         draws=tau_e.size,

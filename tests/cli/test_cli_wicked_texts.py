@@ -31,7 +31,7 @@ Command = Callable[..., Outcome]
 
 @pytest.fixture
 def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder that commands run in; whatever is made beside it has strayed."""
+    """The folder that commands run in; a file next to it was written to the wrong place."""
     folder = tmp_path / "work"
     folder.mkdir()
     monkeypatch.chdir(folder)

@@ -245,7 +245,7 @@ def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
     assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0"
 
 
-def test_doubtful_physics_is_a_warning(load):
+def test_implausible_physics_is_a_warning(load):
     robot = load(TEXT.replace("zz: 0.2", "zz: 0.5").replace("mass: 1,", "mass: 0,"))
     assert robot.warnings == (
         "link of joint swing: its inertia breaks the triangle inequality: 0.5 > 0.1 + 0.2 by 0.2 kg m^2",

@@ -181,7 +181,7 @@ class JointReport(Stored):
 
     def shows(self, verdict: str) -> bool:
         """Return whether the joint is a reason for a verdict that is not ok."""
-        if verdict == "doubtful":
+        if verdict == "unreliable":
             return self.uncertainty is not None and bool(self.uncertainty.undetermined)
         return bool(self.steps.get(verdict))
 

@@ -42,7 +42,7 @@ def _peak_at_an_end(joint: JointReport, spread: Spread) -> Iterator[str]:
     largest = max(of_motors(joint, joint.peak_tau_motor))
     if largest > DIFFERENT_PEAK * spread.peak:
         outside, inside = (f"{number(peak)} {spread.unit}" for peak in (largest, spread.peak))
-        yield f"its peak motor torque of {outside} is at a doubtful end of the record, else it is {inside}"
+        yield f"its peak motor torque of {outside} is at an unreliable end of the record, else it is {inside}"
 
 
 def _spread(name: str, spread: Spread) -> str:

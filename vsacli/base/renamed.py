@@ -26,7 +26,13 @@ class Renaming(NamedTuple):
     place: str
 
 
-RENAMINGS: tuple[Renaming, ...] = ()
+RENAMINGS: tuple[Renaming, ...] = (
+    Renaming("verdict", "doubtful", "unreliable", "`invdyn`, `check-feasibility`, `identify`, `size`"),
+    Renaming("verdict", "strayed", "off_target", "`simulate`"),
+    Renaming("verdict", "untold", "unidentifiable", "`identify`"),
+    Renaming("verdict", "misfit", "poor_fit", "`identify`"),
+    Renaming("key of reports", "doubtful", "unreliable", "columns of `fits`"),
+)
 
 
 def successor(word: str, valid: Iterable[str]) -> str | None:

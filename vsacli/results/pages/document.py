@@ -33,7 +33,7 @@ LIBRARY_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
 LARGEST_SHOWN = 200_000
 """Maximum number of characters of an input that a page shows; tables of samples are longer."""
 
-FAIR = ("over_limit", "doubtful", "strayed", "untold")
+FAIR = ("over_limit", "unreliable", "off_target", "unidentifiable")
 """Verdicts on complete runs with findings."""
 
 TOO_LONG = "too long for a page"

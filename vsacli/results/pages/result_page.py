@@ -157,7 +157,7 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
     return {
         "label": label,
         "troubles": {kind: list(map(after, joints)) for kind, joints in troubles(file).items()},
-        "doubtful": after(doubtful(file)),
+        "unreliable": after(unreliable(file)),
         "chain": chain_motion(file, start, packed),
     }
 
@@ -191,7 +191,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     }
 
 
-def doubtful(result: StoredResult) -> list[list[float]]:
+def unreliable(result: StoredResult) -> list[list[float]]:
     """Return the intervals (s) at the ends of a recording where derivatives of its splines are unreliable.
 
     Raises:
@@ -199,7 +199,7 @@ def doubtful(result: StoredResult) -> list[list[float]]:
     """
     with reporting_damage(result.path, "report"):
         columns = [column for fit in result.report_json.get("fits", ()) for column in fit["columns"]]
-        ends = [column["doubtful"] for column in columns if "doubtful" in column]
+        ends = [column["unreliable"] for column in columns if "unreliable" in column]
         start, end = (max((float(each[side]) for each in ends), default=0.0) for side in ("start", "end"))
     if not start and not end:
         return []
@@ -265,7 +265,7 @@ def measured_page(
     data = {
         "kind": "over time",
         "joints": [],
-        "files": [{"label": texts.label, "troubles": {}, "doubtful": [], "chain": None}],
+        "files": [{"label": texts.label, "troubles": {}, "unreliable": [], "chain": None}],
         "start": 0.0,
         "span": [
             min((float(curve.time[0]) for curve in every), default=0.0),

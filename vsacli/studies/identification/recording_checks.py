@@ -286,11 +286,11 @@ class Gain(NamedTuple):
 
     Attributes:
         sentence: finding as a sentence.
-        doubtful: whether the torques, rather than the robot, are likely wrong.
+        unreliable: whether the torques, rather than the robot, are likely wrong.
     """
 
     sentence: str
-    doubtful: bool
+    unreliable: bool
 
 
 def gains(
@@ -401,11 +401,11 @@ def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bo
     alike = f"{found.system.title}: the numbers found are {factor} times those of the file, all of them"
     carried = f"what springs carry by these numbers is {by_links} times what links as in the file need"
     if by_links and by_links.differs(1.0) and not by_links.differs(factor.value):
-        return Gain(f"{alike}, and {carried}: the torques read too {size}", doubtful=True)
+        return Gain(f"{alike}, and {carried}: the torques read too {size}", unreliable=True)
     if by_links and by_links.differs(factor.value) and not by_links.differs(1.0):
-        return Gain(f"{alike}, but {carried}: it is springs and motors that differ", doubtful=False)
+        return Gain(f"{alike}, but {carried}: it is springs and motors that differ", unreliable=False)
     beside = f"{carried}, which does not decide it" if by_links else "the links tell nothing of it"
     if rotor:
         reason = "a rotor and springs hardly differ alike, torques that read too {size} make them"
-        return Gain(f"{alike}: {reason.format(size=size)}; {beside}", doubtful=True)
-    return Gain(f"{alike}: torques that read too {size} look the same; {beside}", doubtful=False)
+        return Gain(f"{alike}: {reason.format(size=size)}; {beside}", unreliable=True)
+    return Gain(f"{alike}: torques that read too {size} look the same; {beside}", unreliable=False)
