@@ -166,7 +166,7 @@ def test_run_that_ended_early_says_so():
     assert headline.startswith("vsa-3r, rest-to-rest: 1 step, 4 s planned, stopped early ")
 
 
-def test_infeasible_stiffness_names_time_bound_and_remedy():
+def test_infeasible_stiffness_names_time_bound_and_fix():
     assert sentence(too_soft(790, 803.1)) == (
         "elbow: stiffness 790 N m/rad at t = 4.000 s is below the 803.1 its load allows, raise it "
         "(412 steps, from 3.588 s)"

@@ -127,7 +127,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("info", "MOVE", "--robot", "ROBOT"),
     ("invdyn", "ROBOT", "MOVE", "-o", "RESULT"),
     ("invdyn", "ROBOT", "MOVE", "--variables", "flags"),
-    ("check-feasibility", "ROBOT", "SOFT", "--write-fixed", "OUT/fixed.yaml"),
+    ("check-feasibility", "ROBOT", "SOFT", "--write-fix", "1", "-o", "OUT/fixed.yaml"),
     ("validate", "ROBOT", "OUT/fixed.yaml"),
     ("simulate", "ROBOT", "MOVE", "-o", "OUT/s.h5", "--budget", "60"),
     ("codegen", "ROBOT", "-o", "OUT/code"),

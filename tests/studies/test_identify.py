@@ -144,7 +144,7 @@ def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) 
     assert all(residual.residual < 1.5 * residual.noise for residual in base.residuals)
 
 
-def test_late_torques_are_told_and_mended(tmp_path: Path) -> None:
+def test_late_torques_are_told_and_fixed(tmp_path: Path) -> None:
     exact = excited(joint(), JOINT)
     late = exact._replace(tau_motor=np.concatenate((exact.tau_motor[:1], exact.tau_motor[:-1])))
     told = identify(

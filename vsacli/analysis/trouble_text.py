@@ -136,10 +136,10 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
         relation = "below" if worst.value < worst.bound else "above"
         load = f"elastic torque {value} {worst.unit} {when}"
         return f"{load} is {relation} the {bound} that its spring carries {hints}"
-    relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
+    relation, advice = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
     return (
         f"stiffness {value} {worst.unit} {when} is {relation} the {bound} "
-        f"its load allows, {remedy} it {hints}"
+        f"its load allows, {advice} it {hints}"
     )
 
 
@@ -147,10 +147,10 @@ def _singular(joint: JointReport, worst: Worst) -> str:
     if math.isnan(worst.bound):
         when = f"at t = {time_text(worst.time)}"
         return f"its spring is slack {when}: motor torques are undefined ({_steps(joint, 'singular')})"
-    remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
+    advice = "lower" if worst.bound == joint.reachable[1] else "raise"
     return (
         f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "
-        f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
+        f"motor torques are undefined at the end of its range, {advice} it ({_steps(joint, 'singular')})"
     )
 
 

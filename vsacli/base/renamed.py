@@ -32,6 +32,14 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("verdict", "untold", "unidentifiable", "`identify`"),
     Renaming("verdict", "misfit", "poor_fit", "`identify`"),
     Renaming("key of reports", "doubtful", "unreliable", "columns of `fits`"),
+    Renaming("option", "--suggest", "--fixes", "`check-feasibility`"),
+    Renaming("option", "--remedy", "--write-fix", "`check-feasibility`"),
+    Renaming("option", "--write-fixed", "--write-fix", "`check-feasibility`; FILE is that of `-o` now"),
+    Renaming("key of reports", "suggestions", "fixes", "`check-feasibility --fixes`"),
+    Renaming("key of reports", "remedies", "fixes", "`check-feasibility --fixes`"),
+    Renaming("Python name", "suggest", "fixes", "`vsacli`"),
+    Renaming("Python name", "Suggestions", "Fixes", "`vsacli.studies.search`"),
+    Renaming("Python name", "Remedy", "Fix", "`vsacli.studies.search`"),
 )
 
 

@@ -36,8 +36,8 @@ _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Fl
 def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
     """Return the worst of `VERDICTS` that applies.
 
-    A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An early
-    end without a flag has its own verdict.
+    A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An
+    early end without a flag has its own verdict.
     """
     flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}

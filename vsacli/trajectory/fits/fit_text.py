@@ -78,11 +78,11 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
         elif not known.determined:
             yield (
                 f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square; {_remedy(part)}"
+                f" {100 * known.relative:.2g} % of its root mean square; {_advice(part)}"
             )
 
 
-def _remedy(part: Part) -> str:
+def _advice(part: Part) -> str:
     if part.noise is not None:
         return (
             f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"

@@ -1,4 +1,4 @@
-"""Suggested fixes as data, JSON and sentences."""
+"""Fixes as data, JSON and sentences."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class OtherPreload(Published):
 
 
 @dataclass(frozen=True)
-class Remedy(Published):
+class Fix(Published):
     """A fix: changes that together make a task feasible, confirmed by a run over all samples.
 
     Attributes:
@@ -217,7 +217,7 @@ class Cause(Published):
 
 
 @dataclass(frozen=True)
-class Suggestions(Published):
+class Fixes(Published):
     """The fixes of a task: the smallest change of each kind alone, and combinations.
 
     Each kind is the change, the reasons why none suffices, or None if nothing needs to change or the
@@ -226,7 +226,7 @@ class Suggestions(Published):
     Attributes:
         near_singular: margin required of every sample.
         causes: reason why each refused joint is refused.
-        remedies: fixes to choose from, the smallest first; those with another preload come last.
+        fixes: fixes to choose from, the smallest first; those with another preload come last.
     """
 
     near_singular: float
@@ -235,7 +235,7 @@ class Suggestions(Published):
     stiffness_profile: StiffnessProfile | NotPossible | None = None
     transition: LongerTransition | NotPossible | None = None
     causes: tuple[Cause, ...] = ()
-    remedies: tuple[Remedy, ...] = ()
+    fixes: tuple[Fix, ...] = ()
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -248,12 +248,12 @@ class Suggestions(Published):
             return
         yield from map(str, self.causes)
         left = [cause.joint for cause in self.causes if not cause.fixable]
-        rest = f"every step of all joints but {and_joined(left)}" if left and self.remedies else "every step"
-        if self.remedies:
-            yield f"suggestions, with any one of which {rest} has {margin} and keeps every limit:"
+        rest = f"every step of all joints but {and_joined(left)}" if left and self.fixes else "every step"
+        if self.fixes:
+            yield f"fixes, with any one of which {rest} has {margin} and keeps every limit:"
         else:
             yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
-        yield from (f"{number}. {remedy.sentence}" for number, remedy in enumerate(self.remedies, 1))
+        yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
 
 
 def and_joined(names: Sequence[str]) -> str:
