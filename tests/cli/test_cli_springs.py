@@ -118,5 +118,5 @@ def test_a_tendon_that_would_push_says_so(joint, tmp_path):
     assert refused.code == 3
     assert "is below the 0 that its spring carries" in refused.out
     assert "a tendon goes slack at" in refused.out
-    assert "preload" not in refused.out
+    assert "branch" not in refused.out
     assert "no stiffness to choose" in refused.out

@@ -1,4 +1,4 @@
-"""Slow-down, stiffness and preload together, at whatever cost."""
+"""Slow-down, stiffness and branch together, at whatever cost."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_too_fast_and_slightly_too_soft_takes_both():
     content = fix.as_json()
     assert content["slow_down"]["factor"] == 1.719
     assert content["stiffness_offset"]["offsets"] == {"base": 0.0, "shoulder": 19.55, "elbow": 0.0}
-    assert "preload" not in content
+    assert "branch" not in content
     assert content["text"] == fix.sentence
 
 
@@ -106,8 +106,8 @@ def test_simpler_fixes_come_with_less_than_the_combined_ones():
         assert accepted(fix.robot, fix.trajectory)
 
 
-def test_springs_that_are_alike_leave_no_choice_of_preload():
-    assert not search(preloads=True).exchangeable
+def test_springs_that_are_alike_leave_no_choice_of_branch():
+    assert not search(branches=True).exchangeable
 
 
 def unlike():
@@ -115,24 +115,24 @@ def unlike():
     springs = [{"type": "cubic", "k": 4, "k_c": 20}, {"type": "cubic", "k": 4.4, "k_c": 20}]
     robot = vsa_3r().replace("joints.elbow.actuator.spring", springs)
     lowest = {
-        preload: max(
+        branch: max(
             float(block.stiffness_lower[:, 2].max())
-            for block in Run(robot.replace("joints.elbow.actuator.preload", preload), rest_to_rest(4.0))
+            for block in Run(robot.replace("joints.elbow.actuator.branch", branch), rest_to_rest(4.0))
         )
-        for preload in ("positive", "negative")
+        for branch in ("positive", "negative")
     }
     worse = max(lowest, key=lowest.get)
     trajectory = rest_to_rest(4.0, (850.0, 850.0, sum(lowest.values()) / 2))
-    return robot.replace("joints.elbow.actuator.preload", worse), trajectory
+    return robot.replace("joints.elbow.actuator.branch", worse), trajectory
 
 
 @pytest.mark.slow
-def test_other_preload_comes_last_although_it_is_enough():
+def test_other_branch_comes_last_although_it_is_enough():
     robot, trajectory = unlike()
     *others, last = fixes(robot, trajectory, 1e-4).fixes
-    assert all(fix.preload is None for fix in others)
-    assert last.kinds == {"preload"}
-    assert last.sentence == f"change the preload of elbow to {robot.joints[2].actuator.opposite_preload}"
+    assert all(fix.branch is None for fix in others)
+    assert last.kinds == {"branch"}
+    assert last.sentence == f"change the branch of elbow to {robot.joints[2].actuator.opposite_branch}"
     assert last.size == 0.0
     assert accepted(last.robot, last.trajectory, 1e-4)
 

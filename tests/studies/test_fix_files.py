@@ -1,4 +1,4 @@
-"""The files of fixes: slower formulas and recordings, robots with another preload."""
+"""The files of fixes: slower formulas and recordings, robots with another branch."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vsacli import Trajectory, load_robot, load_trajectory
 from vsacli.base.errors import InputError
 from vsacli.studies.search import Fix
 from vsacli.studies.search.changed_motion import with_raised_stiffness
-from vsacli.studies.search.fix_report import OtherPreload
+from vsacli.studies.search.fix_report import OtherBranch
 
 FACTOR = 1.4142
 ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
@@ -73,37 +73,37 @@ def test_slower_recordings_have_scaled_derivatives_and_wrench(tmp_path: Path) ->
     np.testing.assert_allclose(slower.wrench.dwrench, motion.wrench.dwrench / FACTOR, atol=1e-3 * peak)
 
 
-def fix_with(robot_path: Path, joint: str, preload: str) -> Fix:
+def fix_with(robot_path: Path, joint: str, branch: str) -> Fix:
     robot = load_robot(robot_path)
-    changed = robot.replace(f"joints.{joint}.actuator.preload", preload)
+    changed = robot.replace(f"joints.{joint}.actuator.branch", branch)
     trajectory = load_trajectory(REPOSITORY / "trajectories" / f"{robot_path.stem}.yaml", robot)
-    return Fix(0.0, changed, trajectory, preload=OtherPreload({joint: preload}))
+    return Fix(0.0, changed, trajectory, branch=OtherBranch({joint: branch}))
 
 
-def test_robot_with_another_preload_keeps_its_comments(tmp_path: Path) -> None:
+def test_robot_with_another_branch_keeps_its_comments(tmp_path: Path) -> None:
     source = REPOSITORY / "robots" / "lwr_7r_vsa.yaml"
     trajectory = load_trajectory(REPOSITORY / "trajectories" / "lwr_7r.yaml", load_robot(source))
-    robot = load_robot(source).replace("joints.elbow.actuator.preload", "negative")
-    fix = Fix(0.0, robot, trajectory, preload=OtherPreload({"elbow": "negative"}))
+    robot = load_robot(source).replace("joints.elbow.actuator.branch", "negative")
+    fix = Fix(0.0, robot, trajectory, branch=OtherBranch({"elbow": "negative"}))
     paths = written(fix, tmp_path / "fixed.yaml")
     assert paths[-1] == tmp_path / "fixed-robot.yaml"
     again = load_robot(paths[-1])
     assert [joint.actuator for joint in again.joints] == [joint.actuator for joint in robot.joints]
     before, after = (path.read_text().splitlines() for path in (source, paths[-1]))
-    assert [line for line in after if line not in before] == ["      preload: negative"]
+    assert [line for line in after if line not in before] == ["      branch: negative"]
     assert [line for line in before if line not in after] == []
 
 
-def test_preload_of_a_mechanism_is_changed_where_it_stands(tmp_path: Path) -> None:
+def test_branch_of_a_mechanism_is_changed_where_it_stands(tmp_path: Path) -> None:
     text = (REPOSITORY / "robots" / "shifted_cams_1r.yaml").read_text()
     (tmp_path / "cams.yaml").write_text(
-        text.replace("type: shifted_cams", "type: shifted_cams\n        preload: positive")
+        text.replace("type: shifted_cams", "type: shifted_cams\n        branch: positive")
     )
     trajectory = load_trajectory(
         REPOSITORY / "trajectories" / "shifted_cams_1r.yaml", robot := load_robot(tmp_path / "cams.yaml")
     )
-    changed = robot.replace("joints.elbow.actuator.mechanism.preload", "negative")
-    fix = Fix(0.0, changed, trajectory, preload=OtherPreload({"elbow": "negative"}))
+    changed = robot.replace("joints.elbow.actuator.mechanism.branch", "negative")
+    fix = Fix(0.0, changed, trajectory, branch=OtherBranch({"elbow": "negative"}))
     *_, path = written(fix, tmp_path / "fixed.yaml")
     assert load_robot(path).joints == changed.joints
 
@@ -111,7 +111,7 @@ def test_preload_of_a_mechanism_is_changed_where_it_stands(tmp_path: Path) -> No
 def test_files_that_the_robot_names_are_found_from_elsewhere(tmp_path: Path) -> None:
     fix = fix_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
     *_, path = written(fix, tmp_path / "fixed.yaml")
-    assert load_robot(path).joints[0].actuator.preload == "negative"
+    assert load_robot(path).joints[0].actuator.branch == "negative"
 
 
 def test_robot_that_has_no_file_cannot_be_written(tmp_path: Path) -> None:

@@ -77,10 +77,10 @@ def changed_motion(motion, factor, offset):
 
 
 def exchanged(robot):
-    """The robot with the other preload wherever there is one."""
-    preloads = {index: joint.actuator.opposite_preload for index, joint in enumerate(robot.joints)}
+    """The robot with the other branch wherever there is one."""
+    branches = {index: joint.actuator.opposite_branch for index, joint in enumerate(robot.joints)}
     return robot.replace(
-        {f"joints.{index}.actuator.preload": preload for index, preload in preloads.items() if preload}
+        {f"joints.{index}.actuator.branch": branch for index, branch in branches.items() if branch}
     )
 
 
@@ -121,7 +121,7 @@ def check_alone(found, robot, trajectory, motion, joints):
 def check_written(paths, written, fix, joints):
     """The files of a fix keep margin and limits, between samples as well."""
     other = written.with_name(f"{written.stem}-robot.yaml")
-    assert other.exists() == ("preload" in fix)
+    assert other.exists() == ("branch" in fix)
     robot = load_robot(other if other.exists() else paths[0])
     trajectory = load_trajectory(written, robot)
     assert trajectory.known_between
@@ -146,7 +146,7 @@ def test_every_fix_works_and_none_is_missed(tmp_path, vsacli, seed):
     fixes = found["fixes"]
     if not failing - hopeless:
         return
-    smallest = min((each["size"] for each in fixes if "preload" not in each), default=math.inf)
+    smallest = min((each["size"] for each in fixes if "branch" not in each), default=math.inf)
     assert smallest <= SUPERFLUOUS * scanned([robot], motion, joints)
     assert fixes or math.isinf(scanned([robot, exchanged(robot)], motion, joints))
     if not trajectory.estimates:

@@ -146,7 +146,7 @@ DOUBTS = {
                 for name in ("theta", "tau_motor")
             },
         ),
-        "the springs of elbow are deflected as with the preload negative: the columns of motors 1 and 2",
+        "the springs of elbow are deflected as on the branch negative: the columns of motors 1 and 2",
     ),
     "cut off": (
         lambda record: changed(record, tau_motor=put(np.s_[:, 0, 0], lambda torque: np.minimum(torque, 120))),

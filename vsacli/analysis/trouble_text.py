@@ -126,8 +126,8 @@ def _steps(joint: JointReport, kind: str) -> str:
 def _infeasible(joint: JointReport, worst: Worst) -> str:
     steps = _steps(joint, "infeasible")
     slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
-    preload = "; the opposite preload would reach it" if joint.other_preload else ""
-    hints = f"({steps}){slack}{preload}"
+    branch = "; the opposite branch reaches it" if joint.other_branch else ""
+    hints = f"({steps}){slack}{branch}"
     when = f"at t = {time_text(worst.time)}"
     if math.isnan(worst.bound):
         return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"

@@ -40,6 +40,13 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("Python name", "suggest", "fixes", "`vsacli`"),
     Renaming("Python name", "Suggestions", "Fixes", "`vsacli.studies.search`"),
     Renaming("Python name", "Remedy", "Fix", "`vsacli.studies.search`"),
+    Renaming("key of robots", "preload", "branch", "`antagonistic`, `shifted_cams`"),
+    Renaming("key of reports", "other_preload", "other_branch", "`joints`"),
+    Renaming("key of reports", "preload", "branch", "entries of `fixes`"),
+    Renaming("key of reports", "preloads", "branches", "`branch` of `fixes`"),
+    Renaming("parameter", "preload", "branch", "`Antagonistic`, `mechanisms.ShiftedCams`"),
+    Renaming("Python name", "opposite_preload", "opposite_branch", "`mechanisms.Mechanism`"),
+    Renaming("Python name", "other_preload", "other_branch", "`mechanisms.Mechanism`"),
 )
 
 

@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     "--output",
     type=YAML_FILE,
     help="Trajectory file for --write-fix N. A CSV file next to it holds signals without a formula, and"
-    " FILE-robot.yaml the robot, if its preload changes.",
+    " FILE-robot.yaml the robot, if its branch changes.",
 )
 @overwrite_option
 @engine_options
@@ -95,7 +95,7 @@ def check_feasibility(
     within limits, and a record, if there is one, determines that; else 3.
 
     --fixes lists changes after which it can: slower, another stiffness (by a constant, or as a smooth
-    profile), another preload, or several of these together, so that every step keeps the near-singular margin
+    profile), another branch, or several of these together, so that every step keeps the near-singular margin
     and all limits. The list begins with the smallest change; each fix was confirmed by a run of its own. With
     --write-fix N -o FILE, FILE is the trajectory with fix N of the list.
     """

@@ -39,7 +39,7 @@ from vsacli.studies.measured.likely_causes import exchanged, likely_causes
 from vsacli.studies.measured.pairing import exactness, tame
 
 ELSEWHERE = 0.5
-"""Relative distance from deflections on the preload's branch above which deflections are on another one."""
+"""Relative distance from deflections on the robot's branch above which deflections are on another one."""
 
 FOLLOWS_BETTER = 0.25
 """Variance of a motor about another joint, relative to that about its own joint, below which it follows the
@@ -179,9 +179,9 @@ def _agreement(
 
 
 def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
-    """Yield a sentence if most deflections are on another branch than that of the preload."""
+    """Yield a sentence if most deflections are on another branch than that of the robot."""
     actuator = robot.joints[index].actuator
-    if not actuator.commanded or actuator.opposite_preload is None:
+    if not actuator.commanded or actuator.opposite_branch is None:
         return
     stride = signals.filter.stride
     q, theta = signals.q[::stride, index], signals.theta[::stride, index]
@@ -191,8 +191,8 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
     off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)
     if np.mean(off) > 1 / 2:
         yield (
-            f"the springs of {robot.joint_names[index]} are deflected as with the preload "
-            f"{actuator.opposite_preload}: the columns of motors 1 and 2 may be exchanged, or the preload in "
+            f"the springs of {robot.joint_names[index]} are deflected as on the branch "
+            f"{actuator.opposite_branch}: the columns of motors 1 and 2 may be exchanged, or the branch in "
             "the robot file is the other"
         )
 

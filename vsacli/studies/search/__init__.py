@@ -1,4 +1,4 @@
-"""Searches over timing, stiffness and preload: the smallest fix of an infeasible task, the optimal motion."""
+"""Searches over timing, stiffness and branch: the smallest fix of an infeasible task, the optimal motion."""
 
 from typing import TYPE_CHECKING
 

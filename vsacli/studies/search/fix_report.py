@@ -135,17 +135,17 @@ class LongerTransition(Published):
 
 
 @dataclass(frozen=True)
-class OtherPreload(Published):
-    """A change to the other preload; the new preloads are given by joint name."""
+class OtherBranch(Published):
+    """A change to the other branch; the new branches are given by joint name."""
 
-    preloads: Mapping[str, str]
+    branches: Mapping[str, str]
 
-    shape: ClassVar = {"preloads": "preloads", "text": "sentence"}
+    shape: ClassVar = {"branches": "branches", "text": "sentence"}
 
     @property
     def sentence(self) -> str:
         """Advice as a sentence, without a full stop."""
-        return "change the preload of " + ", ".join(f"{joint} to {to}" for joint, to in self.preloads.items())
+        return "change the branch of " + ", ".join(f"{joint} to {to}" for joint, to in self.branches.items())
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Fix(Published):
     Attributes:
         size: root of the sum of the squares of all relative changes: the factor of the slow-down less 1, and
             for each joint the rms change of its stiffness over its rms stiffness.
-        robot: robot with the new preloads.
+        robot: robot with the new branches.
         declared: trajectory with the changes, except for a slow-down that follows a fit.
         factor: factor of that slow-down; 1 if `declared` is stretched already, see `Task`.
         asked: trajectory without the changes.
@@ -170,9 +170,9 @@ class Fix(Published):
     stiffness_offset: StiffnessOffset | None = None
     transition: LongerTransition | None = None
     stiffness_profile: StiffnessProfile | None = None
-    preload: OtherPreload | None = None
+    branch: OtherBranch | None = None
 
-    PARTS: ClassVar = ("slow_down", "preload", "transition", "stiffness_offset", "stiffness_profile")
+    PARTS: ClassVar = ("slow_down", "branch", "transition", "stiffness_offset", "stiffness_profile")
     shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
 
     @property
@@ -226,7 +226,7 @@ class Fixes(Published):
     Attributes:
         near_singular: margin required of every sample.
         causes: reason why each refused joint is refused.
-        fixes: fixes to choose from, the smallest first; those with another preload come last.
+        fixes: fixes to choose from, the smallest first; those with another branch come last.
     """
 
     near_singular: float

@@ -48,7 +48,7 @@ def fixes(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SING
     """Return the smallest changes after which every sample has the margin and keeps every limit.
 
     Slow-down, constant stiffness change, other stiffness profile and longer transition are tried alone, then
-    combinations of them to choose from, also with the other preload. A run over all samples confirms each.
+    combinations of them to choose from, also on the other branch. A run over all samples confirms each.
 
     Args:
         robot: robot that executes the motion.
@@ -171,10 +171,10 @@ def _profiles(task: Task) -> Iterator[Fix]:
     yield from profiles or _with_profiles(task, CombinedSearch(task).smallest())
 
 
-def _other_preloads(task: Task) -> Iterator[Fix]:
-    exchanged = CombinedSearch(task, preloads=True)
+def _other_branches(task: Task) -> Iterator[Fix]:
+    exchanged = CombinedSearch(task, branches=True)
     found = exchanged.smallest() if exchanged.exchangeable else None
-    if found is not None and found.preloads:
+    if found is not None and found.branches:
         yield task.with_constants(found)
 
 
@@ -200,7 +200,7 @@ ALONE: Mapping[str, _Search] = {
 COMBINED: Mapping[str, _Search] = {
     "constants": _constants,
     "profiles": _profiles,
-    "preloads": _other_preloads,
+    "branches": _other_branches,
 }
 """Searches for fixes that may combine several kinds of change."""
 
@@ -211,7 +211,7 @@ def _worth_choosing(
     """Select the fixes that a run confirms and that no simpler fix replaces.
 
     Returns:
-        Selected fixes, those with another preload last; fixes that a run refused between samples; and the
+        Selected fixes, those with another branch last; fixes that a run refused between samples; and the
         instants at which it did, as times since the start of the task, s.
     """
     chosen: list[Fix] = []
@@ -224,7 +224,7 @@ def _worth_choosing(
             (chosen if short is None else failed).append(fix)
             instants += [] if short is None else [short]
     confirmed += chosen
-    ordered = sorted(chosen, key=lambda each: (each.preload is not None, each.size))
+    ordered = sorted(chosen, key=lambda each: (each.branch is not None, each.size))
     return ordered, failed, np.concatenate(instants)
 
 
@@ -257,7 +257,7 @@ def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
-    if CombinedSearch(alone, preloads=True).smallest() is not None:
+    if CombinedSearch(alone, branches=True).smallest() is not None:
         return True
     with suppress(ImpossibleError):
         alone.with_profiles(AS_IT_IS)

@@ -1,4 +1,4 @@
-"""A fix as files: the trajectory, a CSV table for signals without a formula, a robot with another preload."""
+"""A fix as files: the trajectory, a CSV table for signals without a formula, a robot with another branch."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.file import text_to_change
 from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
-from vsacli.studies.search.task import preload_path
+from vsacli.studies.search.task import branch_path
 from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.samples import SampledProfile
@@ -49,10 +49,10 @@ def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
 
 
 def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
-    """Write the trajectory of a fix, and its robot if that has another preload.
+    """Write the trajectory of a fix, and its robot if that has another branch.
 
     Signals in closed form remain formulas; the others are written to a CSV file of the same stem, at the
-    samples and with all derivatives. The robot file is a copy of the user's file with the preload changed.
+    samples and with all derivatives. The robot file is a copy of the user's file with the branch changed.
 
     Raises:
         InputError, StorageError: see `check_fixed_target`; or the robot file does not admit the change, or
@@ -70,7 +70,7 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
     contents: dict[Path, Callable[[TextIO], object]] = {document: lambda file: file.writelines(lines)}
     if beside is not None:
         contents[table] = beside.write
-    if fix.preload is not None:
+    if fix.branch is not None:
         contents[robot] = lambda file: file.write(robot_text(fix, robot.parent))
     for target, write in contents.items():
         with outputs.file(target).opened() as stream:
@@ -170,22 +170,22 @@ def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
 
 
 def robot_text(fix: Fix, folder: Path) -> str:
-    """Return the text of the robot's file with the preloads of a fix, for a file in `folder`.
+    """Return the text of the robot's file with the branches of a fix, for a file in `folder`.
 
     Everything else, comments included, remains as the user wrote it; paths still refer to the same files.
 
     Raises:
         InputError: the robot was not read from a file, or its text does not admit the change.
     """
-    assert fix.preload is not None
+    assert fix.branch is not None
     own, home = text_to_change(fix.robot)
     values = {
-        preload_path(fix.robot, fix.robot.joint_names.index(joint)): preload
-        for joint, preload in fix.preload.preloads.items()
+        branch_path(fix.robot, fix.robot.joint_names.index(joint)): branch
+        for joint, branch in fix.branch.branches.items()
     }
     try:
         return edited(own, values | dict(moved_files(own, home, folder)))
     except InputError as error:
         raise InputError.one(
-            f"{fix.preload.sentence} there by hand: {error}", fix.robot.sources[0].path
+            f"{fix.branch.sentence} there by hand: {error}", fix.robot.sources[0].path
         ) from None

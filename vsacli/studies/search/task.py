@@ -33,7 +33,7 @@ from vsacli.studies.search.fix_report import (
     JointChange,
     LongerTransition,
     Offset,
-    OtherPreload,
+    OtherBranch,
     SlowDown,
     StiffnessOffset,
     StiffnessProfile,
@@ -106,13 +106,13 @@ class Combination:
     Attributes:
         factor: factor of the slow-down, at least 1.
         changes: additions to the stiffness, (samples,), by joint index; joints without one are left out.
-        preloads: new preloads, by joint index; joints that keep theirs are left out.
+        branches: new branches, by joint index; joints that keep theirs are left out.
         size: total cost of the changes.
     """
 
     factor: float
     changes: Mapping[int, FloatArray]
-    preloads: Mapping[int, str]
+    branches: Mapping[int, str]
     size: float
 
     @property
@@ -121,18 +121,16 @@ class Combination:
         return {index: float(change[0]) for index, change in self.changes.items()}
 
     def robot(self, robot: Robot) -> Robot:
-        """Return a robot with the preloads of the combination."""
-        return robot.replace(
-            {preload_path(robot, index): preload for index, preload in self.preloads.items()}
-        )
+        """Return a robot with the branches of the combination."""
+        return robot.replace({branch_path(robot, index): branch for index, branch in self.branches.items()})
 
 
 AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
 
-def preload_path(robot: Robot, index: int) -> str:
-    """Return the path of a joint's preload in the robot file."""
-    return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"
+def branch_path(robot: Robot, index: int) -> str:
+    """Return the path of a joint's branch in the robot file."""
+    return f"joints.{index}.actuator.{robot.joints[index].actuator.branch_field}"
 
 
 _Found = TypeVar("_Found")
@@ -158,7 +156,7 @@ class Task:
         keeps_rate: whether a recording that is slowed down is sampled at its original rate; otherwise its own
             samples are kept, further apart.
         impossible: numbers of the factors (see `Factors`) at which no change is accepted, by form and whether
-            preloads may change; also valid for the same task under a stricter rule, which shares them.
+            branches may change; also valid for the same task under a stricter rule, which shares them.
     """
 
     acceptance: Acceptance
@@ -168,7 +166,7 @@ class Task:
     impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
 
     def acceptance_with(self, found: Combination) -> Acceptance:
-        """Return the acceptance rule for the robot with the preloads of a combination."""
+        """Return the acceptance rule for the robot with the branches of a combination."""
         return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
 
     def with_constants(self, found: Combination) -> Fix:
@@ -189,12 +187,12 @@ class Task:
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
-            preload=self._preload(found),
+            branch=self._branch(found),
             stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
         )
 
     def with_profiles(self, found: Combination) -> Fix:
-        """Return the fix with the slow-down and preloads of a combination and the nearest stiffness profiles.
+        """Return the fix with the slow-down and branches of a combination and the nearest stiffness profiles.
 
         Raises:
             ImpossibleError: no profile was found for some joint.
@@ -215,7 +213,7 @@ class Task:
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
-            preload=self._preload(found),
+            branch=self._branch(found),
             stiffness_profile=StiffnessProfile(summaries) if summaries else None,
         )
 
@@ -291,10 +289,10 @@ class Task:
     def _slow_down(self, found: Combination) -> SlowDown | None:
         return SlowDown(found.factor, self.trajectory.duration) if found.factor > 1 else None
 
-    def _preload(self, found: Combination) -> OtherPreload | None:
+    def _branch(self, found: Combination) -> OtherBranch | None:
         names = self.acceptance.robot.joint_names
-        preloads = {names[index]: preload for index, preload in found.preloads.items()}
-        return OtherPreload(preloads) if preloads else None
+        branches = {names[index]: branch for index, branch in found.branches.items()}
+        return OtherBranch(branches) if branches else None
 
     def falls_short(self, fix: Fix) -> FloatArray | None:
         """Run a fix; return instants at which it misses the margin or a limit, or None if it is confirmed.
