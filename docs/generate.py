@@ -281,7 +281,7 @@ def renamings() -> str:
 
 def noise_study() -> str:
     """Error of the fourth derivative over rate and noise of a record."""
-    header = ("samples", "noise", "knots", "doubtful at each end", "error of d4q, `lsq`", "`interpolate`")
+    header = ("samples", "noise", "knots", "unreliable at each end", "error of d4q, `lsq`", "`interpolate`")
     return table(header, table_rows())
 
 

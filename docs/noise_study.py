@@ -46,11 +46,11 @@ def error(of: Fit, within: tuple[float, float]) -> float:
 
 
 def table_rows() -> Iterator[tuple[str, ...]]:
-    """Rate, noise, knots, doubtful stretch, error of least squares, error of interpolation."""
+    """Rate, noise, knots, unreliable stretch, error of least squares, error of interpolation."""
     for rate in RATES:
         for noise in NOISES:
             smooth, exact = fit(rate, noise, LEAST_SQUARES), fit(rate, noise, INTERPOLATE)
-            start, end = smooth.doubtful
+            start, end = smooth.unreliable
             inside = start, DURATION - end
             yield (
                 f"{rate} Hz",
@@ -109,10 +109,10 @@ def draw(path: Path) -> None:
     below.set(xlabel="time in s", ylabel="error of d4q in % of its rms", ylim=(-25, 25), xlim=SHOWN_SPAN)
     below.legend(frameon=False, ncols=2, loc="upper right")
     for axes in (above, below):
-        axes.axvspan(0, smooth.doubtful[0], color="0.93", zorder=0)
+        axes.axvspan(0, smooth.unreliable[0], color="0.93", zorder=0)
         axes.spines[["top", "right"]].set_visible(False)
     corner = {"xycoords": ("data", "axes fraction"), "xytext": (4, -12), "textcoords": "offset points"}
-    above.annotate("doubtful", (0, 1), **corner)
+    above.annotate("unreliable", (0, 1), **corner)
     figure.savefig(path, dpi=150)
 
 

@@ -26,6 +26,7 @@ from vsacli import (
     StorageError,
     Trajectory,
     feedback_linearization,
+    fixes,
     forward_kinematics,
     import_urdf,
     inverse_dynamics,
@@ -37,7 +38,6 @@ from vsacli import (
     open_result,
     simulate,
     state_derivative,
-    suggest,
 )
 
 REPOSITORY = Path(__file__).parents[1]
@@ -234,7 +234,7 @@ class TestSlips:
         state = State(q, q, self.TORQUES, self.TORQUES)
         yield lambda robot: inverse_dynamics(robot, short_motion(3))
         yield lambda robot: simulate(robot, short_motion(3))
-        yield lambda robot: suggest(robot, short_motion(3))
+        yield lambda robot: fixes(robot, short_motion(3))
         yield lambda robot: load_trajectory(MOTION, robot)
         yield lambda robot: link_torques(robot, q)
         yield lambda robot: forward_kinematics(robot, q)
@@ -253,7 +253,7 @@ class TestSlips:
             with pytest.raises(TypeError, match="robot must be a Robot, not None"):
                 function(None)
 
-    @pytest.mark.parametrize("function", [inverse_dynamics, simulate, suggest])
+    @pytest.mark.parametrize("function", [inverse_dynamics, simulate, fixes])
     def test_a_path_or_a_class_for_a_trajectory(self, function, robot, trajectory) -> None:
         call = r"load_trajectory\('motion.yaml', robot\) reads one; it comes after the robot"
         with pytest.raises(TypeError, match=f"must be a Trajectory, not the path 'motion.yaml'; {call}"):

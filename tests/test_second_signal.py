@@ -47,7 +47,7 @@ LINES = {
     "plot": ["plot", "numpy.h5", "-o", "figures"],
     "export": ["export", "numpy.h5", "--variables", ",".join(["q", "stiffness", *NAMES]), "-o", "table.csv"],
     "table": ["invdyn", ARM, "table.csv", "-o", "table.h5"],
-    "check": ["check-feasibility", ARM, "soft.yaml", "--write-fixed", "fixed.yaml"],
+    "check": ["check-feasibility", ARM, "soft.yaml", "--write-fix", "1", "-o", "fixed.yaml"],
     "fixed": ["invdyn", ARM, "fixed.yaml", "-o", "fixed.h5"],
     "mixed": ["invdyn", MIXED, "mixed.yaml", "-o", "mixed.h5"],
     "columns": ["export", "mixed.h5", "--variables", "stiffness,pretension"],
@@ -120,7 +120,7 @@ def test_joints_that_do_not_take_it_have_none(outcomes: dict[str, tuple[int, str
     assert outcomes["columns"][1].startswith("time,shoulder.stiffness,elbow.stiffness,elbow.pretension\n")
 
 
-def test_a_file_that_mends_the_stiffness_keeps_it(outcomes: dict[str, tuple[int, str]], folder: Path) -> None:
+def test_a_file_that_fixes_the_stiffness_keeps_it(outcomes: dict[str, tuple[int, str]], folder: Path) -> None:
     assert outcomes
     np.testing.assert_array_equal(stored(folder / "fixed.h5", "pretension"), [[0.1, 0.2, 0.3]] * 51)
 

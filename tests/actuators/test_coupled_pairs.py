@@ -24,9 +24,9 @@ RANGE = (290.0, 340.0)
 COUPLINGS = ("cubic", "polynomial", "sinh")
 
 
-def pair(coupling: SpringLaw | None, preload: str = "positive") -> Antagonistic:
+def pair(coupling: SpringLaw | None, branch: str = "positive") -> Antagonistic:
     return Antagonistic(
-        motor=(MOTOR, MOTOR), spring=(SAMPLES["cubic"].law,) * 2, coupling=coupling, preload=preload
+        motor=(MOTOR, MOTOR), spring=(SAMPLES["cubic"].law,) * 2, coupling=coupling, branch=branch
     )
 
 

@@ -12,10 +12,10 @@ from samples.drives import (
     Stopped,
     command,
     joint_with,
-    lower_by_preload,
+    lower_by_branch,
     motion,
     springs,
-    with_preload,
+    with_branch,
 )
 from samples.robots import vsa_3r
 
@@ -245,23 +245,23 @@ def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
     assert [check.flags({"phi": found["phi"]}).tolist() for check in held] == [[Flag.DEFLECTION_LIMIT]] * 2
 
 
-# The other preload
+# The other branch
 
 
-def test_other_preload_may_reach_less_stiffness_under_heavy_load():
+def test_other_branch_may_reach_less_stiffness_under_heavy_load():
     """Beyond the load at which the inner piece splits off, the two branches end at different folds."""
     unlike = springs(ALIKE, Cubic(k=440, k_c=2000))
     tau_e = np.array([100.0, 400.0])
-    lower = lower_by_preload(joint_with(unlike), tau_e)
+    lower = lower_by_branch(joint_with(unlike), tau_e)
     # Below that load both end at the only fold; a root finder each.
     assert lower["positive"][0] == pytest.approx(lower["negative"][0], rel=1e-14)
-    low, high = sorted(lower, key=lambda preload: lower[preload][1])
+    low, high = sorted(lower, key=lambda branch: lower[branch][1])
     between = np.array([0.99 * lower[low][0], (lower[low][1] + lower[high][1]) / 2])
-    for preload, expected in [(high, [False, True]), (low, [False, False])]:
-        actuator = with_preload(joint_with(unlike), preload).actuator
-        assert actuator.other_preload(tau_e, between, tau_e).tolist() == expected
+    for branch, expected in [(high, [False, True]), (low, [False, False])]:
+        actuator = with_branch(joint_with(unlike), branch).actuator
+        assert actuator.other_branch(tau_e, between, tau_e).tolist() == expected
 
 
-def test_other_preload_does_no_better_where_sides_are_alike():
+def test_other_branch_does_no_better_where_sides_are_alike():
     alike = springs(ALIKE, ALIKE)
-    assert not alike.other_preload(np.array([100.0]), np.array([810.0]), np.array([0.0])).any()
+    assert not alike.other_branch(np.array([100.0]), np.array([810.0]), np.array([0.0])).any()

@@ -110,14 +110,14 @@ def test_a_simulation_follows_the_command(vsacli: Run, options: tuple[str, ...],
     assert abs(joint["q_error"]["final"]) < final
 
 
-def test_a_soft_demand_is_told_and_mended(device: Device, vsacli: Run, tmp_path: Path) -> None:
+def test_a_soft_demand_is_told_and_fixed(device: Device, vsacli: Run, tmp_path: Path) -> None:
     unloaded = ok(vsacli("info", "arm.yaml", "--json"))["joints"][0]["stiffness_range"]["unloaded"]
     (tmp_path / "soft.yaml").write_text(TRAJECTORY.format(device.stiffness[0], 0.8 * unloaded[0]))
-    refused = vsacli("check-feasibility", "arm.yaml", "soft.yaml", "--suggest", "--json")
+    refused = vsacli("check-feasibility", "arm.yaml", "soft.yaml", "--fixes", "--json")
     assert refused.code == 3
     report = json.loads(refused.out)
     assert report["joints"][0]["worst"]["infeasible"]
-    assert report["suggestions"]
+    assert report["fixes"]
 
 
 @pytest.mark.slow

@@ -22,8 +22,8 @@ from vsacli.base.flags import Flag
 MOTORS = (Motor(inertia=0.2, damping=0.1), Motor(inertia=0.02, damping=0.05))
 
 
-def serial(first: str, second: str, preload: str = "positive") -> Serial:
-    cams = ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), preload=preload)
+def serial(first: str, second: str, branch: str = "positive") -> Serial:
+    cams = ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), branch=branch)
     return Serial(motor=MOTORS, mechanism=cams)
 
 
@@ -39,7 +39,7 @@ def drive_of(first: str, second: str) -> Drive:
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "preload", "stiffness"),
+    ("first", "second", "branch", "stiffness"),
     [
         ("cubic", "sinh", "positive", (290, 340)),
         ("table", "polynomial", "negative", (290, 340)),
@@ -47,9 +47,9 @@ def drive_of(first: str, second: str) -> Drive:
     ],
 )
 def test_unlike_cams_and_tendons_drive_the_full_model(
-    first: str, second: str, preload: str, stiffness: tuple[float, float]
+    first: str, second: str, branch: str, stiffness: tuple[float, float]
 ) -> None:
-    assert_follows(LINK, [serial(first, second, preload)], [drive_of(first, second)], [stiffness])
+    assert_follows(LINK, [serial(first, second, branch)], [drive_of(first, second)], [stiffness])
 
 
 @pytest.mark.slow
@@ -63,12 +63,12 @@ def test_an_arm_with_a_pair_and_cams_follows() -> None:
     assert_follows(ARM, [cams, pair, cams], [drive, of_pair, drive], [(290, 340)] * 3)
 
 
-@pytest.mark.parametrize("preload", ["positive", "negative"])
+@pytest.mark.parametrize("branch", ["positive", "negative"])
 @pytest.mark.parametrize("law", ["cubic", "sinh", "table", "four_bar"])
-def test_the_solution_is_that_of_the_pair(law: str, preload: str) -> None:
+def test_the_solution_is_that_of_the_pair(law: str, branch: str) -> None:
     spring = SPRINGS[law][0][0], SPRINGS[law][1][0]
-    pair = Antagonistic(motor=(MOTORS[0],) * 2, spring=spring, preload=preload)
-    cams = Serial(motor=MOTORS, mechanism=ShiftedCams(spring=spring, preload=preload))
+    pair = Antagonistic(motor=(MOTORS[0],) * 2, spring=spring, branch=branch)
+    cams = Serial(motor=MOTORS, mechanism=ShiftedCams(spring=spring, branch=branch))
     rng = np.random.default_rng(3)
     tau_e, stiffness, q = rng.uniform(-4, 4, 200), rng.uniform(20, 200, 200), rng.uniform(-2, 2, 200)
     one, other = (each.solve(tau_e, stiffness, q) for each in (pair, cams))
@@ -81,8 +81,8 @@ def test_the_solution_is_that_of_the_pair(law: str, preload: str) -> None:
     # where it vanishes it is the difference of equal numbers
     atol = 1e-12 * np.nanmax(np.abs(determinant))
     np.testing.assert_allclose(cams.determinant(other.deflections, q), -2 * determinant, rtol=1e-9, atol=atol)
-    expected = pair.other_preload(tau_e, stiffness, q)
-    np.testing.assert_array_equal(cams.other_preload(tau_e, stiffness, q), expected)
+    expected = pair.other_branch(tau_e, stiffness, q)
+    np.testing.assert_array_equal(cams.other_branch(tau_e, stiffness, q), expected)
 
 
 def test_signs_follow_from_the_potential() -> None:
@@ -121,17 +121,17 @@ def test_tendons_go_slack() -> None:
     assert np.isnan(result.theta[slack]).all()
 
 
-def test_like_cams_have_no_other_preload() -> None:
-    assert serial("cubic", "cubic").opposite_preload is None
-    assert serial("cubic", "sinh").opposite_preload == "negative"
-    assert serial("exponential", "exponential").opposite_preload is None
+def test_like_cams_have_no_other_branch() -> None:
+    assert serial("cubic", "cubic").opposite_branch is None
+    assert serial("cubic", "sinh").opposite_branch == "negative"
+    assert serial("exponential", "exponential").opposite_branch is None
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"spring": (Polynomial(c1=3),) * 2}, "spring: both are linear"),
-        ({"spring": (Exponential(c=1, a=2),) * 2, "preload": "negative"}, "preload: must be positive"),
+        ({"spring": (Exponential(c=1, a=2),) * 2, "branch": "negative"}, "branch: must be positive"),
         ({"spring": (Cubic(k=1, k_c=2, max_deflection=1),) * 2}, "max_deflection: is not known of a cam"),
     ],
 )

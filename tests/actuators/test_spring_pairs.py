@@ -97,10 +97,10 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
     refused = ~(gap >= -SINGULAR_MARGIN)
     elsewhere = (gap > 1e-3) & ~(error < 1e-6)
     # A finer scan knows better where the coarse one saw no turn.
-    for doubtful in (refused, elsewhere):
-        for index in np.flatnonzero(doubtful):
+    for unclear in (refused, elsewhere):
+        for index in np.flatnonzero(unclear):
             cut = slice(index, index + 1)
-            doubtful[index] = oracle.on_branch(tau_1[cut], tau_e[cut], nodes=20_000)[0]
+            unclear[index] = oracle.on_branch(tau_1[cut], tau_e[cut], nodes=20_000)[0]
     sure = (gap > 1e-3) & (error < 1e-6)
     return RoundTrip(
         draws=tau_e.size,
@@ -219,7 +219,7 @@ def test_absurd_demands_are_answered(first: Spring, second: Spring):
     assert np.all(np.isnan([found.phi_1[~carried], found.phi_2[~carried]]))
 
 
-# The other preload
+# The other branch
 
 
 TWO_SIDED = [
@@ -230,16 +230,16 @@ TWO_SIDED = [
 @pytest.mark.parametrize(
     ("first", "second"), [pair for _, pair in TWO_SIDED], ids=[name for name, _ in TWO_SIDED]
 )
-def test_negative_preload_is_the_branch_with_the_sides_exchanged(first: Spring, second: Spring):
+def test_negative_branch_is_the_branch_with_the_sides_exchanged(first: Spring, second: Spring):
     rng = np.random.default_rng(1)
     (law_1, curve_1), (law_2, curve_2) = first, second
     # Torques of opposite signs lie on the branch whatever the laws are.
     phi_1, phi_2 = (sign * np.abs(draw(rng, curve, 50)) for sign, curve in ((-1, curve_1), (1, curve_2)))
     tau_e = curve_1.torque(phi_1) + curve_2.torque(phi_2)
     stiffness = curve_1.stiffness(phi_1) + curve_2.stiffness(phi_2)
-    found = springs(law_1, law_2, preload="negative").solve(tau_e, stiffness, tau_e)
+    found = springs(law_1, law_2, branch="negative").solve(tau_e, stiffness, tau_e)
     regular = margin(stiffness, found.lower, found.upper) > 1e-3
-    # As for the positive preload.
+    # As for the positive branch.
     np.testing.assert_allclose(found.phi_1[regular], phi_1[regular], rtol=0, atol=1e-10)
     np.testing.assert_allclose(found.phi_2[regular], phi_2[regular], rtol=0, atol=1e-10)
     assert not np.any(has(reach_flags(stiffness, found), Flag.INFEASIBLE))

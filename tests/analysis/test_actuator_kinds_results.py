@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from samples.command_line import Outcome
 from samples.figures import Result, rest_to_rest
+from samples.fixes import written
 from samples.plants import elastic, rigid, with_actuators
-from samples.remedies import written
 from samples.robots import vsa_3r
 
 from vsacli.analysis.run import inverse_dynamics
@@ -29,8 +29,8 @@ from vsacli.results.plots import drawn as drawn_sheet
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.studies.search import suggest
-from vsacli.studies.search.suggestions import NotPossible, StiffnessOffset, StiffnessProfile
+from vsacli.studies.search import fixes
+from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset, StiffnessProfile
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -323,25 +323,25 @@ def test_nothing_is_followed_where_no_joint_is_antagonistic(motion: Trajectory) 
     assert inverse_dynamics(robot, motion, deflections=deflections).report.drifts == ()
 
 
-def test_a_suggested_profile_is_of_the_antagonistic_joint_alone(robot: Robot, tmp_path: Path) -> None:
+def test_the_profile_of_a_fix_is_of_the_antagonistic_joint_alone(robot: Robot, tmp_path: Path) -> None:
     soft = task(robot, tmp_path, ("end: {elbow: 1275}", "end: {elbow: 790}"))
-    found = suggest(robot, soft)
+    found = fixes(robot, soft)
     assert isinstance(found.stiffness_offset, StiffnessOffset)
     assert [offset.joint for offset in found.stiffness_offset.offsets] == ["elbow"]
     assert isinstance(found.stiffness_profile, StiffnessProfile)
-    (remedy,) = [each for each in found.remedies if each.stiffness_profile]
-    path, table = written(remedy, tmp_path / "fixed.yaml")
+    (fix,) = [each for each in found.fixes if each.stiffness_profile]
+    path, table = written(fix, tmp_path / "fixed.yaml")
     assert table.read_text().splitlines()[0] == "time,elbow.stiffness,elbow.dstiffness,elbow.ddstiffness"
     again = load_trajectory(path, robot)
     assert again.warnings == ()
     assert inverse_dynamics(robot, again).report.verdict == "ok"
 
 
-def test_no_stiffness_mends_an_elastic_joint(robot: Robot, motion: Trajectory) -> None:
+def test_no_stiffness_fixes_an_elastic_joint(robot: Robot, motion: Trajectory) -> None:
     base, shoulder, elbow = robot.joints
     weak = replace(shoulder.actuator, motor=replace(shoulder.actuator.motor, max_torque=10.0))
     weaker = replace(robot, joints=(base, replace(shoulder, actuator=weak), elbow))
-    found = suggest(weaker, motion)
+    found = fixes(weaker, motion)
     assert isinstance(found.stiffness_offset, NotPossible)
     assert found.stiffness_offset == found.stiffness_profile
     assert found.causes[0].text.endswith("no slower motion helps, and it has no stiffness to choose")

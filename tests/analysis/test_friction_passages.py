@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from samples.remedies import pendulum
+from samples.fixes import pendulum
 
 from vsacli import Robot, Trajectory, inverse_dynamics
 from vsacli.actuators.friction import Friction

@@ -1,4 +1,4 @@
-"""Motor torques along records with noise of many colours: right, or doubtful."""
+"""Motor torques along records with noise of many colours: right, or unreliable."""
 
 import numpy as np
 import pytest
@@ -22,8 +22,8 @@ def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(colour):
     for seed in (20, 21, 22):
         for each in outcomes("rest to rest, pauses", colour, seed, RATE):
             if each.arm == "softest":  # its torque is d4q, of which a record says no more than it can
-                assert each.verdict == "doubtful" or each.torque.size < 0.1, each
-            else:  # of 36 records errors were up to 1.4 %; of other draws than the first some are doubtful
+                assert each.verdict == "unreliable" or each.torque.size < 0.1, each
+            else:  # of 36 records errors were up to 1.4 %; of other draws than the first some are unreliable
                 assert each.verdict == "ok" or seed > 20, each
                 assert each.torque.size < 0.02, each
             covered += [] if np.isnan(each.torque.covered) else [each.torque.covered]
@@ -34,23 +34,23 @@ def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(colour):
 @pytest.mark.parametrize(
     "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
 )
-def test_torques_of_steps_of_velocity_are_right_or_doubtful(colour):
+def test_torques_of_steps_of_velocity_are_right_or_unreliable(colour):
     for each in outcomes("velocity steps, 50 ms", colour, 20, RATE):
-        assert each.verdict == "doubtful" or each.torque.size < 0.1, each
+        assert each.verdict == "unreliable" or each.torque.size < 0.1, each
         if each.arm == "elastic":
-            assert each.verdict == "doubtful"
+            assert each.verdict == "unreliable"
 
 
 @pytest.mark.parametrize(
     "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
 )
-def test_torques_of_minimum_jerk_are_right_or_doubtful(colour):
+def test_torques_of_minimum_jerk_are_right_or_unreliable(colour):
     for each in outcomes("minimum jerk", colour, 20, RATE):
-        assert each.verdict == "doubtful" or each.torque.size < 0.1, each
+        assert each.verdict == "unreliable" or each.torque.size < 0.1, each
 
 
 @pytest.mark.slow
-def test_a_simulation_along_a_doubtful_record_says_so():
+def test_a_simulation_along_an_unreliable_record_says_so():
     of = record(MOTIONS["velocity steps, 50 ms"], QUICK, 20, RATE)
     trajectory = Trajectory.from_samples(of.time, of.values[:, None])
     warnings = simulate(ARMS["elastic"], trajectory).report.warnings

@@ -33,7 +33,7 @@ QUIET = JointReport(
     peak_tau_motor=(98.871, 91.635),
     start_theta=(0.0727618, -0.0551276),
     torque_step=(0.35, 0.42),
-    other_preload=False,
+    other_branch=False,
     energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
     start_dtheta=(0.0, 0.0),
     end_theta=(-0.8426, -1.2396),
@@ -166,7 +166,7 @@ def test_run_that_ended_early_says_so():
     assert headline.startswith("vsa-3r, rest-to-rest: 1 step, 4 s planned, stopped early ")
 
 
-def test_infeasible_stiffness_names_time_bound_and_remedy():
+def test_infeasible_stiffness_names_time_bound_and_fix():
     assert sentence(too_soft(790, 803.1)) == (
         "elbow: stiffness 790 N m/rad at t = 4.000 s is below the 803.1 its load allows, raise it "
         "(412 steps, from 3.588 s)"
@@ -202,9 +202,7 @@ def test_torque_that_cannot_be_carried_has_no_bound():
 
 
 def test_what_else_would_help_is_said():
-    assert sentence(too_soft(790, 803.1, other_preload=True)).endswith(
-        "; the opposite preload would reach it"
-    )
+    assert sentence(too_soft(790, 803.1, other_branch=True)).endswith("; the opposite branch reaches it")
     slack = too_soft(790, 803.1)
     slack = replace(slack, steps={**slack.steps, "slack": 7})
     assert sentence(slack).endswith("; a tendon goes slack at 7 steps")

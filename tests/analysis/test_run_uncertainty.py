@@ -28,7 +28,7 @@ SPAN = (0.0, 2.0)
 AMPLITUDE = 0.3
 
 
-def swinging(deviations, *, stiffness=1500.0, doubtful=(0.0, 0.0), known=True):
+def swinging(deviations, *, stiffness=1500.0, unreliable=(0.0, 0.0), known=True):
     """Three joints that swing by `AMPLITUDE`; deviations of q to d4q, each joint's alike."""
     sines = Sinusoids(
         signal=POSITION,
@@ -42,7 +42,7 @@ def swinging(deviations, *, stiffness=1500.0, doubtful=(0.0, 0.0), known=True):
     if not known:
         covariances[2] = np.nan
     firm = Constant(signal=STIFFNESS, span=SPAN, value=(stiffness,) * 3)
-    position = Blurred(sines, covariances, doubtful=doubtful)
+    position = Blurred(sines, covariances, unreliable=unreliable)
     return Trajectory(UniformTimes(SPAN[1], 500.0), position, {"stiffness": firm}, name="swing")
 
 
@@ -126,11 +126,11 @@ def test_the_allowance_of_a_one_sided_limit_is_a_share_of_the_bound():
     assert check.allowance({}) == 0
 
 
-def test_torques_that_are_not_determined_make_a_run_doubtful():
+def test_torques_that_are_not_determined_make_a_run_unreliable():
     report = inverse_dynamics(vsa_3r(), swinging(SHAKY)).report
-    assert report.verdict == "doubtful"
+    assert report.verdict == "unreliable"
     text = str(report).splitlines()
-    assert text[0].endswith("DOUBTFUL (3 of 3 joints)")
+    assert text[0].endswith("UNRELIABLE (3 of 3 joints)")
     assert any(
         line.startswith("elbow: tau_motor is not determined by the record: it may be wrong by ")
         and line.endswith(" N m; 10 % is allowed")
@@ -147,18 +147,18 @@ def test_it_is_what_was_asked_for_that_must_be_determined():
         assert sum(len(block.time) for block in run) == 1001
         return run.report().verdict
 
-    assert verdict("tau_motor") == "doubtful"
-    assert verdict("ddtheta") == "doubtful"  # has no deviation of its own
-    assert verdict("d4q_std") == "doubtful"
+    assert verdict("tau_motor") == "unreliable"
+    assert verdict("ddtheta") == "unreliable"  # has no deviation of its own
+    assert verdict("d4q_std") == "unreliable"
     assert verdict("q", "tau_e") == "ok"
     assert verdict("flags", "stiffness") == "ok"
     assert judged_variables(["flags"], limited(velocity=2.0)) == ("dq", "tau_e")
     assert judged_variables(["motor_energy", "q", "time"], vsa_3r()) == ("q", "tau_motor")
 
 
-def test_a_component_that_is_not_determined_makes_doubtful_what_depends_on_it():
+def test_a_component_that_is_not_determined_makes_unreliable_what_depends_on_it():
     report = inverse_dynamics(vsa_3r(), swinging(STEADY, known=False)).report
-    assert report.verdict == "doubtful"
+    assert report.verdict == "unreliable"
     assert str(report).count("is not determined by the record, since a signal") == 3
     assert report.as_json()["joints"][0]["uncertainty"]["variables"]["tau_motor"]["rms"] is None
     run = Run(vsa_3r(), swinging(STEADY, known=False), asked=["q"])
@@ -166,7 +166,7 @@ def test_a_component_that_is_not_determined_makes_doubtful_what_depends_on_it():
     assert [bool(joint.uncertainty.undetermined) for joint in run.report().joints] == [False, False, True]
 
 
-@pytest.mark.parametrize(("deviations", "verdict"), [(STEADY, "ok"), (SHAKY, "doubtful")])
+@pytest.mark.parametrize(("deviations", "verdict"), [(STEADY, "ok"), (SHAKY, "unreliable")])
 def test_a_bound_decides_without_being_stated(deviations, verdict):
     trajectory = swinging(deviations)
     position = dataclasses.replace(trajectory.position, known=False)
@@ -185,7 +185,7 @@ def test_a_bound_decides_without_being_stated(deviations, verdict):
     assert result.report.joints[0].uncertainty.limits == {}  # no deviation to allow for
 
 
-def test_the_doubtful_ends_of_a_record_do_not_count():
+def test_the_unreliable_ends_of_a_record_do_not_count():
     @dataclasses.dataclass(frozen=True)
     class Frayed(Blurred):
         def covariance(self, time):
@@ -194,15 +194,15 @@ def test_the_doubtful_ends_of_a_record_do_not_count():
             return found
 
     steady = swinging(STEADY).position
-    position = Frayed(steady.exact, steady.covariances, doubtful=(0.21, 0.11))
+    position = Frayed(steady.exact, steady.covariances, unreliable=(0.21, 0.11))
     ends = Trajectory(UniformTimes(SPAN[1], 500.0), position, swinging(STEADY).commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), ends).report.verdict == "ok"
-    assert "doubtful end" not in str(inverse_dynamics(vsa_3r(), ends).report)
-    shorter = dataclasses.replace(position, doubtful=(0.19, 0.11))
+    assert "unreliable end" not in str(inverse_dynamics(vsa_3r(), ends).report)
+    shorter = dataclasses.replace(position, unreliable=(0.19, 0.11))
     cut = Trajectory(ends.times, shorter, ends.commanded, name="frayed")
-    assert inverse_dynamics(vsa_3r(), cut).report.verdict == "doubtful"
+    assert inverse_dynamics(vsa_3r(), cut).report.verdict == "unreliable"
     # where they overlap, the half in the middle counts
-    few = dataclasses.replace(position, doubtful=(1.5, 1.5))
+    few = dataclasses.replace(position, unreliable=(1.5, 1.5))
     half = Trajectory(ends.times, few, ends.commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), half).report.verdict == "ok"
 
@@ -219,11 +219,11 @@ def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible
     assert surer.uncertainty.steps["infeasible"] < within
 
 
-def test_doubtful_is_worse_than_infeasible():
-    assert VERDICTS.index("infeasible") < VERDICTS.index("doubtful") < VERDICTS.index("self_check_failed")
+def test_unreliable_is_worse_than_infeasible():
+    assert VERDICTS.index("infeasible") < VERDICTS.index("unreliable") < VERDICTS.index("self_check_failed")
     both = inverse_dynamics(vsa_3r(), swinging(SHAKY, stiffness=802.0)).report
     assert both.joints[0].steps["infeasible"]
-    assert both.verdict == "doubtful"
+    assert both.verdict == "unreliable"
 
 
 def test_a_spread_that_is_not_a_number_determines_nothing():

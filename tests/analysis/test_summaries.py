@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.drives import Stopped, lower_by_preload, motion, springs, with_joint, with_preload
+from samples.drives import Stopped, lower_by_branch, motion, springs, with_branch, with_joint
 from samples.robots import vsa_3r
 from samples.shipped import shipped_robot
 
@@ -172,22 +172,22 @@ def test_end_of_a_run_that_stopped_early_is_unknown():
         assert np.isnan(joint.end_dtheta).all()
 
 
-def test_report_names_the_other_preload_if_it_does_for_every_step():
+def test_report_names_the_other_branch_if_it_does_for_every_step():
     """Springs a hundred times too soft for the elbow, so that its load is beyond where the branches part."""
     weak = dataclasses.replace(vsa_3r().joints[2], actuator=springs(Cubic(k=4, k_c=20), Cubic(k=4.4, k_c=20)))
     tau_e = inverse_dynamics(vsa_3r(), motion()).tau_e[:, 2]
-    lower = lower_by_preload(weak, tau_e)
-    low, high = sorted(lower, key=lambda preload: lower[preload].max())
+    lower = lower_by_branch(weak, tau_e)
+    low, high = sorted(lower, key=lambda branch: lower[branch].max())
     stiffness = float(lower[low].max() + lower[high].max()) / 2
-    for preload, asked, infeasible, other in [
+    for branch, asked, infeasible, other in [
         (high, stiffness, True, True),
         (low, stiffness, False, False),
         (high, 0.999 * float(lower[low].max()), True, False),
     ]:
-        robot = with_joint(vsa_3r(), 2, with_preload(weak, preload))
+        robot = with_joint(vsa_3r(), 2, with_branch(weak, branch))
         report = inverse_dynamics(robot, motion(stiffness=(850.0, 850.0, asked))).report.joints[2]
         assert (report.steps["infeasible"] > 0) == infeasible
-        assert report.other_preload == other
+        assert report.other_branch == other
 
 
 def test_stop_on_infeasible_ends_with_the_first_infeasible_step():

@@ -111,7 +111,7 @@ def of_motions(found: Found) -> Iterator[str]:
         for arm in ARMS:
             runs = [each for each in of_motion if each.arm == arm]
             if runs:
-                doubted = [each.verdict == "doubtful" for each in runs]
+                doubted = [each.verdict == "unreliable" for each in runs]
                 yield f"| {motion} | {arm} | {judged([each.torque.size for each in runs], doubted)} |"
         runs = of_motion[:: len(ARMS)]
         if runs:
@@ -130,8 +130,8 @@ def of_colours(found: Found) -> Iterator[str]:
         errors = [[each.fourth for each in runs[:: len(ARMS)]]]
         errors += [[each.torque for each in runs if each.arm == arm] for arm in ARMS]
         smooth = [each for of, each in rows if of.motion in SMOOTH]
-        right = [each.verdict != "doubtful" for each in smooth if each.torque.size < FALSE]
-        wrong = sum(each.verdict != "doubtful" and each.torque.size > ALLOWED for each in runs)
+        right = [each.verdict != "unreliable" for each in smooth if each.torque.size < FALSE]
+        wrong = sum(each.verdict != "unreliable" and each.torque.size > ALLOWED for each in runs)
         yield f"| {colour} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
 
 

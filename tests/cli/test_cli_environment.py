@@ -110,7 +110,7 @@ def no_room() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
 
-@pytest.mark.parametrize("command", ["check-feasibility", slow("check-feasibility --suggest")])
+@pytest.mark.parametrize("command", ["check-feasibility", slow("check-feasibility --fixes")])
 def test_the_report_needs_no_disk(command: str, report: str, tmp_path: Path) -> None:
     arguments = (*EXAMPLE, *command.split()[1:])
     code, out, err = run(*arguments, folder=tmp_path, preexec_fn=no_room)

@@ -1,4 +1,4 @@
-"""`vsacli check-feasibility --write-fixed`: causes, fixes of some joints, transitions, text that is kept."""
+"""`vsacli check-feasibility --write-fix`: causes, fixes of some joints, transitions, text that is kept."""
 
 from __future__ import annotations
 
@@ -84,15 +84,15 @@ def robot_with(folder, **limits):
 
 
 def written(vsacli, robot, task, text, kind):
-    """The suggestion that takes one kind of change alone, and the file with it."""
+    """The fix that takes one kind of change alone, and the file with it."""
     task.write_text(text)
-    found = json.loads(vsacli("check-feasibility", robot, task, "--suggest", "--json").out)["suggestions"]
+    found = json.loads(vsacli("check-feasibility", robot, task, "--fixes", "--json").out)["fixes"]
     numbers = [
-        number for number, each in enumerate(found["remedies"], 1) if each.keys() == {"size", kind, "text"}
+        number for number, each in enumerate(found["fixes"], 1) if each.keys() == {"size", kind, "text"}
     ]
-    done = vsacli("check-feasibility", robot, task, "--write-fixed", "fixed.yaml", "--remedy", numbers[0])
+    done = vsacli("check-feasibility", robot, task, "--write-fix", numbers[0], "-o", "fixed.yaml")
     assert done.code == 3, done.err
-    return found["remedies"][numbers[0] - 1]["text"], (task.parent / "fixed.yaml").read_text()
+    return found["fixes"][numbers[0] - 1]["text"], (task.parent / "fixed.yaml").read_text()
 
 
 def test_values_change_where_they_stand(tmp_path, vsacli):
@@ -143,19 +143,19 @@ def test_a_slower_recording_keeps_its_rate_over_whole_periods(
             f"format: vsacli-trajectory/1\nname: fast\nrate: {asked}\n"
             "position: {type: csv, file: fast.csv}\nstiffness: {type: csv, file: fast.csv}\n"
         )
-    done = vsacli("check-feasibility", ROBOT, task, "--suggest", "--json")
-    remedies = json.loads(done.out)["suggestions"]["remedies"]
-    slower = [number for number, each in enumerate(remedies, 1) if "slow_down" in each]
-    assert {"slow_down", "stiffness_offset"} <= {key for number in slower for key in remedies[number - 1]}
+    done = vsacli("check-feasibility", ROBOT, task, "--fixes", "--json")
+    fixes = json.loads(done.out)["fixes"]["fixes"]
+    slower = [number for number, each in enumerate(fixes, 1) if "slow_down" in each]
+    assert {"slow_down", "stiffness_offset"} <= {key for number in slower for key in fixes[number - 1]}
     for number in slower:
-        written = ("--write-fixed", f"fixed-{number}.yaml", "--remedy", number)
+        written = ("--write-fix", number, "-o", f"fixed-{number}.yaml")
         assert vsacli("check-feasibility", ROBOT, task, *written).code == 3
         assert vsacli("check-feasibility", ROBOT, f"fixed-{number}.yaml").code == 0
         assert vsacli("invdyn", ROBOT, f"fixed-{number}.yaml", "-o", f"fixed-{number}.h5").code == 0
         export = vsacli("export", f"fixed-{number}.h5", "--rate", rate, "-o", f"fixed-{number}.csv.gz")
         assert export.code == 0, export.err
         trajectory = load_trajectory(tmp_path / f"fixed-{number}.yaml", load_robot(ROBOT))
-        periods = remedies[number - 1]["slow_down"]["duration"] * rate
+        periods = fixes[number - 1]["slow_down"]["duration"] * rate
         assert periods == pytest.approx(round(periods), abs=1e-6)
         assert trajectory.samples == round(periods) + 1
         if not asked:  # then a changed stiffness makes known steps of it
@@ -180,7 +180,7 @@ def test_another_profile_leaves_the_rest_of_the_file(tmp_path, vsacli):
 def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli):
     robot = robot_with(tmp_path, shoulder=2)
     (tmp_path / "fast.yaml").write_text(FAST)
-    done = vsacli("check-feasibility", robot, "fast.yaml", "--write-fixed", "fixed.yaml")
+    done = vsacli("check-feasibility", robot, "fast.yaml", "--write-fix", 1, "-o", "fixed.yaml")
     text = done.out.partition("self-check passed")[2]
     _, base, shoulder, heading, *fixes = text.splitlines()
     assert base.startswith("base: stiffness is 850 N m/rad at t = 0.12")
@@ -191,7 +191,7 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     assert ", since with 827.7 N m/rad, the least it may have, joint-side torque of motor 1 is " in shoulder
     assert shoulder.endswith(" s, above its limit of 2")
     assert heading.startswith(
-        "suggestions, with any one of which every step of all joints but shoulder has a margin"
+        "fixes, with any one of which every step of all joints but shoulder has a margin"
     )
     assert fixes
     trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
@@ -206,8 +206,8 @@ def test_what_helps_at_rest_is_said(tmp_path, vsacli):
     robot = robot_with(tmp_path, base=20)
     task = tmp_path / "slow.yaml"
     task.write_text(FAST.replace("0.45", "4"))
-    done = vsacli("check-feasibility", robot, task, "--suggest", "--json")
-    (cause,) = json.loads(done.out)["suggestions"]["causes"]
+    done = vsacli("check-feasibility", robot, task, "--fixes", "--json")
+    (cause,) = json.loads(done.out)["fixes"]["causes"]
     what, helps = cause["text"].rsplit(": ", 1)
     assert what.endswith("at t = 0.000 s, even at rest, above its limit of 20")
     assert helps.startswith("no slower motion helps, a stiffness of at most ")

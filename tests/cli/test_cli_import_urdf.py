@@ -118,7 +118,7 @@ def test_a_snapped_axis_is_reported(vsacli, tmp_path):
     assert "axis of j2" not in vsacli("import-urdf", "arm.urdf", "--snap", "1e-6", "--overwrite").out
 
 
-def test_doubtful_links_are_reported(vsacli, tmp_path):
+def test_implausible_links_are_reported(vsacli, tmp_path):
     text = robot(link("a"), link("b", ""), link("c"), joint("turn", "a", "b"), joint("nod", "b", "c"))
     write(tmp_path / "arm.urdf", text)
     assert "warning: link of joint turn: its mass is zero" in vsacli("import-urdf", "arm.urdf").out

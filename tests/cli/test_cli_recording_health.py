@@ -1,4 +1,4 @@
-"""What a recording lacks is said by every command that reads it: file, line, column, time, remedy."""
+"""What a recording lacks is said by every command that reads it: file, line, column, time, fix."""
 
 from __future__ import annotations
 

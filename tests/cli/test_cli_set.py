@@ -196,5 +196,7 @@ def test_a_table_has_nothing_to_set_but_a_rate(vsacli: Any, motion: Path) -> Non
 
 
 def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None:
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--set", "duration=3", "--write-fixed", "f.yaml")
+    done = vsacli(
+        "check-feasibility", ROBOT, too_soft, "--set", "duration=3", "--write-fix", 1, "-o", "f.yaml"
+    )
     assert (done.code, "change them instead" in done.err) == (2, True)

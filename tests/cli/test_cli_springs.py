@@ -114,9 +114,9 @@ def test_generated_code_agrees(joint, tmp_path):
 def test_a_tendon_that_would_push_says_so(joint, tmp_path):
     vsacli, _ = joint
     (tmp_path / "over.yaml").write_text(MOVE.replace("60 deg", "100 deg"))
-    refused = vsacli("check-feasibility", "elbow.yaml", "over.yaml", "--suggest")
+    refused = vsacli("check-feasibility", "elbow.yaml", "over.yaml", "--fixes")
     assert refused.code == 3
     assert "is below the 0 that its spring carries" in refused.out
     assert "a tendon goes slack at" in refused.out
-    assert "preload" not in refused.out
+    assert "branch" not in refused.out
     assert "no stiffness to choose" in refused.out

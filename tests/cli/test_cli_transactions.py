@@ -50,7 +50,8 @@ TASKS = {
     "invdyn": Task(("invdyn", ROBOT, "move.yaml", "-o", "r.h5")),
     "invdyn --plot": Task(("invdyn", ROBOT, "move.yaml", "-o", "r.h5", "--plot", "figures/all")),
     "check-feasibility": Task(
-        ("check-feasibility", ROBOT, "soft.yaml", "--plot", "figures", "--write-fixed", "mended.yaml"), 3
+        ("check-feasibility", ROBOT, "soft.yaml", "--plot", "figures", "--write-fix", 1, "-o", "fixed.yaml"),
+        3,
     ),
     "simulate": Task(("simulate", ROBOT, "move.yaml", "-o", "s.h5", "--budget", "300", "-q"), 3),
     "codegen": Task(("codegen", ROBOT, "-o", "code")),

@@ -31,7 +31,7 @@ Command = Callable[..., Outcome]
 
 @pytest.fixture
 def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder that commands run in; whatever is made beside it has strayed."""
+    """The folder that commands run in; a file next to it was written to the wrong place."""
     folder = tmp_path / "work"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -127,7 +127,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("info", "MOVE", "--robot", "ROBOT"),
     ("invdyn", "ROBOT", "MOVE", "-o", "RESULT"),
     ("invdyn", "ROBOT", "MOVE", "--variables", "flags"),
-    ("check-feasibility", "ROBOT", "SOFT", "--write-fixed", "OUT/fixed.yaml"),
+    ("check-feasibility", "ROBOT", "SOFT", "--write-fix", "1", "-o", "OUT/fixed.yaml"),
     ("validate", "ROBOT", "OUT/fixed.yaml"),
     ("simulate", "ROBOT", "MOVE", "-o", "OUT/s.h5", "--budget", "60"),
     ("codegen", "ROBOT", "-o", "OUT/code"),

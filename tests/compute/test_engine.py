@@ -117,11 +117,11 @@ def test_measured_springs_agree():
 
 
 @pytest.mark.usefixtures("quickly")
-def test_other_preload_and_followed_deflections_agree():
+def test_other_branch_and_followed_deflections_agree():
     robot = one_joint(ALIKE, ALIKE)
     actuator = robot.joints[0].actuator
     assert isinstance(actuator, Antagonistic)
-    turned = Robot(name="turned", joints=(joint_with(replace(actuator, preload="negative")),))
+    turned = Robot(name="turned", joints=(joint_with(replace(actuator, branch="negative")),))
     motion = demands(turned, SAMPLES)
     expected = compute_block(turned, motion)
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)

@@ -99,7 +99,7 @@ def test_folder_that_cannot_be_made(tmp_path: Path):
 def test_folder_that_others_may_write_to_is_not_trusted(folder: Path):
     warnings()
     folder.chmod(0o777)
-    expected = f"the cache folder {folder} can be written by others; `chmod go-w {folder}` mends that"
+    expected = f"the cache folder {folder} can be written by others; `chmod go-w {folder}` fixes that"
     assert warnings() == (f"{expected}; compiled code is not kept",)
 
 

@@ -1,4 +1,4 @@
-"""Where a simulated robot ends: how far off it may be, and what the report says of runs that strayed."""
+"""Where a simulated robot ends: how far off it may be, and the report on runs that end off target."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def drifted(size, excess, joint_type="revolute"):
 @pytest.mark.parametrize("size", [1.5, -1.5])
 @pytest.mark.parametrize(
     ("excess", "verdict"),
-    [(0.0105, "ok"), (0.0108, "strayed")],  # 1 % of 1.5 rad and 1e-3 rad are 1.0667 % of 1.5 rad
+    [(0.0105, "ok"), (0.0108, "off_target")],  # 1 % of 1.5 rad and 1e-3 rad are 1.0667 % of 1.5 rad
 )
 def test_a_drift_in_closed_form_strays_beyond_the_tolerance(size, excess, verdict):
     report = drifted(size, excess).report
@@ -37,7 +37,7 @@ def test_a_drift_in_closed_form_strays_beyond_the_tolerance(size, excess, verdic
     assert axis.q.final == pytest.approx(excess * size, rel=1e-7)  # tolerances of the integration
     assert axis.tolerance == pytest.approx(0.016, rel=1e-12)
     assert report.verdict == verdict
-    assert ("at the end q is" in str(report)) == (verdict == "strayed")
+    assert ("at the end q is" in str(report)) == (verdict == "off_target")
 
 
 def test_the_headline_has_the_largest_error_on_the_way():
@@ -55,12 +55,12 @@ def test_the_headline_has_the_largest_error_on_the_way():
 
 def test_a_prismatic_joint_strays_in_metres():
     report = drifted(0.3, 0.05, "prismatic").report
-    assert report.verdict == "strayed"
+    assert report.verdict == "off_target"
     assert "axis: at the end q is 0.015 m off the command, more than the tolerance of 0.004 m" in str(report)
     assert "q off by up to 0.015 m (axis, t = 1.000 s)" in str(report)
 
 
-@pytest.mark.parametrize(("error", "verdict"), [(0.9e-3, "ok"), (1.1e-3, "strayed")])
+@pytest.mark.parametrize(("error", "verdict"), [(0.9e-3, "ok"), (1.1e-3, "off_target")])
 def test_a_joint_that_is_to_hold_still_may_be_a_milliradian_off(error, verdict):
     """No force acts on it: it stays where it starts."""
     report = simulate(rigid_joint(2.0), step_of(0.0), initial_error=InitialError(error)).report
@@ -73,18 +73,18 @@ def test_an_error_of_exactly_the_tolerance_has_arrived():
     error = InitialError([0, 0, 0.01])
     joints = simulate(vsa_3r(), short_motion(3), initial_error=error).report.joints
     size = max(abs(joint.q.final) for joint in joints)
-    for tolerance, verdict in ((size, "ok"), (math.nextafter(size, 0), "strayed")):
+    for tolerance, verdict in ((size, "ok"), (math.nextafter(size, 0), "off_target")):
         goal = GoalTolerance(share=0.0, absolute=tolerance)
         report = simulate(vsa_3r(), short_motion(3), initial_error=error, goal_tolerance=goal).report
         assert report.verdict == verdict
 
 
 def test_straying_of_an_exact_run_is_blamed_on_the_integration():
-    blame = "so what strayed are the errors of the integration"
+    blame = "so the run ends off target by errors of the integration"
     tight = GoalTolerance(share=0.0, absolute=1e-15)
     assert blame in "".join(simulate(vsa_3r(), short_motion(3), goal_tolerance=tight).report.warnings)
     off = simulate(vsa_3r(), short_motion(3), goal_tolerance=tight, initial_error=InitialError(0.01)).report
-    assert off.verdict == "strayed"
+    assert off.verdict == "off_target"
     assert not off.warnings
 
 

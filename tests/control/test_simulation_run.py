@@ -53,7 +53,7 @@ def test_motors_saturate():
     assert flagged.any()
     assert np.array_equal(flagged, beyond.any(axis=1))
     assert base.steps_over_limit == flagged.sum()
-    assert simulation.report.verdict == "strayed"  # without the torque asked for; worse than a limit
+    assert simulation.report.verdict == "off_target"  # without the torque asked for; worse than a limit
     worst = base.worst["motor_torque_limit"]
     assert abs(worst.bound) == limit
     assert abs(worst.value) == np.abs(past.tau_motor[:, 0]).max()

@@ -62,7 +62,7 @@ def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(st
     exact = centre - MOTOR_INERTIA * deflection / whole
     # two hundred steps with local errors of 1e-9
     assert simulation.history.q_actual[:, 0] == pytest.approx(exact, abs=1e-8)
-    assert simulation.report.verdict == "strayed"
+    assert simulation.report.verdict == "off_target"
 
 
 def test_poles_of_a_million_hold_a_rigid_joint_on_its_command():

@@ -15,7 +15,7 @@ joints:
       type: antagonistic          # two motors
       spring: {type: table, file: left.csv}
   - name: elbow
-    actuator: {type: antagonistic, preload: positive}    # in one line
+    actuator: {type: antagonistic, branch: positive}    # in one line
   - {name: tip, actuator: &same {type: antagonistic}}
   - {name: hand, actuator: *same}
 """
@@ -30,15 +30,15 @@ def changed_lines(path: str, value: str) -> list[str]:
     ("path", "value", "lines"),
     [
         (
-            "joints.1.actuator.preload",
+            "joints.1.actuator.branch",
             "negative",
-            ["    actuator: {type: antagonistic, preload: negative}    # in one line"],
+            ["    actuator: {type: antagonistic, branch: negative}    # in one line"],
         ),
-        ("joints.0.actuator.preload", "negative", ["      preload: negative"]),
+        ("joints.0.actuator.branch", "negative", ["      branch: negative"]),
         (
-            "joints.2.actuator.preload",
+            "joints.2.actuator.branch",
             "negative",
-            ["  - {name: tip, actuator: &same {preload: negative, type: antagonistic}}"],
+            ["  - {name: tip, actuator: &same {branch: negative, type: antagonistic}}"],
         ),
         (
             "joints.0.actuator.spring.file",
@@ -53,16 +53,16 @@ def test_one_value_changes(path: str, value: str, lines: list[str]) -> None:
 
 
 def test_several_values_at_once() -> None:
-    again = edited(TEXT, {"joints.1.actuator.preload": "negative", "joints.0.name": "foot"})
-    assert again == TEXT.replace("name: base", "name: foot").replace("preload: positive", "preload: negative")
+    again = edited(TEXT, {"joints.1.actuator.branch": "negative", "joints.0.name": "foot"})
+    assert again == TEXT.replace("name: base", "name: foot").replace("branch: positive", "branch: negative")
 
 
 @pytest.mark.parametrize(
     ("path", "reason"),
     [
-        ("joints.3.actuator.preload", "'actuator' is an alias, which others share"),
-        ("joints.7.actuator.preload", "there is no '7'"),
-        ("joints.0.name.preload", "there is no 'preload'"),
+        ("joints.3.actuator.branch", "'actuator' is an alias, which others share"),
+        ("joints.7.actuator.branch", "there is no '7'"),
+        ("joints.0.name.branch", "there is no 'branch'"),
     ],
 )
 def test_what_cannot_be_changed(path: str, reason: str) -> None:
@@ -72,4 +72,4 @@ def test_what_cannot_be_changed(path: str, reason: str) -> None:
 
 def test_texts_under_a_key_are_found() -> None:
     assert list(texts_at(TEXT, "file")) == [("joints.0.actuator.spring.file", "left.csv")]
-    assert [path for path, _ in texts_at(TEXT, "preload")] == ["joints.1.actuator.preload"]
+    assert [path for path, _ in texts_at(TEXT, "branch")] == ["joints.1.actuator.branch"]

@@ -186,7 +186,7 @@ def test_values_per_joint() -> None:
         ("joints.elbow.link.mass", math.inf, "joints.elbow.link.mass: expected a number in kg, found 'inf'"),
         ("joints.elbow.name", "a b", "joints.elbow.name: must be made of letters"),
         ("joints.elbow.name", "base", "joints.2.name: 'base' is taken by another entry; each needs its own"),
-        ("joints.0.actuator.preload", "up", "joints.0.actuator.preload: unknown word 'up'; valid: positive"),
+        ("joints.0.actuator.branch", "up", "joints.0.actuator.branch: unknown word 'up'; valid: positive"),
         (
             "joints.0.actuator.spring",
             {"type": "cubic", "k": 1, "kc": 2},

@@ -43,16 +43,16 @@ AGREEMENT = 1e-9
 """Of a variable's peak: what is asked for. The margins stay above 1 %, where eps/margin is 2e-14."""
 
 
-def unlike(preloads: tuple[str, ...]) -> tuple[Robot, Trajectory]:
+def unlike(branches: tuple[str, ...]) -> tuple[Robot, Trajectory]:
     """The 3R arm with springs and motors that differ between the sides, more from joint to joint."""
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     actuators = [
         Antagonistic(
             motor=(Motor(inertia=3.2, damping=0.1), Motor(inertia=2.5 - 0.5 * index, damping=0.3)),
             spring=(Cubic(k=400, k_c=2000), Cubic(k=420 - 60 * index, k_c=2500 + 4000 * index)),
-            preload=preload,
+            branch=branch,
         )
-        for index, preload in enumerate(preloads)
+        for index, branch in enumerate(branches)
     ]
     joints = tuple(
         dataclasses.replace(joint, actuator=actuator)
@@ -67,7 +67,7 @@ CASES = {
     "7R": lambda: shipped_run("lwr_7r_vsa", "lwr_7r"),
     "R-P": lambda: shipped_run("rp_2", "rp_2"),
     "sides differ": lambda: unlike(("positive", "positive", "positive")),
-    "preload negative": lambda: unlike(("negative", "positive", "negative")),
+    "branch negative": lambda: unlike(("negative", "positive", "negative")),
 }
 
 
@@ -83,11 +83,11 @@ def sides_of(joint: Joint) -> tuple[Side, Side]:
 
 def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> Iterator[Actuation]:
     """One sample after the other, from the motion, the stiffness and the link torque."""
-    preload = 1 if joint.actuator.preload == "positive" else -1
+    branch = 1 if joint.actuator.branch == "positive" else -1
     for step in steps:
         of_step = {name: float(getattr(result, name)[step, index]) for name in GIVEN}
         yield actuation(
-            Curve(sides_of(joint), of_step["tau_e"], preload),
+            Curve(sides_of(joint), of_step["tau_e"], branch),
             (of_step["q"], of_step["dq"], of_step["ddq"]),
             (of_step["stiffness"], of_step["dstiffness"], of_step["ddstiffness"]),
             (of_step["dtau_e"], of_step["ddtau_e"]),
@@ -112,17 +112,17 @@ def test_motors_do_what_a_scalar_recomputation_says(case: str):
         np.testing.assert_allclose(result.stiffness_lower[steps, index], lower, rtol=AGREEMENT)
 
 
-def test_preload_selects_the_side_that_is_stretched():
-    result = inverse_dynamics(*CASES["preload negative"]())
+def test_branch_selects_the_side_that_is_stretched():
+    result = inverse_dynamics(*CASES["branch negative"]())
     wider = result.phi[:, :, 0] - result.phi[:, :, 1]
     assert np.all(wider[:, 1] > 0)
     assert np.all(wider[:, [0, 2]] < 0)
 
 
-def test_opposite_preload_of_alike_sides_swaps_the_motors():
+def test_opposite_branch_of_alike_sides_swaps_the_motors():
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     joints = tuple(
-        dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, preload="negative"))
+        dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, branch="negative"))
         for joint in robot.joints
     )
     result = inverse_dynamics(robot, trajectory)

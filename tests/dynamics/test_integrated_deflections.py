@@ -36,9 +36,9 @@ TORQUE_AGREEMENT = 1e-9
 """Of the peak motor torque: a drift of 1e-11, which A^-1 magnifies up to a hundredfold at a margin of 3 %."""
 
 
-def unlike(preload: str) -> tuple[Robot, Trajectory]:
+def unlike(branch: str) -> tuple[Robot, Trajectory]:
     """The arm with a shoulder whose springs differ."""
-    actuator = springs(Cubic(k=400, k_c=2000), Cubic(k=360, k_c=6000), preload)
+    actuator = springs(Cubic(k=400, k_c=2000), Cubic(k=360, k_c=6000), branch)
     return with_joint(ARM, 1, joint_with(actuator)), motion(end=(1275.0, 1275.0))
 
 
@@ -61,7 +61,7 @@ CASES = {
     "3R soft": lambda: shipped_run("vsa_3r", "rest_to_rest_soft"),
     "R-P": lambda: shipped_run("rp_2", "rp_2"),
     "sides differ": lambda: unlike("positive"),
-    "preload negative": lambda: unlike("negative"),
+    "branch negative": lambda: unlike("negative"),
     "tendons": tendons,
 }
 

@@ -83,7 +83,7 @@ def test_report_says_when_and_why(touching: Result):
 def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Result):
     base = touching.report.joints[0]
     assert base.worst.keys() == {"singular", "near_singular"}
-    assert not base.other_preload
+    assert not base.other_branch
     assert "its load allows" not in str(touching.report)
 
 

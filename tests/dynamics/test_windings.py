@@ -160,7 +160,7 @@ def test_from_the_file_to_result_figures_and_columns(files):
     assert refused.returncode == 2
 
 
-def test_files_name_line_and_remedy(files):
+def test_files_name_line_and_fix(files):
     text = ROBOT.replace("        gear_ratio: -50\n", "")
     (files / "robot.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"robot.yaml:15: motor: torque_constant: needs gear_ratio \(1 for"):

@@ -19,7 +19,7 @@ Command = Callable[..., Outcome]
 ROBOT = REPOSITORY / "robots" / "planar_2r.yaml"
 ARM = load_robot(ROBOT)
 
-UNTOLD = ("writematrix", "spreadsheet")
+UNRECOGNIZABLE = ("writematrix", "spreadsheet")
 """Exports whose columns have no name, or one in another language."""
 
 
@@ -33,7 +33,7 @@ def columns_of(described):
     return {column["number"]: column for column in described["columns"]}
 
 
-@pytest.mark.parametrize("name", [name for name in EXPORTS if name not in UNTOLD])
+@pytest.mark.parametrize("name", [name for name in EXPORTS if name not in UNRECOGNIZABLE])
 def test_the_trajectory_that_is_printed_gives_the_motion(vsacli: Command, tmp_path: Path, name: str) -> None:
     recorded = motion()
     (tmp_path / "plain.csv").write_text(plain(recorded))
@@ -51,7 +51,7 @@ def test_the_trajectory_that_is_printed_gives_the_motion(vsacli: Command, tmp_pa
     assert found.block(0, 61).of_joints["stiffness"].min() > 0
 
 
-@pytest.mark.parametrize("name", UNTOLD)
+@pytest.mark.parametrize("name", UNRECOGNIZABLE)
 def test_what_cannot_be_told_is_left_open(tmp_path: Path, name: str) -> None:
     described = recording(tmp_path, EXPORTS[name](motion()).content, ARM)
     assert "# shoulder.q: ..." in described["mapping"]

@@ -134,7 +134,7 @@ def test_its_torques_start_without_a_step(tmp_path: Path) -> None:
     assert min(rough) > 0.01
 
 
-OPTIONAL = re.compile(r"^# ( *(?:d|theta|xy|xz|yz|preload|convention): \S.*)$", re.MULTILINE)
+OPTIONAL = re.compile(r"^# ( *(?:d|theta|xy|xz|yz|branch|convention): \S.*)$", re.MULTILINE)
 """Keys with a default that stand commented out beside others that do not."""
 
 

@@ -64,11 +64,11 @@ class Actuation:
 
 @dataclass(frozen=True)
 class Curve:
-    """Deflections at which two sides carry tau_e together; `preload` is +1 (phi_1 up) or -1."""
+    """Deflections at which two sides carry tau_e together; `branch` is +1 (phi_1 up) or -1."""
 
     sides: tuple[Side, Side]
     tau_e: float
-    preload: int = 1
+    branch: int = 1
 
     def other(self, phi: float) -> float:
         """phi_2 for phi_1."""
@@ -84,15 +84,15 @@ class Curve:
         """A number of the sign of dG/dphi_1 towards larger preload."""
         first, second = self.sides
         other = self.other(phi)
-        return self.preload * (second.sigma(other) * first.zeta(phi) - first.sigma(phi) * second.zeta(other))
+        return self.branch * (second.sigma(other) * first.zeta(phi) - first.sigma(phi) * second.zeta(other))
 
     def fold(self, nodes: int = NODES) -> float:
         """phi_1 where the stiffness first stops falling on the way in from large preload."""
         first, _ = self.sides
         reach = max(abs(first.phi(3 * self.tau_e)), 1e-3)
-        outer = self.preload * reach
+        outer = self.branch * reach
         for step in range(1, nodes + 1):
-            inner = self.preload * reach * (1 - 2 * step / nodes)
+            inner = self.branch * reach * (1 - 2 * step / nodes)
             if self.rise(inner) <= 0:
                 return root(self.rise, inner, outer)
             outer = inner
@@ -101,9 +101,9 @@ class Curve:
     def solve(self, stiffness: float, fold: float) -> float:
         """phi_1 beyond the fold for a stiffness that is reached there."""
         step = 0.1
-        while self.stiffness(fold + self.preload * step) < stiffness:
+        while self.stiffness(fold + self.branch * step) < stiffness:
             step *= 2
-        return root(lambda phi: self.stiffness(phi) - stiffness, fold, fold + self.preload * step)
+        return root(lambda phi: self.stiffness(phi) - stiffness, fold, fold + self.branch * step)
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -167,7 +167,7 @@ def test_undefined_samples_are_refused_with_joint_time_and_number(stored, block)
     ]
     assert str(caught.value).endswith(
         "0.h5: j1.tau_motor has no value at 12 samples, first at t = 0.030 s\n"
-        "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan"
+        "nothing was exported; fix the steps that the report names, or get empty cells with --allow-nan"
     )
 
 
@@ -181,7 +181,7 @@ def test_infinite_samples_are_refused_as_well_as_missing_ones(stored, block):
         "j1.q has no value at 1 sample, first at t = 0.007 s",
     ]
     assert str(caught.value).endswith(
-        "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan; "
+        "nothing was exported; fix the steps that the report names, or get empty cells with --allow-nan; "
         "export them as they are with --allow-nan"
     )
     lines = rows(stored(values), ["q"], allow_nan=True)[1:]

@@ -38,7 +38,7 @@ RIGID = "{type: rigid, motor: {inertia: 2}}"
 ELASTIC = "{type: elastic, motor: {inertia: 3, max_torque: 50}, stiffness: 1e3}"
 ANTAGONISTIC = "{type: antagonistic, motor: {inertia: 3}, spring: {type: cubic, k: 400, k_c: 2000}}"
 POSITION = "position: {type: polynomial, degree: 7, start: 0, end: 0.4}\n"
-FEW = "on so few knots, derivatives are doubtful far into the record from both ends"
+FEW = "on so few knots, derivatives are unreliable far into the record from both ends"
 
 
 def robot(*actuators: str) -> Robot:

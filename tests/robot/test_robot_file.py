@@ -44,7 +44,7 @@ joints:
       type: antagonistic
       motor: [{inertia: 10}, {inertia: 11, max_torque: 90}]
       spring: [{type: cubic, k: 4e3, k_c: 1e6}, {type: cubic, k: 5e3, k_c: 1e6, max_deflection: 0.02}]
-      preload: negative
+      branch: negative
 """
 
 
@@ -93,7 +93,7 @@ def test_every_field_is_read(load):
         actuator=Antagonistic(
             motor=(Motor(inertia=10.0), Motor(inertia=11.0, max_torque=90.0)),
             spring=(Cubic(k=4000, k_c=1e6), Cubic(k=5000, k_c=1e6, max_deflection=0.02)),
-            preload="negative",
+            branch="negative",
         ),
     )
     robot = load(TEXT)
@@ -143,7 +143,7 @@ def test_a_spring_shared_by_an_alias(load):
         ("name: slide", "name: a b", "18: name: must be made of letters, digits, _ and -"),
         ("name: slide", "name: swing", "18: joints.name: 'swing' is taken by another entry"),
         ("type: revolute", "type: rotary", "6: type: unknown word 'rotary'; valid: revolute, prismatic"),
-        ("preload: negative", "preload: {}", "26: preload: expected one of positive, negative"),
+        ("branch: negative", "branch: {}", "26: branch: expected one of positive, negative"),
         (
             "      type: antagonistic\n      motor: {",
             "      motor: {",
@@ -245,7 +245,7 @@ def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
     assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0"
 
 
-def test_doubtful_physics_is_a_warning(load):
+def test_implausible_physics_is_a_warning(load):
     robot = load(TEXT.replace("zz: 0.2", "zz: 0.5").replace("mass: 1,", "mass: 0,"))
     assert robot.warnings == (
         "link of joint swing: its inertia breaks the triangle inequality: 0.5 > 0.1 + 0.2 by 0.2 kg m^2",

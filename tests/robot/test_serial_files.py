@@ -51,7 +51,7 @@ def load(*lines: str) -> object:
         ((LIMITED,), "torque.max_deflection: is no limit of a serial actuator"),
         ((AWAS.replace("awas", "awass"),), "mechanism.type: unknown word 'awass'; did you mean 'awas'?"),
         ((AWAS, "coupled_inertia: -0.2"), "is -0.2 on the joint side of the gears; its size must be below"),
-        ((AWAS, "preload: negative"), "unknown key 'preload'"),
+        ((AWAS, "branch: negative"), "unknown key 'branch'"),
         (("coupled_inertia: 0",), "actuator: missing key 'mechanism'"),
     ],
 )  # fmt: skip

@@ -115,10 +115,10 @@ def test_linear_springs_cannot_change_the_stiffness(refusal, spring: str):
 @pytest.mark.parametrize(
     "spring", ["{type: quadratic, k: 90}", "[{type: cubic, k: 1, k_c: 1}, {type: exponential, c: 1, a: 7}]"]
 )
-def test_a_tendon_cannot_be_preloaded_the_other_way(refusal, spring: str):
-    (line,) = refusal(f"{spring}\n      preload: negative")
+def test_a_tendon_cannot_be_on_the_other_branch(refusal, spring: str):
+    (line,) = refusal(f"{spring}\n      branch: negative")
     assert line.startswith(f"rig.yaml:{LINE + 1}: ")
-    assert "preload: must be positive: a spring that only pulls cannot push" in line
+    assert "branch: must be positive: a spring that only pulls cannot push" in line
 
 
 TABLES = {

@@ -25,12 +25,12 @@ class Blurred:
     covariances: FloatArray
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    doubtful: tuple[float, float] = (0.0, 0.0)
+    unreliable: tuple[float, float] = (0.0, 0.0)
     known: bool = True
     fit: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        fit = SimpleNamespace(parts=(), components=self.components, doubtful=self.doubtful)
+        fit = SimpleNamespace(parts=(), components=self.components, unreliable=self.unreliable)
         object.__setattr__(self, "fit", fit)
 
     @property

@@ -45,9 +45,9 @@ class Stopped(Cubic):
         return None
 
 
-def springs(first: SpringLaw, second: SpringLaw, preload: str = "positive") -> Antagonistic:
+def springs(first: SpringLaw, second: SpringLaw, branch: str = "positive") -> Antagonistic:
     motor = Motor(inertia=3, damping=0.1)
-    return Antagonistic(motor=(motor, motor), spring=(first, second), preload=preload)
+    return Antagonistic(motor=(motor, motor), spring=(first, second), branch=branch)
 
 
 def joint_with(actuator: Antagonistic | None = None, limits: Limits | None = None) -> Joint:
@@ -61,14 +61,14 @@ def with_joint(robot: Robot, index: int, joint: Joint) -> Robot:
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
-def with_preload(joint: Joint, preload: str) -> Joint:
-    return dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, preload=preload))
+def with_branch(joint: Joint, branch: str) -> Joint:
+    return dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, branch=branch))
 
 
-def lower_by_preload(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
+def lower_by_branch(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
     return {
-        preload: drive(with_preload(joint, preload), command(tau_e=tau_e))["stiffness_lower"]
-        for preload in ("positive", "negative")
+        branch: drive(with_branch(joint, branch), command(tau_e=tau_e))["stiffness_lower"]
+        for branch in ("positive", "negative")
     }
 
 

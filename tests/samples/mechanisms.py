@@ -170,8 +170,8 @@ DEVICES = {
         scanned=(-1.5, 1.5),
         scanned_settings=(-0.1, 1.0),
     ),
-    "shifted_cams, the other preload": Device(
-        mechanism=ShiftedCams(spring=(SAMPLES["sinh"].law,) * 2, preload="negative"),
+    "shifted_cams, the other branch": Device(
+        mechanism=ShiftedCams(spring=(SAMPLES["sinh"].law,) * 2, branch="negative"),
         potential=_shifted(SAMPLES["sinh"].energy),
         stiffness=(150, 110),
         deflections=(-0.2, 0.2),

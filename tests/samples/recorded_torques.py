@@ -29,7 +29,7 @@ STIFFNESS_ASKED = 1200.0
 
 
 class Error(NamedTuple):
-    """How wrong a variable is, and what is said of it, away from the doubtful ends of the record.
+    """How wrong a variable is, and what is said of it, away from the unreliable ends of the record.
 
     Attributes:
         size: of the error, root mean square, relative to the variable; of the motor with the larger one.
@@ -116,7 +116,7 @@ def judge(recording: Recording) -> Verdict:
     run = Run(robot_of(recording.arm), trajectory)
     blocks = list(run)
     true = motor_torque(recording.arm, *recording.truth).T
-    starts, ends = zip(*(each.fit.doubtful for each in trajectory.estimates.values()), strict=True)
+    starts, ends = zip(*(each.fit.unreliable for each in trajectory.estimates.values()), strict=True)
     time = recording.time
     inside = (time >= min(max(starts), time[-1] / 4)) & (time <= time[-1] - min(max(ends), time[-1] / 4))
     torque, deviation = (

@@ -1,4 +1,4 @@
-"""Slow-down, stiffness and preload together, at whatever cost."""
+"""Slow-down, stiffness and branch together, at whatever cost."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from samples.remedies import BASE, accepted, changed, rest_to_rest
+from samples.fixes import BASE, accepted, changed, rest_to_rest
 from samples.robots import vsa_3r
 
-from vsacli import suggest
+from vsacli import fixes
 from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
 from vsacli.studies.search.acceptance import Acceptance
@@ -80,34 +80,34 @@ def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
 
 def test_too_fast_and_slightly_too_soft_takes_both():
     robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
-    found = suggest(robot, rest_to_rest(1.0, 810.0))
+    found = fixes(robot, rest_to_rest(1.0, 810.0))
     assert not any(
         each.possible for each in (found.slow_down, found.stiffness_offset, found.stiffness_profile)
     )
-    (remedy,) = found.remedies
-    assert remedy.sentence == (
+    (fix,) = found.fixes
+    assert fix.sentence == (
         "slow down by a factor 1.719 (1 s -> 1.719 s), and raise the stiffness of shoulder by 19.55 N m/rad"
     )
-    assert accepted(remedy.robot, remedy.trajectory)
-    content = remedy.as_json()
+    assert accepted(fix.robot, fix.trajectory)
+    content = fix.as_json()
     assert content["slow_down"]["factor"] == 1.719
     assert content["stiffness_offset"]["offsets"] == {"base": 0.0, "shoulder": 19.55, "elbow": 0.0}
-    assert "preload" not in content
-    assert content["text"] == remedy.sentence
+    assert "branch" not in content
+    assert content["text"] == fix.sentence
 
 
 @pytest.mark.slow
-def test_simpler_remedies_come_with_less_than_the_combined_ones():
-    remedies = suggest(vsa_3r(), FAST).remedies
-    assert [remedy.size for remedy in remedies] == sorted(remedy.size for remedy in remedies)
-    alone = [remedy for remedy in remedies if len(remedy.kinds) == 1]
-    assert {kind for remedy in alone for kind in remedy.kinds} == {"slow_down", "stiffness_offset"}
-    for remedy in remedies:
-        assert accepted(remedy.robot, remedy.trajectory)
+def test_simpler_fixes_come_with_less_than_the_combined_ones():
+    found = fixes(vsa_3r(), FAST).fixes
+    assert [fix.size for fix in found] == sorted(fix.size for fix in found)
+    alone = [fix for fix in found if len(fix.kinds) == 1]
+    assert {kind for fix in alone for kind in fix.kinds} == {"slow_down", "stiffness_offset"}
+    for fix in found:
+        assert accepted(fix.robot, fix.trajectory)
 
 
-def test_springs_that_are_alike_leave_no_choice_of_preload():
-    assert not search(preloads=True).exchangeable
+def test_springs_that_are_alike_leave_no_choice_of_branch():
+    assert not search(branches=True).exchangeable
 
 
 def unlike():
@@ -115,25 +115,24 @@ def unlike():
     springs = [{"type": "cubic", "k": 4, "k_c": 20}, {"type": "cubic", "k": 4.4, "k_c": 20}]
     robot = vsa_3r().replace("joints.elbow.actuator.spring", springs)
     lowest = {
-        preload: max(
+        branch: max(
             float(block.stiffness_lower[:, 2].max())
-            for block in Run(robot.replace("joints.elbow.actuator.preload", preload), rest_to_rest(4.0))
+            for block in Run(robot.replace("joints.elbow.actuator.branch", branch), rest_to_rest(4.0))
         )
-        for preload in ("positive", "negative")
+        for branch in ("positive", "negative")
     }
     worse = max(lowest, key=lowest.get)
     trajectory = rest_to_rest(4.0, (850.0, 850.0, sum(lowest.values()) / 2))
-    return robot.replace("joints.elbow.actuator.preload", worse), trajectory
+    return robot.replace("joints.elbow.actuator.branch", worse), trajectory
 
 
 @pytest.mark.slow
-def test_other_preload_comes_last_although_it_is_enough():
+def test_other_branch_comes_last_although_it_is_enough():
     robot, trajectory = unlike()
-    remedies = suggest(robot, trajectory, 1e-4).remedies
-    *others, last = remedies
-    assert all(remedy.preload is None for remedy in others)
-    assert last.kinds == {"preload"}
-    assert last.sentence == f"change the preload of elbow to {robot.joints[2].actuator.opposite_preload}"
+    *others, last = fixes(robot, trajectory, 1e-4).fixes
+    assert all(fix.branch is None for fix in others)
+    assert last.kinds == {"branch"}
+    assert last.sentence == f"change the branch of elbow to {robot.joints[2].actuator.opposite_branch}"
     assert last.size == 0.0
     assert accepted(last.robot, last.trajectory, 1e-4)
 

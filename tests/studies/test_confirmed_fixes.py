@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT
 
-from vsacli import load_robot, load_trajectory, suggest
+from vsacli import fixes, load_robot, load_trajectory
 from vsacli.studies.search.task import Task
 
 
@@ -14,15 +14,15 @@ def test_every_fix_is_confirmed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     confirmed, short = [], []
     falls_short = Task.falls_short
 
-    def noted(task, remedy):
-        found = falls_short(task, remedy)
-        (confirmed if found is None else short).append(remedy)
+    def noted(task, fix):
+        found = falls_short(task, fix)
+        (confirmed if found is None else short).append(fix)
         return found
 
     robot = load_robot(ROBOT)
     motion = load_trajectory(REST_TO_REST, robot, {"duration": 0.2})
     monkeypatch.setattr(Task, "falls_short", noted)
-    chosen = suggest(robot, motion).remedies
+    chosen = fixes(robot, motion).fixes
     assert len(short) > 1
     assert {id(each) for each in chosen} == {id(each) for each in confirmed}
     assert len(confirmed) == len(chosen)

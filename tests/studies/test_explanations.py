@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.excited import Excitation, excited
-from samples.misfits import PLANTS, random_case, write
+from samples.poor_fits import PLANTS, random_case, write
 from samples.shipped import shipped_robot
 
 from vsacli import identify
@@ -58,7 +58,7 @@ def test_false_alarms_are_rare(tmp_path: Path) -> None:
 @pytest.mark.parametrize("plant", WORDS)
 def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> None:
     told = found(FIRST + 3, plant, tmp_path)
-    assert told.verdict in ("misfit", "doubtful")
+    assert told.verdict in ("poor_fit", "unreliable")
     assert any(re.search(WORDS[plant], note) for note in told.notes), told.notes
 
 
@@ -103,7 +103,7 @@ def test_the_links_tell_a_gain_from_springs_and_rotors_that_differ(by_gain: bool
     told = identify(arm, record.noisy(seed=1001).write(tmp_path / "r.csv", arm), fit=["springs", "motors"])
     (note,) = told.notes
     assert re.match(r"elbow: the numbers found are 1.0[23]\d* \+- \S+ times those of the file", note)
-    assert told.verdict == ("doubtful" if by_gain else "ok")
+    assert told.verdict == ("unreliable" if by_gain else "ok")
     end = "the torques read too large" if by_gain else "it is springs and motors that differ"
     assert note.endswith(end)
 

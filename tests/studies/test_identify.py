@@ -134,7 +134,7 @@ def test_identify_reports_what_a_record_tells(tmp_path: Path) -> None:
 def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) -> None:
     record = excited(joint(), JOINT._replace(swing=[0])).noisy(seed=3).write(tmp_path / "record.csv", joint())
     told = identify(joint({"joints.*.actuator.spring.k": 350}), record, fit=["springs", "motors"])
-    assert told.verdict == "untold"
+    assert told.verdict == "unidentifiable"
     base = told.systems[0]
     assert [number.note for number in base.numbers if ".spring." in number.path] == [
         "cannot be told apart"
@@ -144,7 +144,7 @@ def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) 
     assert all(residual.residual < 1.5 * residual.noise for residual in base.residuals)
 
 
-def test_late_torques_are_told_and_mended(tmp_path: Path) -> None:
+def test_late_torques_are_told_and_fixed(tmp_path: Path) -> None:
     exact = excited(joint(), JOINT)
     late = exact._replace(tau_motor=np.concatenate((exact.tau_motor[:1], exact.tau_motor[:-1])))
     told = identify(
@@ -189,7 +189,7 @@ def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Pat
     told = identify(mixed, exact.noisy(seed=7).write(tmp_path / "mixed.csv", mixed), fit=["motors"])
     sprung = [joint.name for joint in mixed.joints if joint.actuator.sprung]
     assert [system.title for system in told.systems] == sprung
-    assert told.verdict in ("ok", "untold")
+    assert told.verdict in ("ok", "unidentifiable")
     serial, motion = ROBOTS["AwAS"]
     record = excited(serial, motion).noisy(seed=8, torque=0.05).write(tmp_path / "awas.csv", serial)
     assert identify(serial, record, fit=["motors", "joints.*.mechanism.k"]).verdict == "ok"
@@ -210,7 +210,7 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
     for (start, end), (record, size) in expected.items():
         path = record.noisy(seed=9).write(tmp_path / "record.csv", joint())
         told = identify(joint(), path, fit=["springs", "motors"])
-        assert told.verdict == "misfit"
+        assert told.verdict == "poor_fit"
         note, *corrected = told.notes
         assert note.startswith(start)
         assert all(each.startswith("base: with that, joints.base") for each in corrected)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from samples.fixes import pendulum, rest_to_rest
 from samples.marks import slow
-from samples.remedies import pendulum, rest_to_rest
 
 from vsacli import inverse_dynamics, load_trajectory, optimize
 from vsacli.studies.search.criteria import CRITERIA, Scale

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
-from samples.remedies import pendulum, rest_to_rest
+from samples.fixes import pendulum, rest_to_rest
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.studies.search.paced_motion import PACE_ORDERS, retimed

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.remedies import pendulum, rest_to_rest, written
+from samples.fixes import pendulum, rest_to_rest, written
 
 from vsacli import Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory, optimize
-from vsacli.studies.search import Remedy
+from vsacli.studies.search import Fix
 from vsacli.trajectory.times import RecordedTimes
 
 MARGIN = 0.03
@@ -45,7 +45,7 @@ def finer(trajectory: Trajectory) -> Trajectory:
 
 def read_back(robot: Robot, trajectory: Trajectory, folder: Path) -> Trajectory:
     """What a file of it says."""
-    written(Remedy(0.0, robot, trajectory), folder / "best.yaml")
+    written(Fix(0.0, robot, trajectory), folder / "best.yaml")
     return load_trajectory(folder / "best.yaml", robot)
 
 

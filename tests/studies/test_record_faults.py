@@ -146,7 +146,7 @@ DOUBTS = {
                 for name in ("theta", "tau_motor")
             },
         ),
-        "the springs of elbow are deflected as with the preload negative: the columns of motors 1 and 2",
+        "the springs of elbow are deflected as on the branch negative: the columns of motors 1 and 2",
     ),
     "cut off": (
         lambda record: changed(record, tau_motor=put(np.s_[:, 0, 0], lambda torque: np.minimum(torque, 120))),
@@ -167,7 +167,7 @@ DOUBTS = {
         "column 'base.q', as 14 more, has each value in 2 rows",
     ),
 }
-"""Likewise of those that only make the numbers doubtful."""
+"""Likewise of those that only make the numbers unreliable."""
 
 
 @pytest.mark.parametrize("fault", slow_but(("torques in mN m", "motors exchanged"), DOUBTS))
@@ -175,7 +175,7 @@ def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_
     change, words = DOUBTS[fault]
     path = change(record).write(tmp_path / "record.csv", arm)
     told = identify(arm, path, fit=["joints.*.actuator.spring.k"])
-    assert told.verdict == "doubtful"
+    assert told.verdict == "unreliable"
     told_of = told.records[0].doubts
     assert any(re.search(words, doubt) for doubt in told_of), told_of
 

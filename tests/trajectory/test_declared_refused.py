@@ -1,4 +1,4 @@
-"""Via points, sinusoids, sequences and steps that cannot be: each with its line, and what would mend it."""
+"""Via points, sinusoids, sequences and steps that cannot be: each with its line, and what would fix it."""
 
 from __future__ import annotations
 

@@ -32,8 +32,8 @@ def fitted(time, values, method=None, degree=7, order=4):
 
 
 def relative_error(fit, time, order=4):
-    """Root mean square error of a derivative outside the doubtful stretches, relative to its own."""
-    start, end = fit.doubtful
+    """Root mean square error of a derivative outside the unreliable stretches, relative to its own."""
+    start, end = fit.unreliable
     inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
     error = fit.at(inside, 5)[order, 0] - motion(inside, order)
     return np.sqrt(np.mean(error**2) / np.mean(motion(inside, order) ** 2))
@@ -254,11 +254,11 @@ def test_gain_of_least_squares(degree):
 
 
 @pytest.mark.parametrize(("degree", "order"), [(5, 2), (7, 4)])
-def test_doubtful_stretch_is_where_noise_counts_more(degree, order):
+def test_unreliable_stretch_is_where_noise_counts_more(degree, order):
     places, deviation = least_squares_deviation(degree, order)
     largest_inside = deviation[(places >= 13) & (places < 19)].max()
     fit = fitted(np.arange(8001) / 1000, motion(np.arange(8001) / 1000), LEAST_SQUARES, degree, order)
-    start, end = fit.doubtful
+    start, end = fit.unreliable
     spans = (degree + 1) // 2
     assert start == pytest.approx(np.ptp(fit.parts[0].knots[: spans + 1]))
     assert end == pytest.approx(start)

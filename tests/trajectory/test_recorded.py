@@ -72,7 +72,7 @@ def test_trajectory_is_named_after_the_file_and_says_what_was_fitted(csv):
     path = csv(columns(*by_joint("q", "dq", "stiffness")), "swing-up.csv")
     trajectory = recorded_trajectory(path, JOINTS)
     assert trajectory.name == "swing-up"
-    few = "on so few knots, derivatives are doubtful far into the record from both ends"
+    few = "on so few knots, derivatives are unreliable far into the record from both ends"
     assert any(each.startswith("ddq, d3q, d4q") and few in each for each in trajectory.warnings)
     assert any("dstiffness, ddstiffness" in each for each in trajectory.warnings)
     (source,) = trajectory.sources

@@ -98,8 +98,8 @@ def test_given_columns_pass_through_and_the_others_come_from_the_spline():
     np.testing.assert_array_equal(rows[0, 0], q[10:20, 0])
     np.testing.assert_array_equal(rows[2, 0], given[10:20, 0])
     np.testing.assert_array_equal(rows[[1, 3, 4]], mixed.at(time[10:20])[[1, 3, 4]])
-    doubtful = "derivatives are doubtful in the first 0.143 s and the last 0.143 s"  # 7 of 49 steps
-    assert mixed.warnings == (f"dq, d3q, d4q come from a C6 spline through q; {doubtful}",)
+    unreliable = "derivatives are unreliable in the first 0.143 s and the last 0.143 s"  # 7 of 49 steps
+    assert mixed.warnings == (f"dq, d3q, d4q come from a C6 spline through q; {unreliable}",)
 
 
 def test_at_uses_no_given_derivatives_that_do_not_belong_together():
@@ -114,9 +114,9 @@ def test_at_uses_no_given_derivatives_that_do_not_belong_together():
 
 def test_single_missing_derivative_is_named():
     time = np.linspace(0, 1, 50)
-    doubtful = "derivatives are doubtful in the first 0.102 s and the last 0.102 s"  # 5 of 49 steps
+    unreliable = "derivatives are unreliable in the first 0.102 s and the last 0.102 s"  # 5 of 49 steps
     assert profile(STIFFNESS, time, 850 + sine(time, 0), sine(time, 1)).warnings == (
-        f"ddstiffness comes from a C4 spline through stiffness; {doubtful}",
+        f"ddstiffness comes from a C4 spline through stiffness; {unreliable}",
     )
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.remedies import pendulum
+from samples.fixes import pendulum
 
 from vsacli import load_trajectory
 from vsacli.base.errors import InputError

@@ -119,9 +119,9 @@ def test_missing_derivatives_approach_the_true_ones():
     copy = sampled(original)
     assert copy.warnings == (
         "dq, ddq, d3q, d4q come from a C6 spline through q;"
-        " derivatives are doubtful in the first 0.035 s and the last 0.035 s",  # 7 steps
+        " derivatives are unreliable in the first 0.035 s and the last 0.035 s",  # 7 steps
         "dstiffness, ddstiffness come from a C4 spline through stiffness;"
-        " derivatives are doubtful in the first 0.025 s and the last 0.025 s",  # 5 steps
+        " derivatives are unreliable in the first 0.025 s and the last 0.025 s",  # 5 steps
     )
     ours, theirs = copy.block(0, 401), original.block(0, 401)
     # a cubic stiffness is its own spline up to rounding, amplified by 1 / step^2

@@ -84,7 +84,7 @@ def test_a_recorded_wrench(load) -> None:
     np.testing.assert_array_equal(block.time, table["time"])
     assert trajectory.warnings == (
         "dwrench, ddwrench come from a C4 spline through wrench;"
-        " derivatives are doubtful in the first 0.5 s and the last 0.5 s",  # 5 steps of 0.1 s
+        " derivatives are unreliable in the first 0.5 s and the last 0.5 s",  # 5 steps of 0.1 s
     )
     assert [source.path for source in trajectory.sources] == ["move.yaml", "push.csv"]
 

@@ -256,14 +256,14 @@ class Actuator(ABC):
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
     @property
-    def opposite_preload(self) -> str | None:
-        """The other value of the preload field; None if there is no other branch."""
+    def opposite_branch(self) -> str | None:
+        """The other value of the branch field; None if there is no other branch."""
         return None
 
-    preload_field: ClassVar[str] = "preload"
-    """Path to the preload field."""
+    branch_field: ClassVar[str] = "branch"
+    """Path to the branch field."""
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Return where the stiffness is attainable on another branch, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 

@@ -19,7 +19,7 @@ from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.pairs.joints import beta, determinant, solve_decoupling
-from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
+from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
 from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command
@@ -45,8 +45,8 @@ class Antagonistic(Actuator):
         "spring between the motors, over theta_1 - theta_2; the link does not feel it",
         default=None,
     )
-    preload: str = choice(
-        PRELOADS,
+    branch: str = choice(
+        BRANCHES,
         "branch of the deflections: positive has phi_1 up and phi_2 down",
         default="positive",
     )
@@ -72,9 +72,9 @@ class Antagonistic(Actuator):
             yield FieldProblem(("coupling", "max_deflection"), reason)
 
     @cached_property
-    def pair(self) -> PreloadedPair:
-        """Both springs, on the solution branch that the preload selects."""
-        return PreloadedPair(self.spring, self.preload)
+    def pair(self) -> PairOnBranch:
+        """Both springs, on the chosen branch."""
+        return PairOnBranch(self.spring, self.branch)
 
     @property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
@@ -227,16 +227,16 @@ class Antagonistic(Actuator):
         return PairElasticity(pairs) if coupling is None else CoupledPairs(pairs, coupling)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
-        """Solve (14) for the deflections (61) on the branch that the actuator's preload selects."""
+        """Solve (14) for the deflections (61) on the actuator's branch."""
         return self.pair.solve(tau_e, stiffness)
 
     @property
-    def opposite_preload(self) -> str | None:
-        """Preload of the other branch; None if the springs are tendons, which only pull."""
+    def opposite_branch(self) -> str | None:
+        """The other value of `branch`; None if the springs are tendons, which only pull."""
         return self.pair.opposite
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
-        """See `Actuator.other_preload`: the branch with opposite preload."""
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
+        """See `Actuator.other_branch`."""
         return self.pair.opposite_reaches(tau_e, stiffness)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:

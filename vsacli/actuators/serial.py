@@ -50,7 +50,7 @@ class Serial(Actuator):
 
     motor_count = 2
     commanded = ("stiffness",)
-    preload_field = "mechanism.preload"
+    branch_field = "mechanism.branch"
     integrable = True
 
     def __post_init__(self) -> None:
@@ -198,13 +198,13 @@ class Serial(Actuator):
         return self.mechanism.solve(tau_e, stiffness, q)
 
     @property
-    def opposite_preload(self) -> str | None:
-        """Preload of the other branch of the mechanism."""
-        return self.mechanism.opposite_preload
+    def opposite_branch(self) -> str | None:
+        """See `Mechanism.opposite_branch`."""
+        return self.mechanism.opposite_branch
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
-        """See `Actuator.other_preload`: another branch of the mechanism."""
-        return self.mechanism.other_preload(tau_e, stiffness, q)
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
+        """See `Actuator.other_branch`: another branch of the mechanism."""
+        return self.mechanism.other_branch(tau_e, stiffness, q)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
         """Return A^-1 (tau_e', sigma')."""

@@ -73,16 +73,16 @@ class FrictionPassages:
                 continue
             when = f"from t = {time_text(passages[0, 0])} on"
             what = f"{joint.name}: friction between the links changes its sign within a step or two {when}"
-            remedy = "a larger rate shows them, a larger width makes them smaller"
+            advice = "a larger rate shows them, a larger width makes them smaller"
             if not trajectory.known_between:
-                yield f"{what}; what the motors do meanwhile is not known: {remedy}"
+                yield f"{what}; what the motors do meanwhile is not known: {advice}"
                 continue
             torques = np.abs(compute(trajectory.at(_times(trajectory, passages, index, width))).tau_motor)
             torques = torques[:, index]
             most = float(np.max(torques, where=np.isfinite(torques), initial=0.0))
             if most > MORE * peak:
                 sizes = f"{most:.3g} {TORQUE.unit(joint.type)} there, {peak:.3g} at the steps"
-                yield f"{what}: motor torques reach {sizes}; {remedy}"
+                yield f"{what}: motor torques reach {sizes}; {advice}"
 
 
 def _times(trajectory: Trajectory, passages: FloatArray, index: int, width: float) -> FloatArray:

@@ -129,7 +129,7 @@ class JointReport(Stored):
         start_theta: Initial motor positions.
         torque_step: |tau_motor - tau_spring| at the first sample: discontinuity of the torque of motors that
             rest before the start; NaN at a rigid joint, where tau_e may jump as well.
-        other_preload: Whether every infeasible sample is feasible with the opposite preload.
+        other_branch: Whether every infeasible sample is feasible on the opposite branch.
         energy: Work of the motors, elastic energy, co-contraction.
         start_dtheta: Initial motor velocities.
         end_theta: Final motor positions; NaN if the last sample was not computed.
@@ -156,7 +156,7 @@ class JointReport(Stored):
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
     torque_step: tuple[float, float]
-    other_preload: bool
+    other_branch: bool
     energy: JointEnergy
     start_dtheta: tuple[float, float] = UNKNOWN
     end_theta: tuple[float, float] = UNKNOWN
@@ -173,7 +173,7 @@ class JointReport(Stored):
         "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
         "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
-        **named("other_preload", "energy"),
+        **named("other_branch", "energy"),
         "uncertainty?": "uncertainty",
         "between?": "between",
         "dry_friction?": "dry_friction",
@@ -181,7 +181,7 @@ class JointReport(Stored):
 
     def shows(self, verdict: str) -> bool:
         """Return whether the joint is a reason for a verdict that is not ok."""
-        if verdict == "doubtful":
+        if verdict == "unreliable":
             return self.uncertainty is not None and bool(self.uncertainty.undetermined)
         return bool(self.steps.get(verdict))
 

@@ -14,7 +14,7 @@ from vsacli.analysis.trouble_text import sentences, uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText
 
-VERDICTS = ("ok", "over_limit", "singular", "infeasible", "doubtful", "self_check_failed")
+VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_check_failed")
 """Verdicts from best to worst; the worst that applies wins."""
 
 

@@ -61,7 +61,7 @@ rounded to four digits or with noise of 1e-4 rad, had 1e-4."""
 ROUNDING_SHARE = 1e-9
 """Share of the largest velocity of any motor that may be rounding, for a joint held still."""
 
-TROUBLE = ("doubtful", "infeasible", "singular", "over_limit")
+TROUBLE = ("unreliable", "infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
 
 

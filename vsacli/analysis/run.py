@@ -60,7 +60,7 @@ class Run:
         engine: Backend, one of `vsacli.compute.engine.NAMES`.
         threads: Number of threads of compiled code; by default the number of CPU cores.
         asked: Names of the requested variables; if recorded signals leave them too uncertain, the verdict is
-            doubtful.
+            unreliable.
         tell: Callback for messages of the choice of the engine: failures, and work that takes long.
 
     Attributes:

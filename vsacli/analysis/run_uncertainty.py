@@ -62,7 +62,7 @@ class RunUncertainty:
         """
         self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
         first, last = trajectory.times.span
-        ends = [estimate.fit.doubtful for estimate in trajectory.estimates.values()]
+        ends = [estimate.fit.unreliable for estimate in trajectory.estimates.values()]
         start, end = np.minimum(np.max(ends, axis=0), (last - first) / 4).tolist()
         self._inside = first + start, last - end
         self._shown = {JUDGED, *asked}

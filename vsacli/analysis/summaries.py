@@ -37,7 +37,7 @@ class JointSummary:
         self._start: FloatArray | None = None
         self._end = np.full((2, len(MOTORS)), np.nan)
         self._limits = limit_checks(joint)
-        self._other_preload = "stiffness" in joint.actuator.commanded
+        self._other_branch = "stiffness" in joint.actuator.commanded
         self._dry_friction = dry_frictions(joint.actuator.motors)
 
     def add(self, block: Block) -> None:
@@ -86,9 +86,9 @@ class JointSummary:
         if flagged:
             self._record_reach(flags, gap, block)
         outside = gap < -SINGULAR_MARGIN
-        if self._other_preload and outside.any():
+        if self._other_branch and outside.any():
             demand = block.tau_e[outside, index], stiffness[outside], block.q[outside, index]
-            self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
+            self._other_branch = bool(self._joint.actuator.other_branch(*demand).all())
 
     def report(
         self,
@@ -126,7 +126,7 @@ class JointSummary:
             peak_tau_motor=_pair(self._peaks[1:3]),
             start_theta=start_theta,
             torque_step=torque_step,
-            other_preload="infeasible" in self._worst and self._other_preload,
+            other_branch="infeasible" in self._worst and self._other_branch,
             energy=energy,
             between=between,
             start_dtheta=start_dtheta,

@@ -42,7 +42,7 @@ def _peak_at_an_end(joint: JointReport, spread: Spread) -> Iterator[str]:
     largest = max(of_motors(joint, joint.peak_tau_motor))
     if largest > DIFFERENT_PEAK * spread.peak:
         outside, inside = (f"{number(peak)} {spread.unit}" for peak in (largest, spread.peak))
-        yield f"its peak motor torque of {outside} is at a doubtful end of the record, else it is {inside}"
+        yield f"its peak motor torque of {outside} is at an unreliable end of the record, else it is {inside}"
 
 
 def _spread(name: str, spread: Spread) -> str:
@@ -126,8 +126,8 @@ def _steps(joint: JointReport, kind: str) -> str:
 def _infeasible(joint: JointReport, worst: Worst) -> str:
     steps = _steps(joint, "infeasible")
     slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
-    preload = "; the opposite preload would reach it" if joint.other_preload else ""
-    hints = f"({steps}){slack}{preload}"
+    branch = "; the opposite branch reaches it" if joint.other_branch else ""
+    hints = f"({steps}){slack}{branch}"
     when = f"at t = {time_text(worst.time)}"
     if math.isnan(worst.bound):
         return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"
@@ -136,10 +136,10 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
         relation = "below" if worst.value < worst.bound else "above"
         load = f"elastic torque {value} {worst.unit} {when}"
         return f"{load} is {relation} the {bound} that its spring carries {hints}"
-    relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
+    relation, advice = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
     return (
         f"stiffness {value} {worst.unit} {when} is {relation} the {bound} "
-        f"its load allows, {remedy} it {hints}"
+        f"its load allows, {advice} it {hints}"
     )
 
 
@@ -147,10 +147,10 @@ def _singular(joint: JointReport, worst: Worst) -> str:
     if math.isnan(worst.bound):
         when = f"at t = {time_text(worst.time)}"
         return f"its spring is slack {when}: motor torques are undefined ({_steps(joint, 'singular')})"
-    remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
+    advice = "lower" if worst.bound == joint.reachable[1] else "raise"
     return (
         f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "
-        f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
+        f"motor torques are undefined at the end of its range, {advice} it ({_steps(joint, 'singular')})"
     )
 
 

@@ -45,14 +45,14 @@ class InputError(VsacliError, ValueError):
         return cls([Problem(str(file), line, message)])
 
 
-def check_type(argument: str, value: object, expected: type, remedy: str) -> None:
+def check_type(argument: str, value: object, expected: type, advice: str) -> None:
     """Refuse an argument whose type is not the one a function expects.
 
     Args:
         argument: name of the argument.
         value: argument as passed.
         expected: type that the function expects.
-        remedy: clause with a valid call; `{}` stands for a path.
+        advice: clause with a valid call; `{}` stands for a path.
 
     Raises:
         TypeError: with the name, both types, and the valid call.
@@ -63,7 +63,7 @@ def check_type(argument: str, value: object, expected: type, remedy: str) -> Non
     if isinstance(value, str | os.PathLike):
         path = os.fspath(value)
         given = f"the path {path!r}"
-    raise TypeError(f"{argument} must be a {expected.__name__}, not {given}; {remedy.format(repr(path))}")
+    raise TypeError(f"{argument} must be a {expected.__name__}, not {given}; {advice.format(repr(path))}")
 
 
 def check_path(value: object, call: str) -> None:

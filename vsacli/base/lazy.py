@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
+from vsacli.base.renamed import successor
+
 
 class LazyRegistry(Mapping[str, Any]):
     """Objects by name, each imported when it is looked up; listing the names imports nothing.
@@ -66,7 +68,9 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         if name == "__all__":
             return sorted(homes())
         if name not in (homes() if listed is None else listed):
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            new = successor(name, get("__all__"))
+            hint = f"; it is now {new!r}" if new else ""
+            raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
         home = homes()[name]
         if home == package:  # a submodule
             return importlib.import_module(f"{package}.{name}")

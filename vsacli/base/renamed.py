@@ -26,7 +26,28 @@ class Renaming(NamedTuple):
     place: str
 
 
-RENAMINGS: tuple[Renaming, ...] = ()
+RENAMINGS: tuple[Renaming, ...] = (
+    Renaming("verdict", "doubtful", "unreliable", "`invdyn`, `check-feasibility`, `identify`, `size`"),
+    Renaming("verdict", "strayed", "off_target", "`simulate`"),
+    Renaming("verdict", "untold", "unidentifiable", "`identify`"),
+    Renaming("verdict", "misfit", "poor_fit", "`identify`"),
+    Renaming("key of reports", "doubtful", "unreliable", "columns of `fits`"),
+    Renaming("option", "--suggest", "--fixes", "`check-feasibility`"),
+    Renaming("option", "--remedy", "--write-fix", "`check-feasibility`"),
+    Renaming("option", "--write-fixed", "--write-fix", "`check-feasibility`; FILE is that of `-o` now"),
+    Renaming("key of reports", "suggestions", "fixes", "`check-feasibility --fixes`"),
+    Renaming("key of reports", "remedies", "fixes", "`check-feasibility --fixes`"),
+    Renaming("Python name", "suggest", "fixes", "`vsacli`"),
+    Renaming("Python name", "Suggestions", "Fixes", "`vsacli.studies.search`"),
+    Renaming("Python name", "Remedy", "Fix", "`vsacli.studies.search`"),
+    Renaming("key of robots", "preload", "branch", "`antagonistic`, `shifted_cams`"),
+    Renaming("key of reports", "other_preload", "other_branch", "`joints`"),
+    Renaming("key of reports", "preload", "branch", "entries of `fixes`"),
+    Renaming("key of reports", "preloads", "branches", "`branch` of `fixes`"),
+    Renaming("parameter", "preload", "branch", "`Antagonistic`, `mechanisms.ShiftedCams`"),
+    Renaming("Python name", "opposite_preload", "opposite_branch", "`mechanisms.Mechanism`"),
+    Renaming("Python name", "other_preload", "other_branch", "`mechanisms.Mechanism`"),
+)
 
 
 def successor(word: str, valid: Iterable[str]) -> str | None:

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.search import Suggestions
+    from vsacli.studies.search import Fixes
 
 
 @click.command(
     "check-feasibility",
     short_help="Report whether a robot can execute a trajectory.",
-    epilog=example("vsacli check-feasibility robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --suggest"),
+    epilog=example("vsacli check-feasibility robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --fixes"),
 )
 @robot_argument
 @trajectory_argument
@@ -54,19 +54,20 @@ if TYPE_CHECKING:
     type=FOLDER,
     help="Also draw each stiffness inside its reachable range there, as png.",
 )
-@click.option("--suggest", "advise", is_flag=True, help="Also say what smallest change would mend it.")
+@click.option("--fixes", "list_fixes", is_flag=True, help="Also list fixes, the smallest change first.")
 @click.option(
-    "--write-fixed",
-    "fixed",
-    type=YAML_FILE,
-    help="Write the first suggestion as a trajectory, with a CSV beside it for what is no formula, and as"
-    " FILE-robot.yaml the robot, if its preload changes; implies --suggest.",
-)
-@click.option(
-    "--remedy",
+    "--write-fix",
+    "number",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Write that suggestion instead of the first.",
+    help="Write the fix with this number in the list to -o FILE; implies --fixes.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=YAML_FILE,
+    help="Trajectory file for --write-fix N. A CSV file next to it holds signals without a formula, and"
+    " FILE-robot.yaml the robot, if its branch changes.",
 )
 @overwrite_option
 @engine_options
@@ -80,9 +81,9 @@ def check_feasibility(
     near_singular: float | None,
     deflections: str,
     plot_folder: str | None,
-    advise: bool,
-    fixed: str | None,
-    remedy: int | None,
+    list_fixes: bool,
+    number: int | None,
+    output: str | None,
     overwrite: bool,
     engine: str,
     threads: int | None,
@@ -93,25 +94,28 @@ def check_feasibility(
     The same computation as invdyn, and the same report. Exit code 0 if every step is feasible, regular and
     within limits, and a record, if there is one, determines that; else 3.
 
-    --suggest looks for what would mend it: slower, another stiffness (by a constant, or as a smooth profile),
-    another preload, or several of these together, so that every step keeps the near-singular margin and all
-    limits. The list begins with the smallest change; each was confirmed by a run of its own.
+    --fixes lists changes after which it can: slower, another stiffness (by a constant, or as a smooth
+    profile), another branch, or several of these together, so that every step keeps the near-singular margin
+    and all limits. The list begins with the smallest change; each fix was confirmed by a run of its own. With
+    --write-fix N -o FILE, FILE is the trajectory with fix N of the list.
     """
-    if remedy is not None and fixed is None:
-        raise click.UsageError("--remedy says which suggestion to write; give --write-fixed FILE, too")
-    if changes and fixed is not None:
-        raise click.UsageError("--write-fixed starts from the files as they are; change them instead")
+    if number is not None and output is None:
+        raise click.UsageError(f"--write-fix {number} needs -o FILE, the trajectory file to write")
+    if output is not None and number is None:
+        raise click.UsageError("-o FILE needs --write-fix N, the number of a fix as --fixes lists it")
+    if changes and output is not None:
+        raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.search import check_fixed_target, suggest
+    from vsacli.studies.search import check_fixed_target, fixes
 
     margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
     check_near_singular(margin)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
-        if fixed is not None:
-            check_fixed_target(fixed, outputs)
+        if output is not None:
+            check_fixed_target(output, outputs)
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
@@ -126,11 +130,11 @@ def check_feasibility(
             report = compute(run, talk)
         else:
             report = _compute_and_draw(run, plot_folder, run_stem(robot, trajectory), outputs, talk)
-        suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
-        if suggestions is not None and fixed is not None:
-            _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, outputs, talk)
+        found = fixes(*inputs, margin) if list_fixes or output is not None else None
+        if found is not None and output is not None and number is not None:
+            _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)
-    return show_report(report, as_json, suggestions)
+    return show_report(report, as_json, found)
 
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:
@@ -158,17 +162,16 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
     return report
 
 
-def _write_fixed(suggestions: Suggestions, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
+def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
     """Write the fix with this number, if it exists, and print the name of the file."""
     from vsacli.studies.search import write_fixed
 
-    remedies = suggestions.remedies
-    if number <= len(remedies):
-        write_fixed(remedies[number - 1], path, outputs)
-        talk.note(f"suggestion {number} goes to {path}")
+    if number <= len(found.fixes):
+        write_fixed(found.fixes[number - 1], path, outputs)
+        talk.note(f"fix {number} goes to {path}")
         return
-    if suggestions.slow_down is None:
+    if found.slow_down is None:
         reason = "nothing needs to change"
     else:
-        reason = f"there is no suggestion {number}" if remedies else "nothing that was tried mends the task"
+        reason = f"there is no fix {number}" if found.fixes else "nothing that was tried fixes the task"
     talk.note(f"{path} is not written: {reason}")

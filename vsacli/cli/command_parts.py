@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
     from vsacli.robot.model import Robot
-    from vsacli.studies.search import Suggestions
+    from vsacli.studies.search import Fixes
     from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -217,12 +217,12 @@ def result_line(result: StoredResult) -> str:
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
 
 
-def show_report(report: Report, as_json: bool, suggestions: Suggestions | None = None) -> Exit:
+def show_report(report: Report, as_json: bool, fixes: Fixes | None = None) -> Exit:
     """Print the report and any fixes; return the exit code of the verdict."""
     if as_json:
-        extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
+        extra = {} if fixes is None else {"fixes": fixes.as_json()}
         say_json({**report.as_json(), **extra})
     else:
-        texts = [str(report)] if suggestions is None else [str(report), str(suggestions)]
+        texts = [str(report)] if fixes is None else [str(report), str(fixes)]
         say_text("\n".join(texts), report.verdict)
     return EXIT_OF_VERDICT[report.verdict]

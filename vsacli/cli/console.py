@@ -65,7 +65,7 @@ GREEN, YELLOW, RED = ("\x1b[1;32m", "\x1b[1;33m", "\x1b[1;31m")
 PLAIN = "\x1b[0m"
 """Escape sequence that ends a color. All colors are bold too, so that verdicts stand out without them."""
 
-COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "doubtful", "strayed", "untold"), YELLOW)}
+COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "unreliable", "off_target", "unidentifiable"), YELLOW)}
 """Color of each verdict; verdicts not listed are red."""
 
 EXIT_OF_VERDICT = {
@@ -73,9 +73,9 @@ EXIT_OF_VERDICT = {
     "over_limit": Exit.VERDICT,
     "singular": Exit.VERDICT,
     "infeasible": Exit.VERDICT,
-    "doubtful": Exit.VERDICT,
-    "misfit": Exit.VERDICT,
-    "untold": Exit.VERDICT,
+    "unreliable": Exit.VERDICT,
+    "poor_fit": Exit.VERDICT,
+    "unidentifiable": Exit.VERDICT,
     "insufficient": Exit.VERDICT,
     "incomplete": Exit.VERDICT,
     "self_check_failed": Exit.BUG,

@@ -52,7 +52,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
     facts = PageTexts(
         title=report.headline.rpartition(":")[0],
         label=found.robot,
-        verdict=found.verdict,
+        verdict=found.verdict.replace("_", " "),
         tone=tone_of(found.verdict),
         report=report,
         provenance=provenance,

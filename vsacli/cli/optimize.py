@@ -109,7 +109,7 @@ def optimize(
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.search import Remedy, check_fixed_target, searches, write_fixed
+    from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
 
     vary = vary or ("timing" if minimize == "time" else "stiffness")
@@ -132,7 +132,7 @@ def optimize(
                 progress=progress.update,
             )
         if output is not None and found.trajectory is not None:
-            write_fixed(Remedy(0.0, inputs.robot, found.trajectory), output, outputs)
+            write_fixed(Fix(0.0, inputs.robot, found.trajectory), output, outputs)
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
         if folder is not None and found.trajectory is not None:

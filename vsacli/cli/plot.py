@@ -88,8 +88,8 @@ def plot(
     Where runs were optimised, <stem>-cost is in place of the first two.
 
     --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
-    plots of every variable, and the robot at the time cursor; of results that fail what would mend them, as
-    check-feasibility --suggest finds it; of several FILEs their differences, too; of studies margin and cost
+    plots of every variable, and the robot at the time cursor; for results that fail the fixes, as
+    check-feasibility --fixes lists them; of several FILEs their differences, too; of studies margin and cost
     of each run. It needs the package bokeh: pip install bokeh.
     """
     from vsacli.base.outputs import Outputs

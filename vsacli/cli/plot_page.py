@@ -13,11 +13,11 @@ from vsacli.cli.console import Talk
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
     from vsacli.base.progress import Bar
-    from vsacli.results.pages import RemedyText
+    from vsacli.results.pages import FixText
     from vsacli.results.store.reader import StoredResult
-    from vsacli.studies.search import Suggestions
+    from vsacli.studies.search import Fixes
 
-MENDABLE = ("infeasible", "singular", "over_limit")
+FIXABLE = ("infeasible", "singular", "over_limit")
 """Verdicts of results for which fixes are searched."""
 
 LONG_PAGE = 2_000_000
@@ -75,49 +75,49 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
             talk.detail(result_line(each))
         files = [Excerpt(each, (), span) for each in whole]
         reports = [stored_report(each.kind, each.report_json) for each in files]
-        remedies = _remedies(whole, talk)
+        fixes = _fixes(whole, talk)
         samples = sum(each.samples for each in files)
 
         def progress(variables: int) -> AbstractContextManager[Bar]:
             shown_from = 0 if samples >= LONG_PAGE else variables + 1
             return talk.progress(variables, shown_from=shown_from, label="drawing")
 
-        return result_page(files, reports, remedies, progress)
+        return result_page(files, reports, fixes, progress)
 
 
-def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
+def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
     """Return the fixes of each file, None where none are needed; show the progress of the search."""
-    failed = [each.kind == "result" and each.verdict in MENDABLE for each in files]
-    remedies: list[RemedyText | None] = []
-    with talk.progress(sum(failed), shown_from=1, label="looking for remedies") as bar:
-        for each, mendable in zip(files, failed, strict=True):
-            remedies.append(_remedy(each, talk) if mendable else None)
-            bar.update(int(mendable))
-    return remedies
+    failed = [each.kind == "result" and each.verdict in FIXABLE for each in files]
+    fixes: list[FixText | None] = []
+    with talk.progress(sum(failed), shown_from=1, label="looking for fixes") as bar:
+        for each, fixable in zip(files, failed, strict=True):
+            fixes.append(_fix(each, talk) if fixable else None)
+            bar.update(int(fixable))
+    return fixes
 
 
-def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
-    """Return the fixes of `check-feasibility --suggest` for a result's inputs, or print why not."""
+def _fix(result: StoredResult, talk: Talk) -> FixText | None:
+    """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
     from vsacli.base.errors import InputError, StorageError
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.files.repetition import rebuilt
-    from vsacli.results.pages import RemedyText
-    from vsacli.studies.search import suggest
+    from vsacli.results.pages import FixText
+    from vsacli.studies.search import fixes
 
     try:
         provenance = result.provenance()
         _check_version(provenance["generated_by"], result.path)
         margin = provenance["options"].get("near_singular", NEAR_SINGULAR_MARGIN)
-        suggestions = suggest(*rebuilt(result), margin)
+        found = fixes(*rebuilt(result), margin)
     except (InputError, StorageError) as error:
         reason = str(error).removeprefix(f"{result.path}: ")
-        talk.note(f"{result.path}: no suggestions on its page: {reason}")
+        talk.note(f"{result.path}: no fixes on its page: {reason}")
         return None
-    lines = str(suggestions).splitlines()
-    if not suggestions.remedies:
-        return RemedyText(lines, "")
-    announced, command = _command(result, suggestions)
-    return RemedyText([*lines, announced], command)
+    lines = str(found).splitlines()
+    if not found.fixes:
+        return FixText(lines, "")
+    announced, command = _command(result, found)
+    return FixText([*lines, announced], command)
 
 
 def _check_version(made_by: str, path: Path) -> None:
@@ -131,11 +131,11 @@ def _check_version(made_by: str, path: Path) -> None:
 
     if made_by != (this := f"vsacli {__version__}"):
         raise InputError.one(
-            f"was computed by {made_by}, and this is {this}; check-feasibility --suggest looks for them", path
+            f"was computed by {made_by}, and this is {this}; check-feasibility --fixes looks for them", path
         )
 
 
-def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
+def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
     """Return announcement and command of the next step: write the first fix, or list all fixes again."""
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.texts import one_line
@@ -144,16 +144,16 @@ def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
     inputs = result.inputs()
     files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
     parts = ["vsacli", "check-feasibility", *files]
-    if suggestions.near_singular != NEAR_SINGULAR_MARGIN:
-        parts += ["--near-singular", f"{suggestions.near_singular}"]
+    if found.near_singular != NEAR_SINGULAR_MARGIN:
+        parts += ["--near-singular", f"{found.near_singular}"]
     changes = written({path: value for each in inputs for path, value in each.changes.items()})
     parts += [part for change in changes for part in ("--set", change)]
     if changes:
         announced = "this lists them again; to have one written, change the files themselves as --set does:"
-        parts += ["--suggest"]
+        parts += ["--fixes"]
     else:
-        announced = "this writes the first as a trajectory, and --remedy another one:"
-        parts += ["--suggest", "--write-fixed", "fixed.yaml"]
+        announced = "this writes the trajectory with the first fix; --write-fix takes the number of any:"
+        parts += ["--write-fix", "1", "-o", "fixed.yaml"]
     return announced, one_line(shlex.join(parts))
 
 

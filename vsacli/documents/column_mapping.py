@@ -196,7 +196,7 @@ class _Choice:
             if place in taken:
                 self._note(source, f"{own or source.column!r} stands for {taken[place]} already")
             elif unit is not None:
-                self._note(source, _unit_remedy(name, own, unit))
+                self._note(source, _unit_advice(name, own, unit))
             else:
                 taken[place] = name
                 yield place, (source.heading(name, own), source.factor)
@@ -252,6 +252,6 @@ class _Choice:
         self._problems.append(Problem(*source.place, f"columns: {message}"))
 
 
-def _unit_remedy(name: str, own: str, unit: str) -> str:
+def _unit_advice(name: str, own: str, unit: str) -> str:
     say = f"{name}: {{column: {own!r}, unit: {unit}}}"
     return f"{own!r} speaks of {unit}; if its numbers are, write {say}, else their unit"

@@ -144,7 +144,7 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
     elif len(line) == MAX_HEADER:
         yield f"expected a header line, found more than {MAX_HEADER} characters without a line break"
     elif all(is_number(column) for column in columns):
-        yield f"expected a header line with the names of the columns, found numbers{_remedy(comment)}"
+        yield f"expected a header line with the names of the columns, found numbers{_advice(comment)}"
     elif len(columns) == 1 and len(line.partition("[")[0].split()) > 1:
         yield "expected commas, semicolons or tabs between the columns, found blanks"
     elif strict:
@@ -153,7 +153,7 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
         yield from (f"column {column!r} appears {n} times" for column, n in repeated.items() if n > 1)
 
 
-def _remedy(comment: int) -> str:
+def _advice(comment: int) -> str:
     if comment:
         return f"; if line {comment} is meant, remove its {COMMENT!r}"
     return "; without one, columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}"

@@ -37,7 +37,7 @@ def edited(text: str, values: Mapping[str, Any]) -> str:
 
     Args:
         text: valid YAML document.
-        values: new texts, numbers, or mappings of these by path, e.g. `joints.0.actuator.preload`; entries of
+        values: new texts, numbers, or mappings of these by path, e.g. `joints.0.actuator.branch`; entries of
             lists by index.
 
     Raises:

@@ -50,13 +50,13 @@ class ExpressionError(ValueError):
     Attributes:
         reason: problem in words.
         place: position of the character, from 1; 0 for the whole text.
-        remedy: clause with advice, beginning with `;`, or empty.
+        advice: clause with advice, beginning with `;`, or empty.
     """
 
-    def __init__(self, reason: str, place: int = 0, remedy: str = "") -> None:
-        self.reason, self.place, self.remedy = reason, place, remedy
+    def __init__(self, reason: str, place: int = 0, advice: str = "") -> None:
+        self.reason, self.place, self.advice = reason, place, advice
         where = f" at character {place}" if place else ""
-        super().__init__(f"{reason}{where}{remedy}")
+        super().__init__(f"{reason}{where}{advice}")
 
 
 class Grammar(NamedTuple):
@@ -326,8 +326,8 @@ def _expression(text: str) -> float:
     try:
         return float(parse(text, _NUMBERS).value({"pi": math.pi}, {}))
     except ExpressionError as error:
-        remedy = "; write a number, or an expression with + - * /, parentheses and pi"
-        raise ExpressionError(error.reason, remedy=remedy) from None
+        advice = "; write a number, or an expression with + - * /, parentheses and pi"
+        raise ExpressionError(error.reason, advice=advice) from None
     except ZeroDivisionError:
         raise ExpressionError("division by zero") from None
 

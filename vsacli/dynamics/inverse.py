@@ -306,8 +306,8 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
         TypeError: Robot or trajectory is of another type.
     """
     check_robot(robot)
-    remedy = "load_trajectory({}, robot) reads one; it comes after the robot"
-    check_type("trajectory", trajectory, Trajectory, remedy)
+    advice = "load_trajectory({}, robot) reads one; it comes after the robot"
+    check_type("trajectory", trajectory, Trajectory, advice)
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")

@@ -235,7 +235,7 @@ def test_a_result_reads_its_geometry(feasible_result: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_recorded_motion_has_bands_and_doubtful_ends(vsacli: Any, feasible_result: Path) -> None:
+def test_a_recorded_motion_has_bands_and_unreliable_ends(vsacli: Any, feasible_result: Path) -> None:
     assert vsacli("export", feasible_result, "--variables", "q,stiffness", "-o", "measured.csv").code == 0
     vsacli("invdyn", ROBOT, "measured.csv", "-o", "again.h5", "-q")
     page = page_of(vsacli, "again.h5")
@@ -243,18 +243,18 @@ def test_a_recorded_motion_has_bands_and_doubtful_ends(vsacli: Any, feasible_res
         report = json.loads(stored["report/json"][()])
         q, deviation = stored["q"][:, 0], stored["q_std"][:, 0]
     columns = [column for fit in report["fits"] for column in fit["columns"]]
-    start, end = (max(column["doubtful"][side] for column in columns) for side in ("start", "end"))
-    assert page.data["files"][0]["doubtful"] == [[0, pytest.approx(start)], [pytest.approx(4 - end), 4]]
+    start, end = (max(column["unreliable"][side] for column in columns) for side in ("start", "end"))
+    assert page.data["files"][0]["unreliable"] == [[0, pytest.approx(start)], [pytest.approx(4 - end), 4]]
     [base] = [each for each in page.chart("q")["series"] if each["joint"] == 0]
     np.testing.assert_allclose(
         page.array(base["band"][1]), q + 2 * deviation, atol=2 * SINGLE * np.abs(q).max()
     )
     assert page.chart("q")["band"] == "two standard deviations"
     inside = page_of(vsacli, "again.h5", "--from", 1, "--to", 3)
-    assert inside.data["files"][0]["doubtful"] == []
+    assert inside.data["files"][0]["unreliable"] == []
 
 
-WRONG = [{"fits": 3}, {"fits": [3]}, {"fits": [{"columns": [{"doubtful": {"start": "long", "end": 0}}]}]}]
+WRONG = [{"fits": 3}, {"fits": [3]}, {"fits": [{"columns": [{"unreliable": {"start": "long", "end": 0}}]}]}]
 
 
 @pytest.mark.parametrize("wrong", WRONG)

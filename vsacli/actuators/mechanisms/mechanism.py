@@ -240,11 +240,11 @@ class Mechanism(ABC):
         """
 
     @property
-    def opposite_preload(self) -> str | None:
-        """The other value of the field `preload`; None if there is no other branch."""
+    def opposite_branch(self) -> str | None:
+        """The other value of the field `branch`; None if there is no other branch."""
         return None
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Return where the stiffness is attainable on the other branch of the mechanism, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 

@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials, Range
-from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
+from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -35,7 +35,7 @@ class ShiftedCams(Mechanism):
         Pair(OneOf(LAWS)),
         "torque of cams 1 and 2 over phi + theta_2 and phi - theta_2; one mapping serves both",
     )
-    preload: str = choice(PRELOADS, "sign of theta_2 on the branch that is used", default="positive")
+    branch: str = choice(BRANCHES, "sign of theta_2 on the branch that is used", default="positive")
 
     def __post_init__(self) -> None:
         check_fields(self, *self._cams.problems(), *self._limit_problems())
@@ -48,8 +48,8 @@ class ShiftedCams(Mechanism):
                 yield FieldProblem(("spring", side, "max_deflection"), reason)
 
     @cached_property
-    def _cams(self) -> PreloadedPair:
-        return PreloadedPair(self.spring, self.preload)
+    def _cams(self) -> PairOnBranch:
+        return PairOnBranch(self.spring, self.branch)
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
@@ -103,13 +103,13 @@ class ShiftedCams(Mechanism):
         return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
 
     @property
-    def opposite_preload(self) -> str | None:
+    def opposite_branch(self) -> str | None:
         """The other sign of theta_2; None if the cams are equal and it makes no difference."""
         first, second = self._cams.laws
         return None if first == second else self._cams.opposite
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """See `Mechanism.other_preload`: the branch with the other sign of theta_2."""
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
+        """See `Mechanism.other_branch`: the branch with the other sign of theta_2."""
         return self._cams.opposite_reaches(tau_e, stiffness)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:

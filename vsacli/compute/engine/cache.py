@@ -152,7 +152,7 @@ def open_cache() -> Cache:
         raise CacheError(f"the cache folder {folder} belongs to somebody else")
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise CacheError(
-            f"the cache folder {folder} can be written by others; `chmod go-w {folder}` mends that"
+            f"the cache folder {folder} can be written by others; `chmod go-w {folder}` fixes that"
         )
     return Cache(folder)
 

@@ -110,7 +110,7 @@ PEAK_SAMPLES = 100
 """Samples that estimate the largest torque of a motion; an order of magnitude is enough."""
 
 _AMPLIFIED = (
-    "model and start are exact, so what strayed are the errors of the integration, which this motion "
+    "model and start are exact, so the run ends off target by errors of the integration, which this motion "
     "amplifies and nothing feeds back: with another --rtol it ends elsewhere"
 )
 
@@ -227,7 +227,7 @@ def _report(
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
             *_undetermined(robot, trajectory),
-            *([_AMPLIFIED] if exact and verdict == "strayed" else []),
+            *([_AMPLIFIED] if exact and verdict == "off_target" else []),
             *(stiffness_warnings(robot, past) if ending is None else []),
             *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
         ),

@@ -27,7 +27,7 @@ from vsacli.control.simulation.joint_tracking import (
     row,
 )
 
-VERDICTS = ("ok", "over_limit", "strayed", "singular", "infeasible", INCOMPLETE, DIVERGED)
+VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
 """Verdicts from best to worst; the worst that applies wins."""
 
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
@@ -36,13 +36,13 @@ _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Fl
 def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
     """Return the worst of `VERDICTS` that applies.
 
-    A flag at any sample implies its own verdict. A complete run with joints off target is "strayed". An early
-    end without a flag has its own verdict.
+    A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An
+    early end without a flag has its own verdict.
     """
     flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
     if ending is None and any(joint.off_course for joint in joints):
-        applies.add("strayed")
+        applies.add("off_target")
     if ending is not None and ending.flag is None:
         applies.add(ending.verdict)
     return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")

@@ -73,7 +73,7 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
         return drivetrain.torques(phase.q, phase.theta).tau_spring
 
     drivetrain, bound = loop.plant.drivetrain, max(LARGEST_SHARE * peak, SMALLEST_TORQUE)
-    for torques, joints, fault, remedy in (
+    for torques, joints, fault, advice in (
         (
             of_springs,
             drivetrain.spring_joint,
@@ -89,5 +89,5 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
             unit = TORQUE.unit(joint.type)
             raise InputError.one(
                 f"{joint.name}: its {fault} to be simulated: rounding of positions alone changes torques by "
-                f"{changes[worst]:.2g} {unit}, and the motion takes up to {peak:.3g} {unit}; {remedy}"
+                f"{changes[worst]:.2g} {unit}, and the motion takes up to {peak:.3g} {unit}; {advice}"
             )

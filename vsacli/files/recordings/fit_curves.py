@@ -129,7 +129,7 @@ def _curve(
     smooth = fit.at(even, 1)[0, member]
     stamps, shown = record.start + time[steps], time[steps]
     fine = shown if len(shown) >= FEWEST_POINTS else np.linspace(shown[0], shown[-1], FEWEST_POINTS)
-    ends = stated["doubtful"]
+    ends = stated["unreliable"]
     return RecordedCurve(
         name=stated["name"] if profile.signal is WRENCH else f"{stated['name']}.{profile.signal.names[0]}",
         unit=_unit(profile.signal, 0, member, joint_types),

@@ -48,7 +48,7 @@ class StudyPoints:
             raise InputError.one(f"nothing can be drawn: it has {what}", table.path)
         self.name, self.runs, self._table = table.study_name, table.read("run"), table
         self.margin = _least(table.read("margin"))
-        self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "doubtful"))
+        self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "unreliable"))
 
     @cached_property
     def varying(self) -> dict[str, FloatArray]:

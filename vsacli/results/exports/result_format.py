@@ -67,7 +67,7 @@ class UndefinedSamplesError(VsacliError):
         faults = {gap.fault for gap in self.gaps}
         otherwise = f", or get {missing} with --allow-nan" if missing else ""
         as_they_are = "export them as they are with --allow-nan" if missing else "leave the variable out"
-        advice = {MISSING: f"mend the steps the report names{otherwise}", INFINITE: as_they_are}
+        advice = {MISSING: f"fix the steps that the report names{otherwise}", INFINITE: as_they_are}
         said = "; ".join(words for fault, words in advice.items() if fault in faults)
         super().__init__(
             "\n".join([*(f"{path}: {gap}" for gap in self.gaps), f"nothing was exported; {said}"])

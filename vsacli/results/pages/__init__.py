@@ -4,8 +4,8 @@ This package packs the charts, the same as in figures; their look and behavior a
 `page.css` and the scripts next to them.
 """
 
-from vsacli.results.pages.document import RemedyText
+from vsacli.results.pages.document import FixText
 from vsacli.results.pages.result_page import measured_page, result_page
 from vsacli.results.pages.study_page import study_page
 
-__all__ = ["RemedyText", "measured_page", "result_page", "study_page"]
+__all__ = ["FixText", "measured_page", "result_page", "study_page"]

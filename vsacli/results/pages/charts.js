@@ -69,7 +69,7 @@ vsacli.charts = (() => {
     shadeAll() {
       const joints = new Set(this.chart.series.map((series) => series.joint ?? -1));
       if (joints.has(-1)) data.joints.forEach((_, joint) => joints.add(joint));
-      shade(this.figure, "doubtful", joints, { fill_alpha: 0.18 });
+      shade(this.figure, "unreliable", joints, { fill_alpha: 0.18 });
       shade(this.figure, "near-singular", joints, { fill_alpha: 0.25 });
       shade(this.figure, "infeasible", joints, { fill_alpha: 0.35 });
       shade(this.figure, "singular", joints, { fill_alpha: 0.0, hatch_pattern: "right_diagonal_line",

@@ -33,7 +33,7 @@ LIBRARY_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
 LARGEST_SHOWN = 200_000
 """Maximum number of characters of an input that a page shows; tables of samples are longer."""
 
-FAIR = ("over_limit", "doubtful", "strayed", "untold")
+FAIR = ("over_limit", "unreliable", "off_target", "unidentifiable")
 """Verdicts on complete runs with findings."""
 
 TOO_LONG = "too long for a page"
@@ -67,7 +67,7 @@ def plotting_library() -> Library:
     return Library(f"Bokeh {installed.version}", tuple(each.read_text(encoding="utf-8") for each in scripts))
 
 
-class RemedyText(NamedTuple):
+class FixText(NamedTuple):
     """The fixes of a failed run.
 
     Attributes:
@@ -90,7 +90,7 @@ class PageTexts(NamedTuple):
         report: report as printed by the command that made the file.
         provenance: pairs of a name and its value.
         inputs: input files.
-        remedy: fixes; None if none are needed, or none were searched.
+        fix: fixes; None if none are needed, or none were searched.
         table: table of the report in addition to that in the text; header first, empty if there is none.
     """
 
@@ -101,7 +101,7 @@ class PageTexts(NamedTuple):
     report: ReportText
     provenance: Sequence[tuple[str, str]]
     inputs: Sequence[InputText]
-    remedy: RemedyText | None = None
+    fix: FixText | None = None
     table: Sequence[tuple[str, ...]] = ()
 
 

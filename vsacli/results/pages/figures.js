@@ -18,7 +18,7 @@ vsacli.figures = (() => {
 
   /* The stretches of a kind at some joints of any file, those that overlap as one. */
   function stretches(kind, joints) {
-    const every = data.files.flatMap((file) => (kind === "doubtful" ? file.doubtful
+    const every = data.files.flatMap((file) => (kind === "unreliable" ? file.unreliable
       : (file.troubles[kind] || []).filter((_, joint) => joints.has(joint)).flat()));
     const merged = [];
     for (const [start, end] of every.sort((one, other) => one[0] - other[0])) {

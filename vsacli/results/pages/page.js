@@ -5,7 +5,7 @@
   const byId = (name) => document.getElementById(name);
   /* Colours of what may be wrong, the worst first. */
   const SHADES = { infeasible: "infeasible", singular: "singular", "near-singular": "near-singular",
-                     "over a limit": "over-limit", doubtful: "doubtful" };
+                     "over a limit": "over-limit", unreliable: "unreliable" };
 
   document.querySelectorAll(".line").forEach((line) => {
     if (/^(warning|.*: warning):/.test(line.textContent)) line.classList.add("warning");
@@ -62,7 +62,7 @@
         if (found.length) addLane(data.files.length > 1 ? `${name}, ${file.label}` : name, found.map(([kind, spans]) => [kind, spans[joint]]));
         found.forEach(([kind]) => kinds.add(kind));
       });
-      if (file.doubtful.length) { addLane("doubtful ends of the record", [["doubtful", file.doubtful]]); kinds.add("doubtful"); }
+      if (file.unreliable.length) { addLane("unreliable ends of the record", [["unreliable", file.unreliable]]); kinds.add("unreliable"); }
     });
     if (!kinds.size) return;
     place.hidden = false;

@@ -25,8 +25,8 @@ from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.charts.reduction import marked_spans
 from vsacli.results.charts.stored import BOUNDS, StoredCharts
 from vsacli.results.pages.document import (
+    FixText,
     PageTexts,
-    RemedyText,
     input_text,
     plotting_library,
     provenance_rows,
@@ -87,7 +87,7 @@ SECTIONS = (
 def result_page(
     files: Sequence[StoredResult],
     reports: Sequence[ReportText],
-    remedies: Sequence[RemedyText | None],
+    fixes: Sequence[FixText | None],
     progress: Progress = unseen,
 ) -> str:
     """Return the page of results, or of simulations, as HTML.
@@ -95,7 +95,7 @@ def result_page(
     Args:
         files: open files; differences are relative to the first.
         reports: report of each file.
-        remedies: fixes of each file, or None.
+        fixes: fixes of each file, or None.
         progress: called with the number of variables to draw.
 
     Raises:
@@ -127,7 +127,7 @@ def result_page(
         "span": [0.0, max(float(file.time[-1]) for file in files) - start],
         "sections": sections,
     }
-    texts = [_texts(*each) for each in zip(files, labels, reports, remedies, strict=True)]
+    texts = [_texts(*each) for each in zip(files, labels, reports, fixes, strict=True)]
     names = [name for file in files for name in (file.robot_name, file.trajectory_name)]
     return rendered(library, ", ".join(dict.fromkeys(names)), texts, data, packed)
 
@@ -157,12 +157,12 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
     return {
         "label": label,
         "troubles": {kind: list(map(after, joints)) for kind, joints in troubles(file).items()},
-        "doubtful": after(doubtful(file)),
+        "unreliable": after(unreliable(file)),
         "chain": chain_motion(file, start, packed),
     }
 
 
-def _texts(file: StoredResult, label: str, report: ReportText, remedy: RemedyText | None) -> PageTexts:
+def _texts(file: StoredResult, label: str, report: ReportText, fix: FixText | None) -> PageTexts:
     ended = "" if file.complete else ", ended early"
     first, last = file.time[[0, -1]].tolist()
     steps = "1 step" if file.samples == 1 else f"{file.samples} steps"
@@ -174,7 +174,7 @@ def _texts(file: StoredResult, label: str, report: ReportText, remedy: RemedyTex
         report=report,
         provenance=provenance_rows(file.provenance()),
         inputs=[input_text(each) for each in file.inputs()],
-        remedy=remedy,
+        fix=fix,
     )
 
 
@@ -191,7 +191,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     }
 
 
-def doubtful(result: StoredResult) -> list[list[float]]:
+def unreliable(result: StoredResult) -> list[list[float]]:
     """Return the intervals (s) at the ends of a recording where derivatives of its splines are unreliable.
 
     Raises:
@@ -199,7 +199,7 @@ def doubtful(result: StoredResult) -> list[list[float]]:
     """
     with reporting_damage(result.path, "report"):
         columns = [column for fit in result.report_json.get("fits", ()) for column in fit["columns"]]
-        ends = [column["doubtful"] for column in columns if "doubtful" in column]
+        ends = [column["unreliable"] for column in columns if "unreliable" in column]
         start, end = (max((float(each[side]) for each in ends), default=0.0) for side in ("start", "end"))
     if not start and not end:
         return []
@@ -265,7 +265,7 @@ def measured_page(
     data = {
         "kind": "over time",
         "joints": [],
-        "files": [{"label": texts.label, "troubles": {}, "doubtful": [], "chain": None}],
+        "files": [{"label": texts.label, "troubles": {}, "unreliable": [], "chain": None}],
         "start": 0.0,
         "span": [
             min((float(curve.time[0]) for curve in every), default=0.0),

@@ -131,10 +131,10 @@ def make_legible(figure: Figure) -> None:
         assert isinstance(text, Text)
         missing = frozenset(text.get_text()) - usual_letters()
         if missing:
-            _mend(text, missing)
+            _make_legible(text, missing)
 
 
-def _mend(text: Text, missing: frozenset[str]) -> None:
+def _make_legible(text: Text, missing: frozenset[str]) -> None:
     fonts = further_fonts(missing)
     text.set_fontfamily([USUAL, *(name for name, _ in fonts)])
     drawn = frozenset("").union(*(letters for _, letters in fonts))

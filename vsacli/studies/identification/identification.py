@@ -26,10 +26,10 @@ from vsacli.studies.identification.consistent_links import ConsistentLinks, doub
 from vsacli.studies.identification.explanations import Explanation, explanation
 from vsacli.studies.identification.fitted_system import Solution, solution
 from vsacli.studies.identification.identification_report import (
-    DOUBTFUL,
-    MISFIT,
     OK,
-    UNTOLD,
+    POOR_FIT,
+    UNIDENTIFIABLE,
+    UNRELIABLE,
     Identification,
     Number,
     RecordReport,
@@ -198,12 +198,13 @@ def _verdict(
     of_gains: Sequence[Gain],
 ) -> str:
     residuals = [each for system in systems for each in system.residuals]
-    if any(record.doubts for record in records) or any(each.doubtful for each in of_gains):
-        return DOUBTFUL
+    if any(record.doubts for record in records) or any(each.unreliable for each in of_gains):
+        return UNRELIABLE
     held = all(system.converged for system in systems) and (links is None or links.within)
     if any(map(_fails, residuals)) or not held or any(each.matters for each in explained):
-        return MISFIT
-    return OK if all(number.identifiable for system in systems for number in system.numbers) else UNTOLD
+        return POOR_FIT
+    numbers = (number for system in systems for number in system.numbers)
+    return OK if all(number.identifiable for number in numbers) else UNIDENTIFIABLE
 
 
 def _fails(residual: Residual) -> bool:
@@ -252,7 +253,7 @@ def _explanations(
     # links are identified from the torque of springs, so a fault of the springs would be explained twice
     explained: list[Explanation] = []
     for system, report in zip(found, reports, strict=True):
-        wrong = any(each.matters for each in explained) or any(each.doubtful for each in of_gains)
+        wrong = any(each.matters for each in explained) or any(each.unreliable for each in of_gains)
         if system.system.title != LINKS or not wrong:
             fails = any(map(_fails, report.residuals))
             explained.append(explanation(robot, system, signals, fails=fails))

@@ -22,7 +22,7 @@ from vsacli.studies.identification.fitted_system import Solution, held_out, rms
 from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recordings import TORQUE, Record
 
-OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
+OK, UNIDENTIFIABLE, POOR_FIT, UNRELIABLE = "ok", "unidentifiable", "poor_fit", "unreliable"
 """Verdicts, the worst last: all parameters are identified; some are not; residuals exceed the noise; a
 recording looks wrong."""
 
@@ -184,7 +184,7 @@ class Identification(Published):
 
     Attributes:
         robot: name of the robot.
-        verdict: `ok`, or the worst of `untold`, `misfit` and `doubtful`.
+        verdict: `ok`, or the worst of `unidentifiable`, `poor_fit` and `unreliable`.
         records: properties and use of each recording.
         systems: results, joint by joint, then those of the links.
         notes: further findings, as sentences.
@@ -229,7 +229,7 @@ class Identification(Published):
 
     def _headline(self) -> str:
         count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
-        return f"{self.robot} from {count}: {self.verdict.upper()}"
+        return f"{self.robot} from {count}: {self.verdict.upper().replace('_', ' ')}"
 
     def _summary(self) -> str:
         """Return the numbers of parameters that agree with the file, differ, or are unidentifiable."""

@@ -39,7 +39,7 @@ from vsacli.studies.measured.likely_causes import exchanged, likely_causes
 from vsacli.studies.measured.pairing import exactness, tame
 
 ELSEWHERE = 0.5
-"""Relative distance from deflections on the preload's branch above which deflections are on another one."""
+"""Relative distance from deflections on the robot's branch above which deflections are on another one."""
 
 FOLLOWS_BETTER = 0.25
 """Variance of a motor about another joint, relative to that about its own joint, below which it follows the
@@ -179,9 +179,9 @@ def _agreement(
 
 
 def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
-    """Yield a sentence if most deflections are on another branch than that of the preload."""
+    """Yield a sentence if most deflections are on another branch than that of the robot."""
     actuator = robot.joints[index].actuator
-    if not actuator.commanded or actuator.opposite_preload is None:
+    if not actuator.commanded or actuator.opposite_branch is None:
         return
     stride = signals.filter.stride
     q, theta = signals.q[::stride, index], signals.theta[::stride, index]
@@ -191,8 +191,8 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
     off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)
     if np.mean(off) > 1 / 2:
         yield (
-            f"the springs of {robot.joint_names[index]} are deflected as with the preload "
-            f"{actuator.opposite_preload}: the columns of motors 1 and 2 may be exchanged, or the preload in "
+            f"the springs of {robot.joint_names[index]} are deflected as on the branch "
+            f"{actuator.opposite_branch}: the columns of motors 1 and 2 may be exchanged, or the branch in "
             "the robot file is the other"
         )
 
@@ -286,11 +286,11 @@ class Gain(NamedTuple):
 
     Attributes:
         sentence: finding as a sentence.
-        doubtful: whether the torques, rather than the robot, are likely wrong.
+        unreliable: whether the torques, rather than the robot, are likely wrong.
     """
 
     sentence: str
-    doubtful: bool
+    unreliable: bool
 
 
 def gains(
@@ -401,11 +401,11 @@ def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bo
     alike = f"{found.system.title}: the numbers found are {factor} times those of the file, all of them"
     carried = f"what springs carry by these numbers is {by_links} times what links as in the file need"
     if by_links and by_links.differs(1.0) and not by_links.differs(factor.value):
-        return Gain(f"{alike}, and {carried}: the torques read too {size}", doubtful=True)
+        return Gain(f"{alike}, and {carried}: the torques read too {size}", unreliable=True)
     if by_links and by_links.differs(factor.value) and not by_links.differs(1.0):
-        return Gain(f"{alike}, but {carried}: it is springs and motors that differ", doubtful=False)
+        return Gain(f"{alike}, but {carried}: it is springs and motors that differ", unreliable=False)
     beside = f"{carried}, which does not decide it" if by_links else "the links tell nothing of it"
     if rotor:
         reason = "a rotor and springs hardly differ alike, torques that read too {size} make them"
-        return Gain(f"{alike}: {reason.format(size=size)}; {beside}", doubtful=True)
-    return Gain(f"{alike}: torques that read too {size} look the same; {beside}", doubtful=False)
+        return Gain(f"{alike}: {reason.format(size=size)}; {beside}", unreliable=True)
+    return Gain(f"{alike}: torques that read too {size} look the same; {beside}", unreliable=False)

@@ -165,7 +165,7 @@ def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
 
 def doubts(columns: Sequence[Column]) -> Iterator[str]:
     """Yield sentences on reasons for an unreliable fit."""
-    yield from _together((column.name, clause) for column in columns for clause in _doubtful_clauses(column))
+    yield from _together((column.name, clause) for column in columns for clause in _fault_clauses(column))
 
 
 def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -225,7 +225,7 @@ def _still(columns: Sequence[Column], joint: str) -> Iterator[str]:
         )
 
 
-def _doubtful_clauses(column: Column) -> Iterator[str]:
+def _fault_clauses(column: Column) -> Iterator[str]:
     is_torque = column.place[0] == TORQUE
     inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps at both ends of a motion
     time, values = column.time[inner], column.values[inner]

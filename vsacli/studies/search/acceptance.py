@@ -281,7 +281,7 @@ class RecordedLimits:
 
         Args:
             robot: robot of the task.
-            joint: joint of the robot, perhaps with the other preload.
+            joint: joint of the robot, perhaps on the other branch.
             values: variables of the joint, with `flags` that ignore the uncertainty.
             instants: times of the samples in the task.
         """

@@ -18,11 +18,11 @@ from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.changed_motion import as_one_function, with_changed_stiffness
 from vsacli.studies.search.criteria import CRITERIA, Criterion, run_costs
+from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.loads import Load, joint_loads, periods, rests
 from vsacli.studies.search.optimum import JointOptimum, Optimum
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.studies.search.stiffness import Profile, StiffnessSearch
-from vsacli.studies.search.suggestions import Remedy
 from vsacli.studies.search.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -105,7 +105,7 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
     None means that it keeps them; an empty array means that only the self-check fails.
     """
     task = Task(Acceptance(what.robot, what.margin), trajectory)
-    return task.falls_short(Remedy(0.0, what.robot, trajectory))
+    return task.falls_short(Fix(0.0, what.robot, trajectory))
 
 
 HALVES = 2

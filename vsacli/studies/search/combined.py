@@ -1,4 +1,4 @@
-"""Search over slow-down, stiffness and preload together, for the combination of least cost.
+"""Search over slow-down, stiffness and branch together, for the combination of least cost.
 
 The factor of the slow-down determines the link torques, and with these the attainable range and the limits of
 a joint do not depend on the other joints. So the search is one-dimensional, over the factor; at each factor,
@@ -23,7 +23,7 @@ from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffne
 from vsacli.studies.search.loads import Instants, Load, TaskSamples, joined
 from vsacli.studies.search.path_commands import PathCommands, Speeds
 from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
-from vsacli.studies.search.task import Combination, Form, Task, constant_change, preload_path
+from vsacli.studies.search.task import Combination, Form, Task, branch_path, constant_change
 
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Pairs of a factor and the relative stride of the scan up to it: fine strides for small slow-downs."""
@@ -34,8 +34,8 @@ MOST_ROUNDS = 20
 SAME_CORRIDOR = 1e-6
 """Relative difference up to which the ends of attainable ranges are equal but for rounding."""
 
-PRELOAD_GAIN = 0.9
-"""Share of a joint's cost below which the other preload must bring it to be preferred."""
+BRANCH_GAIN = 0.9
+"""Share of a joint's cost below which the other branch must bring it to be preferred."""
 
 
 class CombinedSearch:
@@ -46,20 +46,20 @@ class CombinedSearch:
     Args:
         task: motion to fix, acceptance rule, and cost.
         form: search for the stiffness change of a joint.
-        preloads: whether joints may change to the other preload.
+        branches: whether joints may change to the other branch.
     """
 
-    def __init__(self, task: Task, form: Form = constant_change, *, preloads: bool = False) -> None:
+    def __init__(self, task: Task, form: Form = constant_change, *, branches: bool = False) -> None:
         self.task, self.form = task, form
         watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
-        self._choices = _choices(task.acceptance.robot, watched if preloads else None)
+        self._choices = _choices(task.acceptance.robot, watched if branches else None)
         self._factors = Factors.of(task.trajectory)
         self._watch(watched)
-        self._impossible = task.impossible.setdefault((form, preloads), set())
+        self._impossible = task.impossible.setdefault((form, branches), set())
 
     @property
     def exchangeable(self) -> bool:
-        """Whether the other preload of some joint makes a difference."""
+        """Whether the other branch of some joint makes a difference."""
         return any(len(choices) > 1 for choices in self._choices)
 
     def smallest(self) -> Combination | None:
@@ -207,24 +207,24 @@ class CombinedSearch:
         return Combination(
             factor,
             changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
-            preloads={index: preload for index, (_, preload, _) in enumerate(found) if preload},
+            branches={index: branch for index, (_, branch, _) in enumerate(found) if branch},
             size=math.hypot(self.task.cost.of_factor(factor), *(size for size, _, _ in found)),
         )
 
     def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
-        """Return cost, preload ("" if unchanged) and change of stiffness of one joint."""
+        """Return cost, branch ("" if unchanged) and change of stiffness of one joint."""
         if index in self.task.acceptance.ignored:
             return 0.0, "", np.zeros(len(load.time))
         asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
-        for preload, joint in choices.items():
+        for branch, joint in choices.items():
             try:
                 change = self._change(joint, load)
             except ImpossibleError as error:
                 reason = error
                 continue
             size = self.task.cost.of_stiffness(asked, change) if change.any() else 0.0
-            if best is None or size < PRELOAD_GAIN * best[0]:
-                best = size, preload, change
+            if best is None or size < BRANCH_GAIN * best[0]:
+                best = size, branch, change
             if not size:
                 break
         if best is None:
@@ -252,27 +252,27 @@ class CombinedSearch:
 
 
 def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
-    """Return the variants of each joint by preload; the key "" is the unchanged joint.
+    """Return the variants of each joint by branch; the key "" is the unchanged joint.
 
     Args:
         robot: robot with the joints.
-        watched: samples at which the other preload must make a difference to be a variant; None for no
-            other preload.
+        watched: samples at which the other branch must make a difference to be a variant; None for no
+            other branch.
     """
     choices = [{"": joint} for joint in robot.joints]
     if watched is None:
         return choices
     for index, (joint, load) in enumerate(zip(robot.joints, watched.loads(robot), strict=True)):
-        preload = joint.actuator.opposite_preload
-        if preload is not None:
-            exchanged = robot.replace(preload_path(robot, index), preload).joints[index]
+        branch = joint.actuator.opposite_branch
+        if branch is not None:
+            exchanged = robot.replace(branch_path(robot, index), branch).joints[index]
             if not _alike(joint.actuator, exchanged.actuator, load.command):
-                choices[index][preload] = exchanged
+                choices[index][branch] = exchanged
     return choices
 
 
 def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
-    """Return whether the preloads of an actuator are mirror images, as those of equal springs are."""
+    """Return whether the branches of an actuator are mirror images, as those of equal springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
     asked = command.tau_e, command.commanded["stiffness"], command.q

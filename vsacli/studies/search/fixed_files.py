@@ -1,4 +1,4 @@
-"""A fix as files: the trajectory, a CSV table for signals without a formula, a robot with another preload."""
+"""A fix as files: the trajectory, a CSV table for signals without a formula, a robot with another branch."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from vsacli.base.wrench import wrench_columns
 from vsacli.documents.edited import edited, moved_files
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.file import text_to_change
+from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
-from vsacli.studies.search.suggestions import Remedy
-from vsacli.studies.search.task import preload_path
+from vsacli.studies.search.task import branch_path
 from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.samples import SampledProfile
@@ -48,30 +48,30 @@ def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
         outputs.check(file)
 
 
-def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
-    """Write the trajectory of a fix, and its robot if that has another preload.
+def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
+    """Write the trajectory of a fix, and its robot if that has another branch.
 
     Signals in closed form remain formulas; the others are written to a CSV file of the same stem, at the
-    samples and with all derivatives. The robot file is a copy of the user's file with the preload changed.
+    samples and with all derivatives. The robot file is a copy of the user's file with the branch changed.
 
     Raises:
         InputError, StorageError: see `check_fixed_target`; or the robot file does not admit the change, or
             writing fails.
     """
     document, table, robot = fixed_paths(path)
-    trajectory, names = remedy.declared, remedy.robot.joint_names
+    trajectory, names = fix.declared, fix.robot.joint_names
     declared = _declared(trajectory, table.name)
     recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
     beside = None
     if recorded:
         beside = TableFile(table.name, lambda file: _write_table(trajectory, recorded, names, file))
-    text = edited_text(remedy, beside, document.parent) if recorded in ([], [STIFFNESS]) else None
-    lines = _document(trajectory, remedy.factor, declared) if text is None else [text]
+    text = edited_text(fix, beside, document.parent) if recorded in ([], [STIFFNESS]) else None
+    lines = _document(trajectory, fix.factor, declared) if text is None else [text]
     contents: dict[Path, Callable[[TextIO], object]] = {document: lambda file: file.writelines(lines)}
     if beside is not None:
         contents[table] = beside.write
-    if remedy.preload is not None:
-        contents[robot] = lambda file: file.write(robot_text(remedy, robot.parent))
+    if fix.branch is not None:
+        contents[robot] = lambda file: file.write(robot_text(fix, robot.parent))
     for target, write in contents.items():
         with outputs.file(target).opened() as stream:
             write(stream)
@@ -169,23 +169,23 @@ def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
     return wrench_columns(name) if name in WRENCH.names else [f"{joint}.{name}" for joint in joint_names]
 
 
-def robot_text(remedy: Remedy, folder: Path) -> str:
-    """Return the text of the robot's file with the preloads of a fix, for a file in `folder`.
+def robot_text(fix: Fix, folder: Path) -> str:
+    """Return the text of the robot's file with the branches of a fix, for a file in `folder`.
 
     Everything else, comments included, remains as the user wrote it; paths still refer to the same files.
 
     Raises:
         InputError: the robot was not read from a file, or its text does not admit the change.
     """
-    assert remedy.preload is not None
-    own, home = text_to_change(remedy.robot)
+    assert fix.branch is not None
+    own, home = text_to_change(fix.robot)
     values = {
-        preload_path(remedy.robot, remedy.robot.joint_names.index(joint)): preload
-        for joint, preload in remedy.preload.preloads.items()
+        branch_path(fix.robot, fix.robot.joint_names.index(joint)): branch
+        for joint, branch in fix.branch.branches.items()
     }
     try:
         return edited(own, values | dict(moved_files(own, home, folder)))
     except InputError as error:
         raise InputError.one(
-            f"{remedy.preload.sentence} there by hand: {error}", remedy.robot.sources[0].path
+            f"{fix.branch.sentence} there by hand: {error}", fix.robot.sources[0].path
         ) from None

@@ -20,7 +20,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.storage import reading_copies, temporary_folder
 from vsacli.documents.edited import MappingNode, Node, ScalarNode, edited, moved_files, node_at, root_of
 from vsacli.documents.source import is_table
-from vsacli.studies.search.suggestions import Remedy
+from vsacli.studies.search.fix_report import Fix
 from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.curves.steps import Chain
@@ -135,23 +135,23 @@ class TableFile(NamedTuple):
     write: Callable[[TextIO], object]
 
 
-def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | None:
+def edited_text(fix: Fix, table: TableFile | None, folder: Path) -> str | None:
     """Return the text of the user's file with the fix applied; None if the file does not admit it.
 
     Args:
-        remedy: fix to apply.
+        fix: fix to apply.
         table: table with the stiffness, if it no longer has a formula.
         folder: folder of the new file.
     """
-    asked = remedy.asked
+    asked = fix.asked
     source = None if asked is None else next(iter(asked.sources), None)
     if asked is None or source is None or source.text is None or is_table(source.path):
         return None
-    for values in _candidates(remedy, asked, source.text):
+    for values in _candidates(fix, asked, source.text):
         try:
             text = _with(source.text, values, table)
             moved = dict(moved_files(source.text, Path(source.path).parent, folder))
-            if _says(text, source.path, remedy, table):
+            if _says(text, source.path, fix, table):
                 kept = {
                     path: file for path, file in moved.items() if table is None or path != "stiffness.file"
                 }
@@ -161,15 +161,15 @@ def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | 
     return None
 
 
-def _candidates(remedy: Remedy, asked: Trajectory, text: str) -> Iterator[Values]:
+def _candidates(fix: Fix, asked: Trajectory, text: str) -> Iterator[Values]:
     """Yield values by path that may declare the fix: first with other times, then with `slow_down`."""
-    root, names = root_of(text), remedy.robot.joint_names
-    fixed = remedy.declared
+    root, names = root_of(text), fix.robot.joint_names
+    fixed = fix.declared
     named = {"name": fixed.name}
-    if remedy.factor == 1:
+    if fix.factor == 1:
         yield named | _changed(root, asked, fixed, names) | _duration(root, asked, fixed)
-    factor = 1 + remedy.longer
-    unstretched = fixed if remedy.factor != 1 else fixed.stretched(1 / factor)
+    factor = 1 + fix.longer
+    unstretched = fixed if fix.factor != 1 else fixed.stretched(1 / factor)
     before = node_at(root, "slow_down")
     declared = float(before.value) if isinstance(before, ScalarNode) else 1.0
     slower = {} if factor == 1 else {"slow_down": _rounded(declared * factor)}
@@ -259,7 +259,7 @@ def _with(text: str, values: Values, table: TableFile | None) -> str:
     return text
 
 
-def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool:
+def _says(text: str, path: str, fix: Fix, table: TableFile | None) -> bool:
     """Return whether a text in place of the user's file reproduces the fix at every sample."""
     with temporary_folder() as place:
         copies = {path: str(place / "text")}
@@ -269,8 +269,8 @@ def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool
             with (place / "table").open("w", encoding="utf-8") as stream:
                 table.write(stream)
         with reading_copies(copies):
-            again = load_trajectory(path, remedy.robot)
-    wanted = remedy.trajectory
+            again = load_trajectory(path, fix.robot)
+    wanted = fix.trajectory
     if again.samples != wanted.samples:
         return False
     blocks = (each.block(0, each.samples).variables() for each in (again, wanted))

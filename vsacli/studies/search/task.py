@@ -1,6 +1,6 @@
 """A task to be fixed: its acceptance rule, the cost of changes, the fixes, and the run that confirms each.
 
-A search yields a `Combination` of changes; `Task` turns it into a `Remedy` with a trajectory and a robot.
+A search yields a `Combination` of changes; `Task` turns it into a `Fix` with a trajectory and a robot.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from vsacli.studies.search.changed_motion import (
     with_kept_rate,
     with_raised_stiffness,
 )
+from vsacli.studies.search.fix_report import (
+    Fix,
+    JointChange,
+    LongerTransition,
+    Offset,
+    OtherBranch,
+    SlowDown,
+    StiffnessOffset,
+    StiffnessProfile,
+)
 from vsacli.studies.search.loads import Load, TaskSamples, joint_loads
 from vsacli.studies.search.nearest_profile import Change, nearest_change
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
     smallest_offset,
     smallest_transition,
-)
-from vsacli.studies.search.suggestions import (
-    JointChange,
-    LongerTransition,
-    Offset,
-    OtherPreload,
-    Remedy,
-    SlowDown,
-    StiffnessOffset,
-    StiffnessProfile,
 )
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.times import ResampledTimes
@@ -106,13 +106,13 @@ class Combination:
     Attributes:
         factor: factor of the slow-down, at least 1.
         changes: additions to the stiffness, (samples,), by joint index; joints without one are left out.
-        preloads: new preloads, by joint index; joints that keep theirs are left out.
+        branches: new branches, by joint index; joints that keep theirs are left out.
         size: total cost of the changes.
     """
 
     factor: float
     changes: Mapping[int, FloatArray]
-    preloads: Mapping[int, str]
+    branches: Mapping[int, str]
     size: float
 
     @property
@@ -121,18 +121,16 @@ class Combination:
         return {index: float(change[0]) for index, change in self.changes.items()}
 
     def robot(self, robot: Robot) -> Robot:
-        """Return a robot with the preloads of the combination."""
-        return robot.replace(
-            {preload_path(robot, index): preload for index, preload in self.preloads.items()}
-        )
+        """Return a robot with the branches of the combination."""
+        return robot.replace({branch_path(robot, index): branch for index, branch in self.branches.items()})
 
 
 AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
 
-def preload_path(robot: Robot, index: int) -> str:
-    """Return the path of a joint's preload in the robot file."""
-    return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"
+def branch_path(robot: Robot, index: int) -> str:
+    """Return the path of a joint's branch in the robot file."""
+    return f"joints.{index}.actuator.{robot.joints[index].actuator.branch_field}"
 
 
 _Found = TypeVar("_Found")
@@ -158,7 +156,7 @@ class Task:
         keeps_rate: whether a recording that is slowed down is sampled at its original rate; otherwise its own
             samples are kept, further apart.
         impossible: numbers of the factors (see `Factors`) at which no change is accepted, by form and whether
-            preloads may change; also valid for the same task under a stricter rule, which shares them.
+            branches may change; also valid for the same task under a stricter rule, which shares them.
     """
 
     acceptance: Acceptance
@@ -168,10 +166,10 @@ class Task:
     impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
 
     def acceptance_with(self, found: Combination) -> Acceptance:
-        """Return the acceptance rule for the robot with the preloads of a combination."""
+        """Return the acceptance rule for the robot with the branches of a combination."""
         return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
 
-    def with_constants(self, found: Combination) -> Remedy:
+    def with_constants(self, found: Combination) -> Fix:
         """Return the fix by a combination whose changes of stiffness are constant."""
         offsets = tuple(
             Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
@@ -182,19 +180,19 @@ class Task:
         stretched, factor = self._stretched(found.factor, changed=changed)
         raised = with_raised_stiffness(stretched, found.constants)
         declared, factor = self._kept_rate(raised, factor, found)
-        return Remedy(
+        return Fix(
             size=found.size,
             robot=found.robot(self.acceptance.robot),
             declared=declared,
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
-            preload=self._preload(found),
+            branch=self._branch(found),
             stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
         )
 
-    def with_profiles(self, found: Combination) -> Remedy:
-        """Return the fix with the slow-down and preloads of a combination and the nearest stiffness profiles.
+    def with_profiles(self, found: Combination) -> Fix:
+        """Return the fix with the slow-down and branches of a combination and the nearest stiffness profiles.
 
         Raises:
             ImpossibleError: no profile was found for some joint.
@@ -208,18 +206,18 @@ class Task:
         scale = factor ** np.arange(STIFFNESS.orders)[:, None]
         at_steps = {index: scale * change.rows[:, load.steps] for index, (load, change) in changes.items()}
         declared, factor = self._kept_rate(with_changed_stiffness(stretched, at_steps), factor, found)
-        return Remedy(
+        return Fix(
             size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
             robot=robot,
             declared=declared,
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
-            preload=self._preload(found),
+            branch=self._branch(found),
             stiffness_profile=StiffnessProfile(summaries) if summaries else None,
         )
 
-    def with_transition(self) -> Remedy:
+    def with_transition(self) -> Fix:
         """Return the fix with the shortest accepted transitions between stiffness levels.
 
         Raises:
@@ -234,7 +232,7 @@ class Task:
             for old, new in zip(asked, changed, strict=True)
             if not np.isnan(old).any()
         ]
-        return Remedy(
+        return Fix(
             size=math.hypot(*sizes),
             robot=self.acceptance.robot,
             declared=longer,
@@ -291,42 +289,42 @@ class Task:
     def _slow_down(self, found: Combination) -> SlowDown | None:
         return SlowDown(found.factor, self.trajectory.duration) if found.factor > 1 else None
 
-    def _preload(self, found: Combination) -> OtherPreload | None:
+    def _branch(self, found: Combination) -> OtherBranch | None:
         names = self.acceptance.robot.joint_names
-        preloads = {names[index]: preload for index, preload in found.preloads.items()}
-        return OtherPreload(preloads) if preloads else None
+        branches = {names[index]: branch for index, branch in found.branches.items()}
+        return OtherBranch(branches) if branches else None
 
-    def falls_short(self, remedy: Remedy) -> FloatArray | None:
+    def falls_short(self, fix: Fix) -> FloatArray | None:
         """Run a fix; return instants at which it misses the margin or a limit, or None if it is confirmed.
 
         Instants are times since the start of the unchanged task, s: the worst ones in the report of the run,
         also between samples, and those of a grid `FINER` times as fine. None are returned if only the
         self-check fails.
         """
-        run = Run(remedy.robot, remedy.trajectory, near_singular=self.acceptance.near_singular)
+        run = Run(fix.robot, fix.trajectory, near_singular=self.acceptance.near_singular)
         for _ in run:
             pass
         report = run.report()
         counted = (each for index, each in enumerate(report.joints) if index not in self.acceptance.ignored)
         short = [joint for joint in counted if self._is_short(joint)]
-        refused = self._refused_between(remedy)
+        refused = self._refused_between(fix)
         if report.self_check.passed and not short and not refused.size:
             return None
         worst = [time for joint in short for time in (joint.margin_time, *_times(joint))]
-        elapsed = (np.array(worst) - remedy.trajectory.start) / (1 + remedy.longer)
+        elapsed = (np.array(worst) - fix.trajectory.start) / (1 + fix.longer)
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 
     def _is_short(self, joint: JointReport) -> bool:
         """Return whether a joint has less than the required margin or a verdict of `REFUSED`."""
         return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
 
-    def _refused_between(self, remedy: Remedy) -> FloatArray:
+    def _refused_between(self, fix: Fix) -> FloatArray:
         """Return up to `WATCHED_STEPS` refused instants between the samples of a fix, s."""
-        trajectory, factor = remedy.trajectory, 1 + remedy.longer
+        trajectory, factor = fix.trajectory, 1 + fix.longer
         # the allowance for the noise of a recording is known at samples only; the run checks between them
         if not trajectory.known_between or trajectory.estimates:
             return np.empty(0)
-        acceptance = replace(self.acceptance, robot=remedy.robot, between=np.empty(0))
+        acceptance = replace(self.acceptance, robot=fix.robot, between=np.empty(0))
         steps = (trajectory.times.block(0, trajectory.samples) - trajectory.start) / factor
         parts = max(1, min(FINER, MOST_INSTANTS // len(steps)))
         elapsed = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()

@@ -55,14 +55,14 @@ class Sizing(Published):
         """First verdict that applies.
 
         They are self_check_failed (as for a run), insufficient if nothing suffices for some motor, incomplete
-        if samples were left out, doubtful (as for a run), and ok.
+        if samples were left out, unreliable (as for a run), and ok.
         """
         verdicts = [outcome.verdict for outcome in self.outcomes]
         applies = {
             "self_check_failed": "self_check_failed" in verdicts,
             "insufficient": bool(self.lacking),
             "incomplete": any(outcome.left_out for outcome in self.outcomes),
-            "doubtful": "doubtful" in verdicts,
+            "unreliable": "unreliable" in verdicts,
         }
         return next((verdict for verdict, holds in applies.items() if holds), "ok")
 

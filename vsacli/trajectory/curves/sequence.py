@@ -253,12 +253,12 @@ class Sequence(Formula):
             else:
                 name = self.signal.names[jump.order]
                 change = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
-                yield FieldProblem(part, f"{change}; {self._remedy()}", jump.component)
+                yield FieldProblem(part, f"{change}; {self._advice()}", jump.component)
 
-    def _remedy(self) -> str:
+    def _advice(self) -> str:
         smooth = "twice" if self.use.rigid else "four times"
-        remedy = f"the motion must be {smooth} continuously differentiable, so that parts meet at rest"
-        return f"{remedy}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
+        advice = f"the motion must be {smooth} continuously differentiable, so that parts meet at rest"
+        return f"{advice}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
 
     def _ends(self) -> FloatArray:
         """Return start and ends of the parts, from zero on, s, (parts+1,)."""
@@ -296,5 +296,5 @@ class Sequence(Formula):
 
 
 def _elsewhere(jump: Jump, path: tuple[str | int, ...]) -> str:
-    remedy = "leave this key out" if "start" in path else "begin there"
-    return f"begins at {jump.after:.12g}, but the part before ends at {jump.before:.12g}; {remedy}"
+    advice = "leave this key out" if "start" in path else "begin there"
+    return f"begins at {jump.after:.12g}, but the part before ends at {jump.before:.12g}; {advice}"

@@ -58,7 +58,7 @@ class Part:
         return np.asarray(self.spline.t[self.spline.k : -self.spline.k])
 
     @property
-    def doubtful(self) -> tuple[float, float]:
+    def unreliable(self) -> tuple[float, float]:
         """Times after the start and before the end with unreliable derivatives, s.
 
         They are (degree + 1)/2 knot spans. Beyond, noise in the highest derivative that is needed is less
@@ -71,7 +71,7 @@ class Part:
     def inside(self) -> tuple[float, float]:
         """First and last time, s, with reliable derivatives; of the middle half if that is longer."""
         first, last = self.knots[[0, -1]].tolist()
-        start, end = np.minimum(self.doubtful, (last - first) / 4).tolist()
+        start, end = np.minimum(self.unreliable, (last - first) / 4).tolist()
         return first + start, last - end
 
     def of_columns(self, columns: IndexArray) -> Part:
@@ -160,9 +160,9 @@ class Fit:
         return np.unique(np.concatenate([part.knots for part in self.parts]))
 
     @property
-    def doubtful(self) -> tuple[float, float]:
+    def unreliable(self) -> tuple[float, float]:
         """Times after the start and before the end with unreliable derivatives of any component, s."""
-        stretches = [part.doubtful for part in self.parts] or [(0.0, 0.0)]
+        stretches = [part.unreliable for part in self.parts] or [(0.0, 0.0)]
         starts, ends = zip(*stretches, strict=True)
         return max(starts), max(ends)
 

@@ -78,11 +78,11 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
         elif not known.determined:
             yield (
                 f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square; {_remedy(part)}"
+                f" {100 * known.relative:.2g} % of its root mean square; {_advice(part)}"
             )
 
 
-def _remedy(part: Part) -> str:
+def _advice(part: Part) -> str:
     if part.noise is not None:
         return (
             f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"
@@ -150,7 +150,7 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
                 "knots": len(part.knots),
                 "residual": {"rms": float(fit.residual[member]), "max": float(fit.largest[member])},
                 "noise": float(fit.noise[member]),
-                "doubtful": dict(zip(("start", "end"), part.doubtful, strict=True)),
+                "unreliable": dict(zip(("start", "end"), part.unreliable, strict=True)),
                 "band": _band(part, member, fit),
                 **_judgement(part),
             }
@@ -196,7 +196,7 @@ def _misfit(parts: Sequence[Part], labels: Sequence[str], fit: Fit) -> str:
 
 
 def _trust(time: FloatArray, parts: Sequence[Part]) -> str:
-    start, end = (max(stretch) for stretch in zip(*(part.doubtful for part in parts), strict=True))
+    start, end = (max(stretch) for stretch in zip(*(part.unreliable for part in parts), strict=True))
     if start + end >= time[-1] - time[0]:
-        return "on so few knots, derivatives are doubtful far into the record from both ends"
-    return f"derivatives are doubtful in the first {start:.3g} s and the last {end:.3g} s"
+        return "on so few knots, derivatives are unreliable far into the record from both ends"
+    return f"derivatives are unreliable in the first {start:.3g} s and the last {end:.3g} s"

@@ -60,7 +60,7 @@ def mismatches(
         fit: fit of the signal.
         start: stamp of time zero, s, added to reported times.
     """
-    first, last = np.minimum(fit.doubtful, (time[-1] - time[0]) / 4)
+    first, last = np.minimum(fit.unreliable, (time[-1] - time[0]) / 4)
     inside = (time >= time[0] + first) & (time <= time[-1] - last)
     if not inside.any() or all(given is None for given in derivatives):
         return

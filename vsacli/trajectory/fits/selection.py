@@ -171,7 +171,7 @@ def _better(judge: Part, difference: float, record: Record, filtered: bool) -> b
 def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
     """Return the relative difference of the highest derivatives of a fit and a smoothing spline, inside."""
     time, order = record.time, record.order
-    start, end = smooth.doubtful
+    start, end = smooth.unreliable
     inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
     probes = inside[:: 1 + len(inside) // PROBES]
     expected = smooth.spline(probes, nu=order)[:, 0]

@@ -115,7 +115,7 @@ def column_layout(
     known = _known(of_every_joint)
     if _is_foreign(names, known):
         examples = f"{', '.join(expected[:2])}, ..."
-        message = f"has no column of a trajectory ({examples}); {_remedy(file)}"
+        message = f"has no column of a trajectory ({examples}); {_advice(file)}"
         raise InputError.one(message, file, line)
     problems = list(_strangers(names, expected, known, file))
     problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
@@ -193,7 +193,7 @@ def _strangers(
         named = ", ".join(map(repr, others[:MOST_NAMED]))
         words = "unknown column" if len(others) == 1 else f"{len(others)} unknown columns,"
         such = "" if len(others) <= MOST_NAMED else " such as"
-        yield f"{words}{such} {named}; {_remedy(file)}"
+        yield f"{words}{such} {named}; {_advice(file)}"
 
 
 def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
@@ -204,7 +204,7 @@ def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
     return none_known and any(nearest(name, signals) is None for name in columns)
 
 
-def _remedy(file: str) -> str:
+def _advice(file: str) -> str:
     return (
         f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
         f" ignore: {REST} there leaves out those without use"

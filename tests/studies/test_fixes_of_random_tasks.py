@@ -77,10 +77,10 @@ def changed_motion(motion, factor, offset):
 
 
 def exchanged(robot):
-    """The robot with the other preload wherever there is one."""
-    preloads = {index: joint.actuator.opposite_preload for index, joint in enumerate(robot.joints)}
+    """The robot with the other branch wherever there is one."""
+    branches = {index: joint.actuator.opposite_branch for index, joint in enumerate(robot.joints)}
     return robot.replace(
-        {f"joints.{index}.actuator.preload": preload for index, preload in preloads.items() if preload}
+        {f"joints.{index}.actuator.branch": branch for index, branch in branches.items() if branch}
     )
 
 
@@ -110,7 +110,7 @@ def check_alone(found, robot, trajectory, motion, joints):
     constants = scanned([robot], motion, joints, factors=(1.0,), offsets=FINE_OFFSETS)
     if math.isfinite(constants):
         assert found["stiffness_offset"]["possible"]
-    sizes = [each["size"] for each in found["remedies"] if set(each) == {"size", "stiffness_offset", "text"}]
+    sizes = [each["size"] for each in found["fixes"] if set(each) == {"size", "stiffness_offset", "text"}]
     # whole steps of the grid, of which the search has finer ones
     assert all(size <= CLOSE * constants for size in sizes[:1])
     slower = slower_by_whole_steps(robot, trajectory, motion, joints)
@@ -118,14 +118,14 @@ def check_alone(found, robot, trajectory, motion, joints):
         assert found["slow_down"]["factor"] - 1 <= CLOSE * slower
 
 
-def check_written(paths, written, remedy, joints):
+def check_written(paths, written, fix, joints):
     """The files of a fix keep margin and limits, between samples as well."""
     other = written.with_name(f"{written.stem}-robot.yaml")
-    assert other.exists() == ("preload" in remedy)
+    assert other.exists() == ("branch" in fix)
     robot = load_robot(other if other.exists() else paths[0])
     trajectory = load_trajectory(written, robot)
     assert trajectory.known_between
-    assert fine_joints(robot, finely(trajectory))[joints].all(), remedy["text"]
+    assert fine_joints(robot, finely(trajectory))[joints].all(), fix["text"]
 
 
 @pytest.mark.parametrize("seed", slow_but(QUICK, (*INFEASIBLE, *FURTHER)))
@@ -135,22 +135,22 @@ def test_every_fix_works_and_none_is_missed(tmp_path, vsacli, seed):
     trajectory = load_trajectory(paths[1], robot)
     motion = finely(trajectory)
     written, number = tmp_path / "fix.yaml", 1 + seed % WRITTEN
-    done = vsacli("check-feasibility", *paths, "--write-fixed", written, "--remedy", number, "--json")
-    found = json.loads(done.out)["suggestions"]
+    done = vsacli("check-feasibility", *paths, "--write-fix", number, "-o", written, "--json")
+    found = json.loads(done.out)["fixes"]
     failing = {robot.joint_names[index] for index in np.flatnonzero(~fine_joints(robot, motion))}
     assert failing <= {cause["joint"] for cause in found["causes"]}
     hopeless = {cause["joint"] for cause in found["causes"] if not cause["fixable"]}
     joints = [index for index, name in enumerate(robot.joint_names) if name not in hopeless]
     for index in set(range(len(robot.joints))) - set(joints):
         assert math.isinf(scanned([robot, exchanged(robot)], motion, [index]))
-    remedies = found["remedies"]
+    fixes = found["fixes"]
     if not failing - hopeless:
         return
-    smallest = min((each["size"] for each in remedies if "preload" not in each), default=math.inf)
+    smallest = min((each["size"] for each in fixes if "branch" not in each), default=math.inf)
     assert smallest <= SUPERFLUOUS * scanned([robot], motion, joints)
-    assert remedies or math.isinf(scanned([robot, exchanged(robot)], motion, joints))
+    assert fixes or math.isinf(scanned([robot, exchanged(robot)], motion, joints))
     if not trajectory.estimates:
         check_alone(found, robot, trajectory, motion, joints)
-    assert written.exists() == (number <= len(remedies))
+    assert written.exists() == (number <= len(fixes))
     if written.exists():
-        check_written(paths, written, remedies[number - 1], joints)
+        check_written(paths, written, fixes[number - 1], joints)

@@ -24,6 +24,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, RecordedLimits, Trouble
 from vsacli.studies.search.combined import CombinedSearch
+from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
@@ -32,7 +33,6 @@ from vsacli.studies.search.scans import (
     smallest_offset,
     smallest_slow_down,
 )
-from vsacli.studies.search.suggestions import Cause, NotPossible, Remedy, Suggestions
 from vsacli.studies.search.task import AS_IT_IS, Combination, Task, least_change
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -44,11 +44,11 @@ FASTER_SHARE = 0.8
 """Share of the extra duration of another fix below which a larger fix of the same kinds is worth offering."""
 
 
-def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
+def fixes(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Fixes:
     """Return the smallest changes after which every sample has the margin and keeps every limit.
 
     Slow-down, constant stiffness change, other stiffness profile and longer transition are tried alone, then
-    combinations of them to choose from, also with the other preload. A run over all samples confirms each.
+    combinations of them to choose from, also on the other branch. A run over all samples confirms each.
 
     Args:
         robot: robot that executes the motion.
@@ -64,13 +64,13 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)
-    as_it_is = Remedy(0.0, robot, trajectory)
+    as_it_is = Fix(0.0, robot, trajectory)
     if damped_joints(robot, trajectory):
         if asked.falls_short(as_it_is) is not None:
-            refuse_damped_transmissions(robot, trajectory, "suggestions")
-        return Suggestions(near_singular)
+            refuse_damped_transmissions(robot, trajectory, "fixes")
+        return Fixes(near_singular)
     if not acceptance.refused_joints(trajectory).any() and asked.falls_short(as_it_is) is None:
-        return Suggestions(near_singular)
+        return Fixes(near_singular)
     found_causes = dict(causes(asked))
     tried = _tried(asked, found_causes)
     if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
@@ -79,20 +79,20 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
             for index, cause in found_causes.items()
         }
         tried = _tried(asked, found_causes)
-    return Suggestions(
+    return Fixes(
         near_singular,
         **{name: tried.part(name) for name in ALONE},
         causes=tuple(found_causes.values()),
-        remedies=tuple(tried.chosen),
+        fixes=tuple(tried.chosen),
     )
 
 
 class _Tried(NamedTuple):
     """Results of searches by name, fixes to choose from, and fixes that a run refused between samples."""
 
-    found: Mapping[str, list[Remedy] | NotPossible]
-    chosen: list[Remedy]
-    failed: list[Remedy]
+    found: Mapping[str, list[Fix] | NotPossible]
+    chosen: list[Fix]
+    failed: list[Fix]
 
     def part(self, name: str) -> Any:
         """Return the only change of the fix that a search of `ALONE` found, or the reasons for none."""
@@ -104,9 +104,9 @@ class _Tried(NamedTuple):
         return getattr(found[0], name)
 
     @staticmethod
-    def slower(fixes: Sequence[Remedy]) -> bool:
+    def slower(candidates: Sequence[Fix]) -> bool:
         """Return whether any of the fixes slows the motion down."""
-        return any(each.longer > 0 for each in fixes)
+        return any(each.longer > 0 for each in candidates)
 
 
 def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
@@ -130,9 +130,9 @@ def _searched(asked: Task) -> _Tried:
     searches = {**ALONE, **COMBINED}
     if not has_transitions(asked.trajectory):
         del searches["transition"]
-    found: dict[str, list[Remedy] | NotPossible] = {}
-    confirmed: list[Remedy] = []
-    every_failed: list[Remedy] = []
+    found: dict[str, list[Fix] | NotPossible] = {}
+    confirmed: list[Fix] = []
+    every_failed: list[Fix] = []
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
         task = replace(asked, acceptance=rule)
@@ -145,8 +145,8 @@ def _searched(asked: Task) -> _Tried:
         chosen, failed, short = _worth_choosing(chain(*by_search.values()), asked, confirmed)
         every_failed.extend(failed)
         tried = _Tried(dict(found), chosen, every_failed)
-        for name, remedies in by_search.items():
-            if any(each is other for each in remedies for other in failed):
+        for name, own in by_search.items():
+            if any(each is other for each in own for other in failed):
                 del found[name]
         return tried, short if failed else None
 
@@ -154,31 +154,31 @@ def _searched(asked: Task) -> _Tried:
     return tried
 
 
-def _slow_down(task: Task) -> Iterator[Remedy]:
+def _slow_down(task: Task) -> Iterator[Fix]:
     factor = smallest_slow_down(task.acceptance, task.trajectory)
     yield task.with_constants(Combination(factor, {}, {}, task.cost.of_factor(factor)))
 
 
-def _constants(task: Task) -> Iterator[Remedy]:
+def _constants(task: Task) -> Iterator[Fix]:
     search = CombinedSearch(task)
     combinations = search.smallest(), search.fastest()
     return (task.with_constants(found) for found in combinations if found is not None)
 
 
-def _profiles(task: Task) -> Iterator[Remedy]:
+def _profiles(task: Task) -> Iterator[Fix]:
     least = CombinedSearch(task, least_change)
     profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
     yield from profiles or _with_profiles(task, CombinedSearch(task).smallest())
 
 
-def _other_preloads(task: Task) -> Iterator[Remedy]:
-    exchanged = CombinedSearch(task, preloads=True)
+def _other_branches(task: Task) -> Iterator[Fix]:
+    exchanged = CombinedSearch(task, branches=True)
     found = exchanged.smallest() if exchanged.exchangeable else None
-    if found is not None and found.preloads:
+    if found is not None and found.branches:
         yield task.with_constants(found)
 
 
-def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:
+def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Fix]:
     """Yield fixes with profiles at the slow-downs of these combinations, where profiles are found."""
     factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
     for found in factors.values():
@@ -186,7 +186,7 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Re
             yield task.with_profiles(found)
 
 
-_Search = Callable[[Task], Iterable[Remedy]]
+_Search = Callable[[Task], Iterable[Fix]]
 """Search for fixes of a task that its samples accept; raises ImpossibleError if there are none."""
 
 ALONE: Mapping[str, _Search] = {
@@ -195,45 +195,45 @@ ALONE: Mapping[str, _Search] = {
     "stiffness_profile": lambda task: [task.with_profiles(AS_IT_IS)],
     "transition": lambda task: [task.with_transition()],
 }
-"""Searches for one kind of change, by the name of the kind in `Suggestions`."""
+"""Searches for one kind of change, by the name of the kind in `Fixes`."""
 
 COMBINED: Mapping[str, _Search] = {
     "constants": _constants,
     "profiles": _profiles,
-    "preloads": _other_preloads,
+    "branches": _other_branches,
 }
 """Searches for fixes that may combine several kinds of change."""
 
 
 def _worth_choosing(
-    candidates: Iterable[Remedy], task: Task, confirmed: list[Remedy]
-) -> tuple[list[Remedy], list[Remedy], FloatArray]:
+    candidates: Iterable[Fix], task: Task, confirmed: list[Fix]
+) -> tuple[list[Fix], list[Fix], FloatArray]:
     """Select the fixes that a run confirms and that no simpler fix replaces.
 
     Returns:
-        Selected fixes, those with another preload last; fixes that a run refused between samples; and the
+        Selected fixes, those with another branch last; fixes that a run refused between samples; and the
         instants at which it did, as times since the start of the task, s.
     """
-    chosen: list[Remedy] = []
-    failed: list[Remedy] = []
+    chosen: list[Fix] = []
+    failed: list[Fix] = []
     instants = [np.empty(0)]
-    for remedy in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
-        if not any(_superfluous(remedy, beside) for beside in chosen):
-            known = any(remedy is each for each in confirmed)
-            short = None if known else task.falls_short(remedy)
-            (chosen if short is None else failed).append(remedy)
+    for fix in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
+        if not any(_superfluous(fix, beside) for beside in chosen):
+            known = any(fix is each for each in confirmed)
+            short = None if known else task.falls_short(fix)
+            (chosen if short is None else failed).append(fix)
             instants += [] if short is None else [short]
     confirmed += chosen
-    ordered = sorted(chosen, key=lambda each: (each.preload is not None, each.size))
+    ordered = sorted(chosen, key=lambda each: (each.branch is not None, each.size))
     return ordered, failed, np.concatenate(instants)
 
 
-def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
+def _superfluous(fix: Fix, beside: Fix) -> bool:
     """Return whether another fix with the same or fewer kinds of change makes this one superfluous."""
-    if beside.kinds < remedy.kinds:
-        return beside.size <= SIMPLER_SHARE * remedy.size
-    faster = remedy.longer < FASTER_SHARE * beside.longer
-    return beside.kinds == remedy.kinds and beside.size <= remedy.size and not faster
+    if beside.kinds < fix.kinds:
+        return beside.size <= SIMPLER_SHARE * fix.size
+    faster = fix.longer < FASTER_SHARE * beside.longer
+    return beside.kinds == fix.kinds and beside.size <= fix.size and not faster
 
 
 def causes(task: Task) -> Iterator[tuple[int, Cause]]:
@@ -257,7 +257,7 @@ def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
-    if CombinedSearch(alone, preloads=True).smallest() is not None:
+    if CombinedSearch(alone, branches=True).smallest() is not None:
         return True
     with suppress(ImpossibleError):
         alone.with_profiles(AS_IT_IS)

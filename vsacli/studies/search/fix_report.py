@@ -1,4 +1,4 @@
-"""Suggested fixes as data, JSON and sentences."""
+"""Fixes as data, JSON and sentences."""
 
 from __future__ import annotations
 
@@ -135,27 +135,27 @@ class LongerTransition(Published):
 
 
 @dataclass(frozen=True)
-class OtherPreload(Published):
-    """A change to the other preload; the new preloads are given by joint name."""
+class OtherBranch(Published):
+    """A change to the other branch; the new branches are given by joint name."""
 
-    preloads: Mapping[str, str]
+    branches: Mapping[str, str]
 
-    shape: ClassVar = {"preloads": "preloads", "text": "sentence"}
+    shape: ClassVar = {"branches": "branches", "text": "sentence"}
 
     @property
     def sentence(self) -> str:
         """Advice as a sentence, without a full stop."""
-        return "change the preload of " + ", ".join(f"{joint} to {to}" for joint, to in self.preloads.items())
+        return "change the branch of " + ", ".join(f"{joint} to {to}" for joint, to in self.branches.items())
 
 
 @dataclass(frozen=True)
-class Remedy(Published):
+class Fix(Published):
     """A fix: changes that together make a task feasible, confirmed by a run over all samples.
 
     Attributes:
         size: root of the sum of the squares of all relative changes: the factor of the slow-down less 1, and
             for each joint the rms change of its stiffness over its rms stiffness.
-        robot: robot with the new preloads.
+        robot: robot with the new branches.
         declared: trajectory with the changes, except for a slow-down that follows a fit.
         factor: factor of that slow-down; 1 if `declared` is stretched already, see `Task`.
         asked: trajectory without the changes.
@@ -170,9 +170,9 @@ class Remedy(Published):
     stiffness_offset: StiffnessOffset | None = None
     transition: LongerTransition | None = None
     stiffness_profile: StiffnessProfile | None = None
-    preload: OtherPreload | None = None
+    branch: OtherBranch | None = None
 
-    PARTS: ClassVar = ("slow_down", "preload", "transition", "stiffness_offset", "stiffness_profile")
+    PARTS: ClassVar = ("slow_down", "branch", "transition", "stiffness_offset", "stiffness_profile")
     shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
 
     @property
@@ -217,7 +217,7 @@ class Cause(Published):
 
 
 @dataclass(frozen=True)
-class Suggestions(Published):
+class Fixes(Published):
     """The fixes of a task: the smallest change of each kind alone, and combinations.
 
     Each kind is the change, the reasons why none suffices, or None if nothing needs to change or the
@@ -226,7 +226,7 @@ class Suggestions(Published):
     Attributes:
         near_singular: margin required of every sample.
         causes: reason why each refused joint is refused.
-        remedies: fixes to choose from, the smallest first; those with another preload come last.
+        fixes: fixes to choose from, the smallest first; those with another branch come last.
     """
 
     near_singular: float
@@ -235,7 +235,7 @@ class Suggestions(Published):
     stiffness_profile: StiffnessProfile | NotPossible | None = None
     transition: LongerTransition | NotPossible | None = None
     causes: tuple[Cause, ...] = ()
-    remedies: tuple[Remedy, ...] = ()
+    fixes: tuple[Fix, ...] = ()
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -248,12 +248,12 @@ class Suggestions(Published):
             return
         yield from map(str, self.causes)
         left = [cause.joint for cause in self.causes if not cause.fixable]
-        rest = f"every step of all joints but {and_joined(left)}" if left and self.remedies else "every step"
-        if self.remedies:
-            yield f"suggestions, with any one of which {rest} has {margin} and keeps every limit:"
+        rest = f"every step of all joints but {and_joined(left)}" if left and self.fixes else "every step"
+        if self.fixes:
+            yield f"fixes, with any one of which {rest} has {margin} and keeps every limit:"
         else:
             yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
-        yield from (f"{number}. {remedy.sentence}" for number, remedy in enumerate(self.remedies, 1))
+        yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
 
 
 def and_joined(names: Sequence[str]) -> str:

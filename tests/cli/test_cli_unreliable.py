@@ -52,16 +52,16 @@ def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
     assert [float(cell) for cell in first.split(",")[1:]] == deviations[0].ravel().tolist()
 
 
-def test_a_fit_that_follows_the_noise_is_used_and_doubtful(vsacli, tmp_path, noisy):
+def test_a_fit_that_follows_the_noise_is_used_and_unreliable(vsacli, tmp_path, noisy):
     done = vsacli("invdyn", ROBOT, noisy("interpolate"), "-o", "r.h5")
     assert done.code == 3
     headline, *_ = done.out.splitlines()
-    assert headline.endswith("DOUBTFUL (3 of 3 joints)")
+    assert headline.endswith("UNRELIABLE (3 of 3 joints)")
     assert "base: tau_motor is not determined by the record" in done.out
     with h5py.File(tmp_path / "r.h5") as file:
-        assert file.attrs["verdict"] == "doubtful"
+        assert file.attrs["verdict"] == "unreliable"
     shown = vsacli("info", "r.h5")
-    assert "verdict doubtful" in shown.out
+    assert "verdict unreliable" in shown.out
 
 
 def test_what_is_asked_for_decides(vsacli, noisy):

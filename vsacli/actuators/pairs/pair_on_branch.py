@@ -1,4 +1,4 @@
-"""Two springs as a robot file declares them, on the solution branch that the preload selects."""
+"""Two springs as a robot file declares them, on one of two branches."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from vsacli.actuators.reach import reach
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 
-PRELOADS = ("positive", "negative")
+BRANCHES = ("positive", "negative")
 
 
 @dataclass(frozen=True)
-class PreloadedPair:
+class PairOnBranch:
     """Springs 1 and 2, and the branch of their deflections.
 
     Attributes:
         spring: Laws as written in the robot file; `laws` has them as they act on each side.
-        preload: One of `PRELOADS`; positive has phi_1 up and phi_2 down.
+        branch: One of `BRANCHES`; positive has phi_1 up and phi_2 down.
     """
 
     spring: tuple[SpringLaw, SpringLaw]
-    preload: str
+    branch: str
 
     @cached_property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
@@ -41,20 +41,20 @@ class PreloadedPair:
         return tuple({id(law): law for law in self.spring}.values())
 
     def problems(self) -> Iterator[FieldProblem]:
-        """Yield the reasons why the springs cannot set a stiffness, in the fields `spring` and `preload`."""
+        """Yield the reasons why the springs cannot set a stiffness, in the fields `spring` and `branch`."""
         if all(spring.is_linear for spring in self.spring):
             reason = (
                 "both are linear: no motion of the motors changes the stiffness (A is singular everywhere)"
             )
             yield FieldProblem(("spring",), reason)
-        if self.preload == "negative" and any(spring.pulls_only for spring in self.spring):
-            yield FieldProblem(("preload",), "must be positive: a spring that only pulls cannot push")
+        if self.branch == "negative" and any(spring.pulls_only for spring in self.spring):
+            yield FieldProblem(("branch",), "must be positive: a spring that only pulls cannot push")
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Solve (14) on the branch, arrays (samples,)."""
         first, second = self.laws
-        # Pairs have side 1 up; a negative preload is the pair with its sides exchanged.
-        if self.preload == "negative":
+        # Pairs have side 1 up; a negative branch is the pair with its sides exchanged.
+        if self.branch == "negative":
             return make_pair(second, first).solve(tau_e, stiffness).exchanged()
         return make_pair(first, second).solve(tau_e, stiffness)
 
@@ -65,14 +65,14 @@ class PreloadedPair:
 
     @property
     def opposite(self) -> str | None:
-        """The other preload; None if a spring only pulls."""
+        """The other branch; None if a spring only pulls."""
         if any(law.pulls_only for law in self.laws):
             return None
-        return next(word for word in PRELOADS if word != self.preload)
+        return next(word for word in BRANCHES if word != self.branch)
 
     def opposite_reaches(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
-        """Return where the stiffness is attainable with the other preload, (samples,)."""
+        """Return where the stiffness is attainable on the other branch, (samples,)."""
         if self.opposite is None:
             return np.zeros(tau_e.shape, dtype=bool)
-        other = replace(self, preload=self.opposite)
+        other = replace(self, branch=self.opposite)
         return ~reach(stiffness, other.solve(tau_e, stiffness)).infeasible

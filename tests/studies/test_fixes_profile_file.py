@@ -1,4 +1,4 @@
-"""The suggested profile as a trajectory file."""
+"""The profile of a fix as a trajectory file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from samples.remedies import pushed, rest_to_rest, written
+from samples.fixes import pushed, rest_to_rest, written
 from samples.robots import vsa_3r
 
 from vsacli import load_trajectory
@@ -14,7 +14,7 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
-from vsacli.studies.search import Remedy, check_fixed_target
+from vsacli.studies.search import Fix, check_fixed_target
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
@@ -65,20 +65,20 @@ TASKS = {
 def fixed(trajectory):
     task = Task(Acceptance(vsa_3r(), 0.01), trajectory)
     for _ in range(4):
-        remedy = task.with_profiles(AS_IT_IS)
-        short = task.falls_short(remedy)
+        fix = task.with_profiles(AS_IT_IS)
+        short = task.falls_short(fix)
         if short is None:
             break
         task = replace(
             task, acceptance=replace(task.acceptance, between=np.union1d(task.acceptance.between, short))
         )
-    return remedy
+    return fix
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
-    robot, remedy = vsa_3r(), fixed(TASKS[task])
-    trajectory, paths = remedy.trajectory, written(remedy, tmp_path / "fixed.yaml")
+    robot, fix = vsa_3r(), fixed(TASKS[task])
+    trajectory, paths = fix.trajectory, written(fix, tmp_path / "fixed.yaml")
     assert paths == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
     assert sorted(tmp_path.iterdir()) == sorted(paths)
     again = load_trajectory(paths[0], robot)
@@ -110,7 +110,7 @@ def test_position_stays_a_formula(tmp_path, task, kind):
 def test_many_steps_are_written_block_by_block(tmp_path):
     robot = vsa_3r()
     trajectory = with_changed_stiffness(rest_to_rest(4.0, rate=5000), {1: np.ones((3, 20_001))})
-    path, _ = written(Remedy(0.0, robot, trajectory), tmp_path / "long.yaml")
+    path, _ = written(Fix(0.0, robot, trajectory), tmp_path / "long.yaml")
     again = load_trajectory(path, robot)
     assert again.samples == 20_001
     np.testing.assert_array_equal(
@@ -122,16 +122,16 @@ def test_many_steps_are_written_block_by_block(tmp_path):
 def test_neither_file_is_replaced_unless_asked(tmp_path, existing):
     (tmp_path / existing).write_text("mine")
     robot = vsa_3r()
-    remedy = Remedy(0.0, robot, with_changed_stiffness(SOFT, {}))
+    fix = Fix(0.0, robot, with_changed_stiffness(SOFT, {}))
     for act in (
         lambda: check_fixed_target(tmp_path / "fixed.yaml", Outputs(overwrite=False)),
-        lambda: written(remedy, tmp_path / "fixed.yaml"),
+        lambda: written(fix, tmp_path / "fixed.yaml"),
     ):
         with pytest.raises(StorageError, match=rf"{existing}: exists already; .*--overwrite"):
             act()
     assert [path.name for path in tmp_path.iterdir()] == [existing]
     assert (tmp_path / existing).read_text() == "mine"
-    written(remedy, tmp_path / "fixed.yaml", overwrite=True)
+    written(fix, tmp_path / "fixed.yaml", overwrite=True)
     assert load_trajectory(tmp_path / "fixed.yaml", robot).samples == SOFT.samples
 
 

@@ -1,4 +1,4 @@
-"""`vsacli check-feasibility` with --suggest, --write-fixed and --near-singular."""
+"""`vsacli check-feasibility` with --fixes, --write-fix and --near-singular."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from samples.command_line import ROBOT, contents, edited
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.cli.check_feasibility import check_feasibility
 
+WRITE = ("--write-fix", 1, "-o", "fixed.yaml")
 
-def test_suggestions_follow_the_report(vsacli, too_soft):
+
+def test_fixes_follow_the_report(vsacli, too_soft):
     plain = vsacli("check-feasibility", ROBOT, too_soft)
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--suggest")
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--fixes")
     assert (done.code, done.err) == (3, "")
     assert done.out.startswith(plain.out)
     *causes, heading, profile, offset = done.out[len(plain.out) :].splitlines()
     assert (
         heading
-        == "suggestions, with any one of which every step has a margin of at least 1 % and keeps every limit:"
+        == "fixes, with any one of which every step has a margin of at least 1 % and keeps every limit:"
     )
     assert [cause.partition(":")[0] for cause in causes] == ["base", "shoulder", "elbow"]
     assert causes[0].startswith(
@@ -32,16 +34,16 @@ def test_suggestions_follow_the_report(vsacli, too_soft):
 
 def test_json_has_them_under_one_key(vsacli, too_soft):
     plain = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json").out)
-    report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--suggest").out)
-    suggestions = report.pop("suggestions")
+    report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--fixes").out)
+    found = report.pop("fixes")
     assert report == plain
-    assert suggestions["near_singular"] == NEAR_SINGULAR_MARGIN
-    assert suggestions["slow_down"]["possible"] is False
-    offsets = suggestions["stiffness_offset"]["offsets"]
+    assert found["near_singular"] == NEAR_SINGULAR_MARGIN
+    assert found["slow_down"]["possible"] is False
+    offsets = found["stiffness_offset"]["offsets"]
     assert offsets.keys() == {"base", "shoulder", "elbow"}
     # the base carries nothing at the end, where 2K/(1-m) is needed: 800/0.99 - 790, up to the grid of 0.01
     assert 800 / 0.99 - 790 <= offsets["base"] <= 800 / 0.99 - 790 + 0.02
-    changes = suggestions["stiffness_profile"]["changes"]
+    changes = found["stiffness_profile"]["changes"]
     assert changes.keys() == offsets.keys()
     assert changes["base"]["largest"] == pytest.approx(offsets["base"], abs=0.05)
 
@@ -50,13 +52,13 @@ def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
     fast = edited(
         motion, tmp_path / "fast.yaml", ("duration: 4.0", "duration: 0.4"), ("rate: 100 ", "rate: 1000 ")
     )
-    report = json.loads(vsacli("check-feasibility", ROBOT, fast, "--json", "--suggest").out)
-    found = report["suggestions"]["slow_down"]
+    report = json.loads(vsacli("check-feasibility", ROBOT, fast, "--json", "--fixes").out)
+    found = report["fixes"]["slow_down"]
     assert found["duration"] == pytest.approx(0.4 * found["factor"])
     factor = f"slow down by a factor {found['factor']:.4g}"
     assert found["text"] == f"{factor} (0.4 s -> {found['duration']:.10g} s)"
     slower = edited(fast, tmp_path / "slower.yaml", ("duration: 0.4", f"duration: {found['duration']}"))
-    again = vsacli("check-feasibility", ROBOT, slower, "--suggest")
+    again = vsacli("check-feasibility", ROBOT, slower, "--fixes")
     assert again.code == 0
     assert again.out.endswith(
         "nothing to change: every step has a margin of at least 1 % and keeps every limit\n"
@@ -64,25 +66,25 @@ def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
 
 
 def test_nothing_needs_to_change(vsacli, motion):
-    report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", "--suggest").out)
-    assert report["suggestions"] == {
+    report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", "--fixes").out)
+    assert report["fixes"] == {
         "near_singular": 0.01,
         "slow_down": None,
         "stiffness_offset": None,
         "stiffness_profile": None,
         "transition": None,
         "causes": [],
-        "remedies": [],
+        "fixes": [],
     }
 
 
 def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
+    done = vsacli("check-feasibility", ROBOT, too_soft, *WRITE)
     assert (done.code, done.err) == (
         3,
-        "suggestion 1 goes to fixed.yaml\nwrote fixed.yaml\nwrote fixed.csv\n",
+        "fix 1 goes to fixed.yaml\nwrote fixed.yaml\nwrote fixed.csv\n",
     )
-    assert "suggestions, with any one of which" in done.out
+    assert "fixes, with any one of which" in done.out
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
     assert run.code == 0
@@ -99,12 +101,12 @@ def test_recorded_trajectory_is_fixed(vsacli, too_soft):
         "-o",
         "soft.csv",
     )
-    assert vsacli("check-feasibility", ROBOT, "soft.csv", "--write-fixed", "fixed.yaml").code == 3
+    assert vsacli("check-feasibility", ROBOT, "soft.csv", *WRITE).code == 3
     assert vsacli("check-feasibility", ROBOT, "fixed.yaml").code == 0
 
 
 def test_nothing_is_written_if_nothing_needs_to_change(vsacli, tmp_path, motion):
-    done = vsacli("check-feasibility", ROBOT, motion, "--write-fixed", "fixed.yaml")
+    done = vsacli("check-feasibility", ROBOT, motion, *WRITE)
     assert (done.code, done.err) == (0, "fixed.yaml is not written: nothing needs to change\n")
     assert contents(tmp_path).keys() == {"move.yaml"}
 
@@ -116,46 +118,53 @@ def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
         tmp_path / "robot.yaml",
         ("motor: {inertia:", "motor: {max_torque: 1, inertia:"),
     )
-    done = vsacli("check-feasibility", robot, too_soft, "--write-fixed", "fixed.yaml")
-    assert (done.code, done.err) == (3, "fixed.yaml is not written: nothing that was tried mends the task\n")
+    done = vsacli("check-feasibility", robot, too_soft, *WRITE)
+    assert (done.code, done.err) == (3, "fixed.yaml is not written: nothing that was tried fixes the task\n")
     assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}
 
 
-def test_another_remedy_is_written_by_its_number(vsacli, tmp_path, too_soft):
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--remedy", 2)
-    assert (done.code, done.err) == (3, "suggestion 2 goes to fixed.yaml\nwrote fixed.yaml\n")
+def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 2, "-o", "fixed.yaml")
+    assert (done.code, done.err) == (3, "fix 2 goes to fixed.yaml\nwrote fixed.yaml\n")
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml"}
     again = vsacli("check-feasibility", ROBOT, "fixed.yaml")
     assert again.code == 0
     assert "motors move" not in again.out
 
 
-def test_number_of_no_remedy(vsacli, tmp_path, too_soft):
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--remedy", 9)
-    assert (done.code, done.err) == (3, "fixed.yaml is not written: there is no suggestion 9\n")
+def test_number_of_no_fix(vsacli, tmp_path, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 9, "-o", "fixed.yaml")
+    assert (done.code, done.err) == (3, "fixed.yaml is not written: there is no fix 9\n")
     assert contents(tmp_path).keys() == {"soft.yaml"}
 
 
-def test_number_of_a_remedy_needs_a_file(vsacli, too_soft):
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--remedy", 2)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--write-fix", 2), "--write-fix 2 needs -o FILE, the trajectory file to write"),
+        (("-o", "f.yaml"), "-o FILE needs --write-fix N, the number of a fix as --fixes lists it"),
+        (("--fixes", "--output", "f.yaml"), "-o FILE needs --write-fix N"),
+    ],
+)
+def test_number_of_a_fix_and_its_file_need_each_other(vsacli, tmp_path, too_soft, options, message):
+    done = vsacli("check-feasibility", ROBOT, too_soft, *options)
     assert (done.code, done.out) == (2, "")
-    assert "--remedy says which suggestion to write; give --write-fixed FILE, too" in done.err
+    assert message in done.err
+    assert contents(tmp_path).keys() == {"soft.yaml"}
 
 
 def test_files_that_exist_are_kept(vsacli, tmp_path, too_soft):
     (tmp_path / "fixed.csv").write_text("mine")
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
+    done = vsacli("check-feasibility", ROBOT, too_soft, *WRITE)
     assert (done.code, done.out) == (4, "")
     assert done.err.startswith("fixed.csv: exists already")
-    assert (
-        vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--overwrite").code == 3
-    )
+    assert vsacli("check-feasibility", ROBOT, too_soft, *WRITE, "--overwrite").code == 3
     assert (tmp_path / "fixed.csv").read_text().startswith("time,base.stiffness,")
 
 
 def test_inputs_are_never_overwritten(vsacli, too_soft):
     before = too_soft.read_text()
-    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", too_soft, "--overwrite")
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 1, "-o", too_soft, "--overwrite")
     assert done.code == 2
     assert "soft.yaml: is read by this command" in done.err
     assert too_soft.read_text() == before
@@ -182,10 +191,10 @@ def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
     assert verdict == "ok"
 
 
-def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
-    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", "0.1", "--write-fixed", "fixed.yaml")
+def test_fixes_keep_the_margin_that_is_asked_for(vsacli, motion):
+    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", "0.1", *WRITE)
     assert "a margin of at least 10 %" in done.out
-    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--suggest")
+    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--fixes")
     assert (again.code, again.out.splitlines()[-1]) == (
         0,
         "nothing to change: every step has a margin of at least 10 % and keeps every limit",

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.marks import slow
-from samples.remedies import (
+from samples.fixes import (
     BASE,
     CUBIC,
     K_C,
@@ -20,6 +19,7 @@ from samples.remedies import (
     pendulum,
     rest_to_rest,
 )
+from samples.marks import slow
 from samples.robots import vsa_3r
 
 from vsacli.actuators.elastic import Elastic
@@ -29,11 +29,11 @@ from vsacli.actuators.laws.tendons import Exponential
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
-from vsacli.studies.search import suggest
+from vsacli.studies.search import fixes
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset
 from vsacli.studies.search.loads import joint_loads
 from vsacli.studies.search.scans import smallest_offset
-from vsacli.studies.search.suggestions import NotPossible, StiffnessOffset
 from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01
@@ -43,13 +43,13 @@ UNIT = 0.01
 
 
 def offsets(robot, trajectory):
-    found = suggest(robot, trajectory, MARGIN).stiffness_offset
+    found = fixes(robot, trajectory, MARGIN).stiffness_offset
     assert isinstance(found, StiffnessOffset)
     return {offset.joint: offset.value for offset in found.offsets}
 
 
 def reason(robot, trajectory):
-    found = suggest(robot, trajectory, MARGIN).stiffness_offset
+    found = fixes(robot, trajectory, MARGIN).stiffness_offset
     assert isinstance(found, NotPossible)
     (only,) = found.reasons
     return only
@@ -152,7 +152,7 @@ def test_other_springs(spring):
 
 
 def test_prismatic_joint_has_its_unit():
-    found = suggest(pendulum(letter="P"), rest_to_rest(1.0, 800.0, start=(0.0,), end=(0.3,)))
+    found = fixes(pendulum(letter="P"), rest_to_rest(1.0, 800.0, start=(0.0,), end=(0.3,)))
     assert found.stiffness_offset.sentence.startswith("raise the stiffness of lift by ")
     assert found.stiffness_offset.sentence.endswith(" N/m")
 
@@ -160,7 +160,7 @@ def test_prismatic_joint_has_its_unit():
 @pytest.mark.slow
 def test_raised_and_lowered_joints_in_one_sentence():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 900.0)))
-    found = suggest(robot, rest_to_rest(4.0, (800.0, 950.0, 800.0)))
+    found = fixes(robot, rest_to_rest(4.0, (800.0, 950.0, 800.0)))
     assert found.stiffness_offset.sentence == (
         "raise the stiffness of base by 8.1 N m/rad, elbow by 9.16 N m/rad "
         "and lower the stiffness of shoulder by 50 N m/rad"

@@ -1,4 +1,4 @@
-"""Suggestions for recorded motions: limits count as in a run, and the files keep the record."""
+"""Fixes of recorded motions: limits count as in a run, and the files keep the record."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples.fixes import pendulum, written
 from samples.marks import slow
-from samples.remedies import pendulum, written
 
-from vsacli import Robot, Trajectory, inverse_dynamics, load_trajectory, suggest
+from vsacli import Robot, Trajectory, fixes, inverse_dynamics, load_trajectory
 from vsacli.robot.joint import Limits
-from vsacli.studies.search import Remedy
+from vsacli.studies.search import Fix
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 
 VARIABLES = {"max_torque": "tau_motor", "max_velocity": "dtheta", "position": "q", "velocity": "dq"}
@@ -48,43 +48,43 @@ def limited(robot: Robot, trajectory: Trajectory, limit: str, deviations: float)
     return dataclasses.replace(robot, joints=(joint,))
 
 
-def check_file(remedy: Remedy, path: Path) -> None:
+def check_file(fix: Fix, path: Path) -> None:
     """What is written is what was confirmed, with its uncertainty, and runs clean."""
-    again = load_trajectory(written(remedy, path)[0], remedy.robot)
-    before, after = (each.block(0, each.samples).variables() for each in (remedy.trajectory, again))
+    again = load_trajectory(written(fix, path)[0], fix.robot)
+    before, after = (each.block(0, each.samples).variables() for each in (fix.trajectory, again))
     for name, array in before.items():
         np.testing.assert_array_equal(after[name], array)
-    result = inverse_dynamics(remedy.robot, again)
+    result = inverse_dynamics(fix.robot, again)
     assert result.report.verdict == "ok"
     assert result.tau_motor_std.max() > 0
 
 
 @pytest.mark.parametrize("seed", [seed if seed in QUICK else slow(seed) for seed in range(SEEDS)])
-def test_what_a_run_calls_ok_needs_no_remedy_and_remedies_are_ok_in_a_run(tmp_path: Path, seed: int) -> None:
+def test_what_a_run_calls_ok_needs_no_fix_and_fixes_are_ok_in_a_run(tmp_path: Path, seed: int) -> None:
     trajectory, limit = recorded_swing(seed), list(VARIABLES)[seed % len(VARIABLES)]
     within = limited(pendulum(), trajectory, limit, 1.9)
     assert inverse_dynamics(within, trajectory).report.verdict == "ok"
-    assert suggest(within, trajectory).slow_down is None
+    assert fixes(within, trajectory).slow_down is None
     beyond = limited(pendulum(), trajectory, limit, 2.5)
     assert inverse_dynamics(beyond, trajectory).report.verdict == "over_limit"
-    suggestions = suggest(beyond, trajectory)
-    assert bool(suggestions.remedies) == (limit != "position")
-    for number, remedy in enumerate(suggestions.remedies):
-        check_file(remedy, tmp_path / f"fixed-{number}.yaml")
-    for remedy in suggestions.remedies:
-        if remedy.kinds == {"slow_down"}:  # and not more than is needed
-            faster = trajectory.stretched(remedy.slow_down.factor - STEP)
+    found = fixes(beyond, trajectory)
+    assert bool(found.fixes) == (limit != "position")
+    for number, fix in enumerate(found.fixes):
+        check_file(fix, tmp_path / f"fixed-{number}.yaml")
+    for fix in found.fixes:
+        if fix.kinds == {"slow_down"}:  # and not more than is needed
+            faster = trajectory.stretched(fix.slow_down.factor - STEP)
             assert inverse_dynamics(beyond, faster).report.verdict == "over_limit"
 
 
 @pytest.mark.slow
-def test_a_limit_within_the_noise_keeps_nothing_else_from_being_mended(tmp_path: Path) -> None:
+def test_a_limit_within_the_noise_keeps_nothing_else_from_being_fixed(tmp_path: Path) -> None:
     trajectory = recorded_swing(1)
     robot = limited(limited(pendulum(), trajectory, "position", 1.5), trajectory, "max_torque", 100.0)
-    remedies = suggest(robot, trajectory).remedies
-    assert {"slow_down"} in [remedy.kinds for remedy in remedies]
-    for number, remedy in enumerate(remedies):
-        check_file(remedy, tmp_path / f"fixed-{number}.yaml")
+    found = fixes(robot, trajectory).fixes
+    assert {"slow_down"} in [fix.kinds for fix in found]
+    for number, fix in enumerate(found):
+        check_file(fix, tmp_path / f"fixed-{number}.yaml")
 
 
 @pytest.mark.parametrize("reshaped", [False, True])
@@ -103,7 +103,7 @@ def test_records_with_steps_of_their_own_are_written_so_that_they_read_back(
     trajectory = load_trajectory(tmp_path / "swing.yaml", robot)
     rows = np.linspace(0.0, 1.0, 3)[:, None] * np.ones(trajectory.samples)
     fixed = with_changed_stiffness(trajectory, {0: rows}) if reshaped else trajectory
-    path, _ = written(Remedy(0.0, robot, fixed, factor=1.2), tmp_path / "fixed.yaml")
+    path, _ = written(Fix(0.0, robot, fixed, factor=1.2), tmp_path / "fixed.yaml")
     again, fixed = load_trajectory(path, robot), fixed.stretched(1.2)
     assert bool(again.estimates) != reshaped
     # a record keeps its rate of 150 Hz, over 2.4 s; what is known at the steps has those it has

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.marks import slow
-from samples.remedies import (
+from samples.fixes import (
     BASE,
     CUBIC,
     K,
@@ -20,6 +19,7 @@ from samples.remedies import (
     rest_to_rest,
     smallest_margin,
 )
+from samples.marks import slow
 from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh

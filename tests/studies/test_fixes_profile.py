@@ -7,8 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from samples.marks import slow
-from samples.remedies import (
+from samples.fixes import (
     BASE,
     CUBIC,
     SHOULDER,
@@ -18,6 +17,7 @@ from samples.remedies import (
     pendulum,
     rest_to_rest,
 )
+from samples.marks import slow
 from samples.robots import vsa_3r
 from scipy.integrate import trapezoid
 
@@ -26,10 +26,10 @@ from vsacli.analysis.run import Run, inverse_dynamics
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.joint import Limits
-from vsacli.studies.search import suggest
+from vsacli.studies.search import fixes
 from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.fix_report import NotPossible
 from vsacli.studies.search.nearest_profile import Bounds, NoSplineError, nearest_spline
-from vsacli.studies.search.suggestions import NotPossible
 from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -39,13 +39,13 @@ MARGIN = 0.01
 
 
 def profile(robot, trajectory):
-    """The remedy that changes the profile alone, and the change of each joint."""
-    remedy = Task(Acceptance(robot, MARGIN), trajectory).with_profiles(AS_IT_IS)
-    return remedy.trajectory, remedy.stiffness_profile
+    """The fix that changes the profile alone, and the change of each joint."""
+    fix = Task(Acceptance(robot, MARGIN), trajectory).with_profiles(AS_IT_IS)
+    return fix.trajectory, fix.stiffness_profile
 
 
 def reason(robot, trajectory):
-    found = suggest(robot, trajectory, MARGIN).stiffness_profile
+    found = fixes(robot, trajectory, MARGIN).stiffness_profile
     assert isinstance(found, NotPossible)
     (only,) = found.reasons
     return only
@@ -125,14 +125,14 @@ def test_bounds_too_fast_for_any_spline_are_refused():
 )
 def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, stiffness):
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
-    suggestions = suggest(robot, trajectory, MARGIN)
+    alternatives = fixes(robot, trajectory, MARGIN)
     fixed, found = profile(robot, trajectory)
-    # the suggested one also minds instants between steps, which moves the fourth digit
-    for suggested, first in zip(suggestions.stiffness_profile.changes, found.changes, strict=True):
-        assert suggested.joint == first.joint
-        assert suggested.largest == pytest.approx(first.largest, rel=1e-3)
+    # the one of a fix also minds instants between steps, which moves the fourth digit
+    for fix, first in zip(alternatives.stiffness_profile.changes, found.changes, strict=True):
+        assert fix.joint == first.joint
+        assert fix.largest == pytest.approx(first.largest, rel=1e-3)
     assert accepted(robot, fixed, MARGIN)
-    constants = {each.joint: each.value for each in suggestions.stiffness_offset.offsets}
+    constants = {each.joint: each.value for each in alternatives.stiffness_offset.offsets}
     for joint in found.changes:
         assert 0 < joint.rms <= constants[joint.joint]
     moved = change(fixed, trajectory)

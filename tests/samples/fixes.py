@@ -1,4 +1,4 @@
-"""Tasks for the tests of suggestions, and what their closed bounds say."""
+"""Tasks for the tests of fixes, and what their closed bounds say."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
-from vsacli.studies.search import Remedy, write_fixed
+from vsacli.studies.search import Fix, write_fixed
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
@@ -134,8 +134,8 @@ def pushed(trajectory: Trajectory, frame: str = "base") -> Trajectory:
     )
 
 
-def written(remedy: Remedy, path: Path, *, overwrite: bool = False) -> tuple[Path, ...]:
-    """The files of a remedy."""
+def written(fix: Fix, path: Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    """The files of a fix."""
     with Outputs(overwrite=overwrite) as outputs:
-        write_fixed(remedy, path, outputs)
+        write_fixed(fix, path, outputs)
     return outputs.paths

@@ -1,4 +1,4 @@
-"""What a page says would mend a run: what `check-feasibility --suggest` says, or a note why nothing."""
+"""The fixes on a page: those that `check-feasibility --fixes` lists, or a note why nothing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from samples.wicked import TEXTS, clean
 
 from vsacli.base.version import __version__
 
-HEADING = "What would mend it"
+HEADING = "What would fix it"
 
 
 def page_of(vsacli: Any, *files: Path) -> tuple[Page, str]:
@@ -40,7 +40,7 @@ def soft(vsacli: Any, too_soft: Path) -> Path:
     return too_soft.with_suffix(".h5")
 
 
-def test_the_suggestions_are_those_of_check_feasibility(vsacli: Any, soft: Path, too_soft: Path) -> None:
+def test_the_fixes_are_those_of_check_feasibility(vsacli: Any, soft: Path, too_soft: Path) -> None:
     """And the command that stands below them writes the first."""
     page, notes = page_of(vsacli, soft)
     *lines, announced, command = section(page)
@@ -51,7 +51,7 @@ def test_the_suggestions_are_those_of_check_feasibility(vsacli: Any, soft: Path,
     assert (notes, program, announced) == (
         "",
         "vsacli",
-        "this writes the first as a trajectory, and --remedy another one:",
+        "this writes the trajectory with the first fix; --write-fix takes the number of any:",
     )
     assert {"fixed.yaml", "fixed.csv"} < contents(too_soft.parent).keys()
 
@@ -98,7 +98,7 @@ def _older(file: h5py.File) -> None:
         (
             _older,
             f"was computed by vsacli 0.0.1, and this is vsacli {__version__};"
-            " check-feasibility --suggest looks for them",
+            " check-feasibility --fixes looks for them",
         ),
     ],
 )
@@ -109,7 +109,7 @@ def test_without_its_inputs_a_note_says_why_there_are_none(
         change(file)
     page, note = page_of(vsacli, soft)
     assert HEADING not in page.text
-    assert note.startswith(f"{soft}: no suggestions on its page: {reason.format(soft=too_soft)}")
+    assert note.startswith(f"{soft}: no fixes on its page: {reason.format(soft=too_soft)}")
 
 
 def test_no_path_of_an_input_acts(vsacli: Any, soft: Path) -> None:
