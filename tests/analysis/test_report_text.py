@@ -26,13 +26,13 @@ QUIET = JointReport(
     worst={},
     margin=0.0576,
     margin_time=0.1,
-    reachable=(801.0983, math.inf),
+    attainable=(801.0983, math.inf),
     stiffness_min=850.0,
     stiffness_max=1275.0,
     peak_tau_e=7.55,
     peak_tau_motor=(98.871, 91.635),
     start_theta=(0.0727618, -0.0551276),
-    torque_step=(0.35, 0.42),
+    torque_discontinuity=(0.35, 0.42),
     other_preload=False,
     energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
     start_dtheta=(0.0, 0.0),
@@ -94,12 +94,12 @@ def test_whole_report_of_a_run_without_trouble():
         QUIET,
         name="slide",
         type="prismatic",
-        reachable=(8009.5, 20000.0),
+        attainable=(8009.5, 20000.0),
         stiffness_min=9000.0,
         stiffness_max=9000.0,
         start_theta=(0.0317, 0.00602),
         end_theta=(0.2317, 0.18602),
-        torque_step=(0.1, 0.2),
+        torque_discontinuity=(0.1, 0.2),
         margin=0.11,
         energy=JointEnergy(12.04, 20.4, 11.2, 31.0, 5.0),
     )
@@ -195,9 +195,9 @@ def test_value_and_bound_are_shown_with_enough_digits_to_differ(value, bound, sh
 
 
 def test_torque_that_cannot_be_carried_has_no_bound():
-    text = sentence(too_soft(790, NAN, margin=NAN, reachable=(NAN, NAN)))
+    text = sentence(too_soft(790, NAN, margin=NAN, attainable=(NAN, NAN)))
     assert "its springs cannot carry the elastic torque at t = 4.000 s at any stiffness (412 steps" in text
-    row = line(render(report(too_soft(790, NAN, margin=NAN, reachable=(NAN, NAN)))), "elbow ")
+    row = line(render(report(too_soft(790, NAN, margin=NAN, attainable=(NAN, NAN)))), "elbow ")
     assert row.split()[-2:] == ["nothing", "none"]
 
 
@@ -304,13 +304,13 @@ def test_ends_are_missing_in_reports_that_were_written_before():
 
 
 def test_start_at_an_infeasible_step_is_undefined():
-    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
+    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_discontinuity=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow undefined (first step infeasible)"
     assert "torque step" not in text
 
 
 def test_start_at_a_singular_step_has_no_torque_step():
-    text = render(report(replace(QUIET, torque_step=(NAN, NAN))))
+    text = render(report(replace(QUIET, torque_discontinuity=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow +0.07276 -0.05513 rad"
     assert "torque step" not in text
 

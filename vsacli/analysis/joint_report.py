@@ -90,7 +90,7 @@ class JointUncertainty(Stored):
     Attributes:
         variables: how uncertain the motor torque is, and each variable that was asked for.
         asked: names of those that were asked for, and so decide.
-        steps: how many of the steps that are infeasible, and singular, would be otherwise within twice the
+        samples: number of infeasible, and of singular, samples that would be otherwise within twice the
             standard deviation of the margin.
         limits: for each limit that is exceeded by no more than the uncertainty and does not count as
             exceeded there, the step at which it is exceeded most.
@@ -98,7 +98,7 @@ class JointUncertainty(Stored):
 
     variables: dict[str, Spread] = field(default_factory=dict)
     asked: tuple[str, ...] = (JUDGED,)
-    steps: dict[str, int] = field(default_factory=dict)
+    samples: dict[str, int] = field(default_factory=dict)
     limits: dict[str, Worst] = field(default_factory=dict)
 
     @property
@@ -117,19 +117,19 @@ class JointReport(Stored):
         name: of the joint.
         type: "revolute" or "prismatic".
         actuator: its kind; what that does not have is NaN: motor 2, margin and corridor, stiffness.
-        steps: how many steps have each kind of trouble.
+        samples: number of samples with each kind of problem.
         first_time: when each kind that occurs first does, s.
         worst: the worst step of each kind that occurs; limits one by one.
         margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
         margin_time: when.
-        reachable: the corridor at that time.
+        attainable: attainable range of the stiffness at that time.
         stiffness_min: smallest commanded stiffness.
         stiffness_max: the largest.
         peak_tau_e: largest |tau_e|.
         peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
         start_theta: motor positions at the first step, to which the motors go before the start.
-        torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
-            at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
+        torque_discontinuity: |tau_motor - tau_spring| at the first sample: jump from the torque that
+            holds the motor at rest; NaN at a rigid joint, where tau_e may jump as well.
         other_preload: whether every infeasible step could be done with the opposite preload.
         energy: work of the motors, elastic energy, co-contraction.
         start_dtheta: motor velocities at the first step.
@@ -145,18 +145,18 @@ class JointReport(Stored):
     name: str
     type: str
     actuator: str
-    steps: dict[str, int]
+    samples: dict[str, int]
     first_time: dict[str, float]
     worst: dict[str, Worst]
     margin: float
     margin_time: float
-    reachable: tuple[float, float]
+    attainable: tuple[float, float]
     stiffness_min: float
     stiffness_max: float
     peak_tau_e: float
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
-    torque_step: tuple[float, float]
+    torque_discontinuity: tuple[float, float]
     other_preload: bool
     energy: JointEnergy
     start_dtheta: tuple[float, float] = UNKNOWN
@@ -168,11 +168,15 @@ class JointReport(Stored):
     dry_friction: tuple[DryFriction, ...] = ()
 
     shape: ClassVar = {
-        **named("name", "type", "actuator", "steps", "first_time", "worst"),
-        "margin": {"min": "margin", "time": "margin_time", "reachable": "reachable"},
+        **named("name", "type", "actuator", "samples", "first_time", "worst"),
+        "margin": {"min": "margin", "time": "margin_time", "attainable": "attainable"},
         "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
         "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
-        "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
+        "start": {
+            "theta": "start_theta",
+            "dtheta": "start_dtheta",
+            "torque_discontinuity": "torque_discontinuity",
+        },
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
         **named("other_preload", "energy"),
         "uncertainty?": "uncertainty",
@@ -184,15 +188,15 @@ class JointReport(Stored):
         """Return whether the joint is a reason for a verdict that is not ok."""
         if verdict == "doubtful":
             return self.uncertainty is not None and bool(self.uncertainty.undetermined)
-        return bool(self.steps.get(verdict))
+        return bool(self.samples.get(verdict))
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
         """Return a report from `as_json`: no upper end alone is NaN, so it is infinite."""
         joint = super().from_json(content, **further)
-        lower, upper = joint.reachable
+        lower, upper = joint.attainable
         if math.isnan(upper) and not math.isnan(lower):
-            return replace(joint, reachable=(lower, math.inf))
+            return replace(joint, attainable=(lower, math.inf))
         return joint
 
 

@@ -130,7 +130,7 @@ def check_feasibility(
         if suggestions is not None and fixed is not None:
             _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, outputs, talk)
     talk.wrote(outputs)
-    return show_report(report, as_json, suggestions)
+    return show_report(report, as_json, (robot, trajectory), suggestions)
 
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:

@@ -136,9 +136,8 @@ def run(arguments: Sequence[str]) -> int:
         with reporting_stdout_errors():
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
     except click.ClickException as error:
-        _name_successor(error)
         shown = io.StringIO()
-        error.show(shown)
+        _with_successor(error).show(shown)
         return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
     except Interrupted as error:
         return _interrupted(error)
@@ -160,12 +159,13 @@ def run(arguments: Sequence[str]) -> int:
     return int(code or Exit.OK)
 
 
-def _name_successor(error: click.ClickException) -> None:
-    """Let the error of an unknown option name the option that it is called now."""
+def _with_successor(error: click.ClickException) -> click.ClickException:
+    """Return the error of an unknown option that was renamed with its present name; any other as it is."""
     if isinstance(error, click.NoSuchOption) and error.ctx:
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
-            error.message, error.possibilities = f"{error.option_name} is now {new}.", None
+            return click.UsageError(f"{error.option_name} is now {new}.", error.ctx)
+    return error
 
 
 def _interrupted(ended: Interrupted) -> int:
