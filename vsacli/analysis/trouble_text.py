@@ -120,14 +120,15 @@ def _rank(kind: str) -> tuple[int, int]:
     return (2, 0) if kind == "near_singular" else (1, Flag.labelled(kind).value)
 
 
-def _size(joint: JointReport, kind: str) -> float:
-    """Return how large a problem is: by how much the bound is missed, else in how many samples."""
-    worst = joint.worst[kind]
-    return _share_beyond(worst) if math.isfinite(worst.bound) else joint.samples.get(kind, 0)
+def _size(joint: JointReport, kind: str) -> tuple[float, int]:
+    """Return how large a problem is: by which share the bound is missed, then in how many samples."""
+    return _share_beyond(joint.worst[kind]), joint.samples.get(kind, 0)
 
 
 def _share_beyond(worst: Worst) -> float:
-    return abs(worst.value - worst.bound) / abs(worst.bound) if worst.bound else math.inf
+    """Return the excess as a share of the bound; infinite where there is none, as no stiffness would do."""
+    known = worst.bound and not math.isnan(worst.bound)
+    return abs(worst.value - worst.bound) / abs(worst.bound) if known else math.inf
 
 
 def _words(kind: str) -> str:
