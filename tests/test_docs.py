@@ -194,7 +194,7 @@ def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
         match key, value:
             case "joints", [*joints]:
                 yield from (leaf for joint in joints for leaf in leaves(joint))
-            case "steps" | "first_time", dict():
+            case "samples" | "first_time", dict():
                 yield key
                 yield from (kind for kind in value if not kind.endswith("_limit"))
             case "worst", dict():

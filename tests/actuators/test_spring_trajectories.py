@@ -74,7 +74,7 @@ def test_step_at_which_the_branch_splits_is_named(vsacli, sinking):
     first = int(over.argmax())
     # Loads grow by some 0.05 N m a step of 0.05 s; the digits of the split leave one step open.
     assert joint["first_time"]["infeasible"] == pytest.approx(result.time[first], abs=0.06)
-    assert joint["steps"]["infeasible"] == pytest.approx(over.sum(), abs=2)
+    assert joint["samples"]["infeasible"] == pytest.approx(over.sum(), abs=2)
     assert "arm: stiffness 1950 N m/rad at t =" in vsacli("check-feasibility", *sinking).out
 
 

@@ -66,11 +66,11 @@ def test_what_a_joint_does_not_have_is_null_in_json(robot: Robot, motion: Trajec
     base, shoulder, elbow = inverse_dynamics(robot, motion).report.as_json()["joints"]
     assert [joint["actuator"] for joint in (base, shoulder, elbow)] == list(KINDS)
     for joint in (base, shoulder):
-        assert joint["margin"] == {"min": None, "time": None, "reachable": [None, None]}
+        assert joint["margin"] == {"min": None, "time": None, "attainable": [None, None]}
         assert (joint["peak"]["tau_motor"][1], joint["start"]["theta"][1]) == (None, None)
-        assert not any(joint["steps"].values())
+        assert not any(joint["samples"].values())
     assert base["stiffness"] == {"min": None, "max": None}
-    assert base["start"]["torque_step"] == [None, None]
+    assert base["start"]["torque_discontinuity"] == [None, None]
     assert shoulder["stiffness"] == {"min": 1000.0, "max": 1000.0}
     assert None not in (*elbow["peak"]["tau_motor"], *elbow["start"]["theta"], elbow["margin"]["min"])
     assert shoulder["peak"]["tau_motor"][0] > 30
@@ -96,7 +96,7 @@ def test_a_limit_of_an_elastic_joint_is_reported(robot: Robot, motion: Trajector
     joints = [replace(joint, limits=Limits(velocity=(-0.1, 0.1))) for joint in robot.joints]
     report = inverse_dynamics(replace(robot, joints=tuple(joints)), motion).report
     assert report.verdict == "over_limit"
-    assert all(joint.steps["over_limit"] for joint in report.joints)
+    assert all(joint.samples["over_limit"] for joint in report.joints)
 
 
 # Self-check

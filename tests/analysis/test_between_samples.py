@@ -121,7 +121,7 @@ def test_limits_that_no_step_exceeds(name: str, letter: str, rate: float) -> Non
     result = inverse_dynamics(robot, trajectory)
     (joint,) = result.report.joints
     assert result.report.verdict == "over_limit"
-    assert joint.steps["over_limit"] >= 1
+    assert joint.samples["over_limit"] >= 1
     found = joint.between[label]
     assert found == joint.worst[label]
     assert abs(found.bound) == bound
@@ -151,7 +151,7 @@ def test_margins_that_are_smaller_than_at_any_step(
     assert between.time == joint.margin_time == joint.worst[flag.label].time
     marked = result.flags[:, 0] & flag != 0
     assert marked[np.abs(result.time - between.time).argmin()]
-    assert joint.steps[flag.label] == np.count_nonzero(marked)
+    assert joint.samples[flag.label] == np.count_nonzero(marked)
     assert np.isfinite(result.tau_motor[marked]).all(), "the steps themselves are feasible"
     assert result.report.verdict == ("infeasible" if flag is Flag.INFEASIBLE else "ok")
 

@@ -12,7 +12,7 @@ import pytest
 from vsacli.analysis.derivative_check import SelfCheck
 from vsacli.analysis.joint_report import COUNTED, JointReport, Worst
 from vsacli.analysis.report import Report
-from vsacli.analysis.trouble_text import sentences
+from vsacli.analysis.trouble_text import findings
 from vsacli.dynamics.energy import JointEnergy
 
 NAN = math.nan
@@ -21,18 +21,18 @@ QUIET = JointReport(
     name="elbow",
     type="revolute",
     actuator="antagonistic",
-    steps=dict.fromkeys(COUNTED, 0),
+    samples=dict.fromkeys(COUNTED, 0),
     first_time={},
     worst={},
     margin=0.0576,
     margin_time=0.1,
-    reachable=(801.0983, math.inf),
+    attainable=(801.0983, math.inf),
     stiffness_min=850.0,
     stiffness_max=1275.0,
     peak_tau_e=7.55,
     peak_tau_motor=(98.871, 91.635),
     start_theta=(0.0727618, -0.0551276),
-    torque_step=(0.35, 0.42),
+    torque_discontinuity=(0.35, 0.42),
     other_branch=False,
     energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
     start_dtheta=(0.0, 0.0),
@@ -63,12 +63,12 @@ def report(*joints: JointReport, **changes: object) -> Report:
     return replace(whole, **changes)
 
 
-def troubled(worst: Worst, steps: int = 412, first: float = 3.588, **changes: object) -> JointReport:
+def troubled(worst: Worst, samples: int = 412, first: float = 3.588, **changes: object) -> JointReport:
     """The elbow with one kind of trouble."""
     counted = worst.kind if worst.kind in COUNTED else "over_limit"
     return replace(
         QUIET,
-        steps={**QUIET.steps, counted: steps},
+        samples={**QUIET.samples, counted: samples},
         first_time={worst.kind: first, counted: first},
         worst={worst.kind: worst},
         **changes,
@@ -80,7 +80,7 @@ def too_soft(value: float, bound: float, **changes: object) -> JointReport:
 
 
 def sentence(joint: JointReport) -> str:
-    (only,) = sentences([joint])
+    (only,) = findings([joint], 4001)
     return only
 
 
@@ -94,25 +94,28 @@ def test_whole_report_of_a_run_without_trouble():
         QUIET,
         name="slide",
         type="prismatic",
-        reachable=(8009.5, 20000.0),
+        attainable=(8009.5, 20000.0),
         stiffness_min=9000.0,
         stiffness_max=9000.0,
         start_theta=(0.0317, 0.00602),
         end_theta=(0.2317, 0.18602),
-        torque_step=(0.1, 0.2),
+        torque_discontinuity=(0.1, 0.2),
         margin=0.11,
         energy=JointEnergy(12.04, 20.4, 11.2, 31.0, 5.0),
     )
     assert render(report(QUIET, slide)).splitlines() == [
-        "vsa-3r, rest-to-rest: 4001 steps, 4 s                                       OK",
-        "joint   peak tau_e   peak motor 1 / 2   stiffness        reachable    margin",
-        "elbow     7.55 N m    98.9 / 91.6 N m    850-1275       from 801.1    5.76 %",
-        "slide       7.55 N      98.9 / 91.6 N        9000   8009.5-20000.0   11.00 %",
-        "start motors at: elbow +0.07276 -0.05513 rad, slide +0.0317 +0.00602 m",
-        "torque step at start: 0.42 N m (elbow)",
-        "end motors at: elbow -0.8426 -1.24 rad, slide +0.2317 +0.186 m",
-        "energy: motors spend 40.8 J, take back 22.4 J; springs hold up to 12.0 J (slide)",
-        "co-contraction: up to 61.2 N m rms for each motor (elbow), its load takes 2.84 N m",
+        "OK  vsa-3r, rest-to-rest: 4001 samples, 4 s",
+        "",
+        "joint   peak tau_e   peak motor 1 / 2       stiffness       attainable   margin",
+        "           N m | N            N m | N   N m/rad | N/m    N m/rad | N/m        %",
+        "elbow         7.55        98.9 / 91.6        850-1275       from 801.1     5.76",
+        "slide         7.55        98.9 / 91.6            9000   8009.5-20000.0    11.00",
+        "",
+        "initial motor positions: elbow +0.07276 -0.05513 rad, slide +0.0317 +0.00602 m",
+        "initial torque discontinuity: 0.42 N m (elbow)",
+        "final motor positions: elbow -0.8426 -1.24 rad, slide +0.2317 +0.186 m",
+        "energy: motors deliver 40.8 J and recover 22.4 J; springs store up to 12.0 J (slide)",
+        "co-contraction: up to 61.2 N m rms per motor (elbow); its load requires 2.84 N m",
         "self-check passed (4e-11, bound 1e-08)",
     ]
 
@@ -123,9 +126,9 @@ def test_whole_report_of_a_run_without_trouble():
         (JointEnergy(9.66, NAN, NAN, NAN, NAN), []),
         (
             JointEnergy(0.5, 3.0, 1.0, NAN, NAN),
-            ["energy: motors spend 3 J, take back 1 J; springs hold up to 0.5 J (elbow)"],
+            ["energy: motors deliver 3 J and recover 1 J; springs store up to 0.5 J (elbow)"],
         ),
-        (JointEnergy(0.0, 3.0, 1.0, NAN, NAN), ["energy: motors spend 3 J, take back 1 J"]),
+        (JointEnergy(0.0, 3.0, 1.0, NAN, NAN), ["energy: motors deliver 3 J and recover 1 J"]),
     ],
     ids=["a step without torques", "one motor", "no springs"],
 )
@@ -141,41 +144,68 @@ def test_energies_are_summed_only_if_every_joint_has_them():
     assert "61.2 N m" in line
 
 
-def test_headline_counts_the_joints_concerned():
-    text = render(report(too_soft(790, 803.1), QUIET, QUIET))
-    assert text.splitlines()[0].endswith("INFEASIBLE (1 of 3 joints)")
-    assert len(text.splitlines()[0]) == 78
+def test_the_first_line_counts_the_joints_that_fail():
+    limit = troubled(Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s"))
+    text = render(report(too_soft(790, 803.1), QUIET, limit))
+    expected = "INFEASIBLE  vsa-3r, rest-to-rest: 4001 samples, 4 s; 1 of 3 joints infeasible, 1 over a limit"
+    assert text.splitlines()[0] == expected
 
 
 @pytest.mark.parametrize(
     ("worst", "verdict"),
     [
-        (Worst("singular", 1.0, 800.0, 800.0, "N m/rad"), "SINGULAR (1 of 1 joints)"),
-        (Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s"), "OVER LIMIT (1 of 1 joints)"),
+        (Worst("singular", 1.0, 800.0, 800.0, "N m/rad"), "SINGULAR"),
+        (Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s"), "OVER LIMIT"),
         (Worst("near_singular", 1.0, 801.0, 800.0, "N m/rad"), "OK"),
     ],
     ids=lambda value: value.kind if isinstance(value, Worst) else "",
 )
-def test_headline_says_the_verdict(worst, verdict):
-    headline = render(report(troubled(worst))).splitlines()[0]
-    assert headline.split("  ")[-1].strip() == verdict
+def test_the_first_line_begins_with_the_verdict(worst, verdict):
+    first = render(report(troubled(worst))).splitlines()[0]
+    assert first == f"{verdict}  vsa-3r, rest-to-rest: 4001 samples, 4 s"  # the only joint is not counted
+
+
+def test_the_most_critical_finding_comes_first():
+    joints = [
+        troubled(Worst("near_singular", 1.0, 801.0, 800.0, "N m/rad")),
+        troubled(Worst("motor_torque_limit", 1.0, 95.0, 90.0, "N m", 1)),
+        troubled(Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s")),
+        troubled(Worst("singular", 1.0, 800.0, 800.0, "N m/rad")),
+        too_soft(790, 803.1),
+        too_soft(700, 803.1),
+        replace(QUIET, worst={}),
+    ]
+    found = list(findings([replace(joint, name=f"j{at}") for at, joint in enumerate(joints)], 4001))
+    assert [line.partition(":")[0] for line in found] == ["j5", "j4", "j3", "j1", "j2", "j0"]
+
+
+def test_joints_beyond_the_first_few_follow_in_one_line():
+    joints = [replace(too_soft(700 + at, 803.1), name=f"j{at}") for at in range(6)]
+    *full, others = findings(joints, 412)
+    assert [line.partition(":")[0] for line in full] == ["j0", "j1", "j2"]
+    assert others == "also infeasible: j3 (all samples), j4 (all samples), j5 (all samples)"
+
+
+def test_a_hint_follows_the_findings():
+    text = report(too_soft(790, 803.1), warnings=("its mass is zero",)).as_text("to list fixes: run this")
+    assert text.findings[1:] == ["to list fixes: run this", "warning: its mass is zero"]
 
 
 def test_run_that_ended_early_says_so():
     headline = render(report(samples=1, complete=False)).splitlines()[0]
-    assert headline.startswith("vsa-3r, rest-to-rest: 1 step, 4 s planned, stopped early ")
+    assert headline == "OK  vsa-3r, rest-to-rest: 1 sample, stopped early, 4 s"
 
 
 def test_infeasible_stiffness_names_time_bound_and_fix():
     assert sentence(too_soft(790, 803.1)) == (
-        "elbow: stiffness 790 N m/rad at t = 4.000 s is below the 803.1 its load allows, raise it "
-        "(412 steps, from 3.588 s)"
+        "elbow: stiffness 790 N m/rad at t = 4.000 s is below the minimum of 803.1 N m/rad at this load; "
+        "increase it (412 samples, from 3.588 s)"
     )
-    assert "is above the 1500 its load allows, lower it" in sentence(too_soft(1600, 1500))
+    assert "is above the maximum of 1500 N m/rad at this load; decrease it" in sentence(too_soft(1600, 1500))
 
 
-def test_one_step_is_singular_in_both_senses():
-    assert sentence(too_soft(790, 803.1, steps=1)).endswith("raise it (1 step)")
+def test_one_sample_is_singular_in_both_senses():
+    assert sentence(too_soft(790, 803.1, samples=1)).endswith("increase it (1 sample)")
 
 
 @pytest.mark.parametrize(
@@ -191,28 +221,31 @@ def test_one_step_is_singular_in_both_senses():
 def test_value_and_bound_are_shown_with_enough_digits_to_differ(value, bound, shown):
     text = sentence(too_soft(value, bound))
     assert re.search(r"stiffness (\S+) N m/rad", text)[1] == shown[0]
-    assert re.search(r"the (\S+) its load allows", text)[1] == shown[1]
+    assert re.search(r"m of (\S+) N m/rad at this load", text)[1] == shown[1]
 
 
 def test_torque_that_cannot_be_carried_has_no_bound():
-    text = sentence(too_soft(790, NAN, margin=NAN, reachable=(NAN, NAN)))
-    assert "its springs cannot carry the elastic torque at t = 4.000 s at any stiffness (412 steps" in text
-    row = line(render(report(too_soft(790, NAN, margin=NAN, reachable=(NAN, NAN)))), "elbow ")
-    assert row.split()[-2:] == ["nothing", "none"]
+    text = sentence(too_soft(790, NAN, margin=NAN, attainable=(NAN, NAN)))
+    assert (
+        "the springs cannot carry the elastic torque at t = 4.000 s at any stiffness; reduce the load (412"
+        in text
+    )
+    row = line(render(report(too_soft(790, NAN, margin=NAN, attainable=(NAN, NAN)))), "elbow ")
+    assert row.split()[-2:] == ["none", "none"]
 
 
 def test_what_else_would_help_is_said():
     assert sentence(too_soft(790, 803.1, other_branch=True)).endswith("; the opposite branch reaches it")
     slack = too_soft(790, 803.1)
-    slack = replace(slack, steps={**slack.steps, "slack": 7})
-    assert sentence(slack).endswith("; a tendon goes slack at 7 steps")
+    slack = replace(slack, samples={**slack.samples, "slack": 7})
+    assert sentence(slack).endswith("; a tendon goes slack at 7 samples")
 
 
 def test_singular_step_says_what_is_undefined():
-    text = sentence(troubled(Worst("singular", 1.25, 800.0, 800.0, "N m/rad"), steps=1))
+    text = sentence(troubled(Worst("singular", 1.25, 800.0, 800.0, "N m/rad"), samples=1))
     assert text == (
         "elbow: stiffness 800 N m/rad at t = 1.250 s is singular: "
-        "motor torques are undefined at the end of its range, raise it (1 step)"
+        "motor torques are undefined at the end of the attainable range; increase it (1 sample)"
     )
 
 
@@ -220,7 +253,7 @@ def test_near_singular_step_is_a_warning():
     text = sentence(troubled(Worst("near_singular", 1.25, 800.5, 800.1, "N m/rad")))
     assert text == (
         "elbow: warning: stiffness 800.5 N m/rad at t = 1.250 s is 0.05 % from singular, "
-        "where motor torques grow without bound (412 steps, from 3.588 s)"
+        "where motor torques grow without bound (412 samples, from 3.588 s)"
     )
 
 
@@ -239,7 +272,7 @@ def test_near_singular_step_is_a_warning():
 def test_limit_names_what_leaves_it_and_when(worst, said):
     text = sentence(troubled(worst))
     assert text.startswith(f"elbow: {said}")
-    assert text.endswith(f" limit {worst.bound:g} (first at 3.588 s)")
+    assert text.endswith(f" limit of {worst.bound:g} {worst.unit} (first at 3.588 s)")
 
 
 def test_times_between_milliseconds_are_told_apart():
@@ -249,7 +282,7 @@ def test_times_between_milliseconds_are_told_apart():
 
 @pytest.mark.parametrize(
     ("margin", "shown"),
-    [(0.2, "20.00 %"), (-0.0272, "-2.72 %"), (-6.8e-6, "-0.0007 %"), (0.0, "0.00 %"), (1.2e-10, "1e-08 %")],
+    [(0.2, "20.00"), (-0.0272, "-2.72"), (-6.8e-6, "-0.0007"), (0.0, "0.00"), (1.2e-10, "1e-08")],
 )
 def test_small_margins_do_not_round_to_zero(margin, shown):
     row = line(render(report(replace(QUIET, margin=margin))), "elbow ")
@@ -258,38 +291,38 @@ def test_small_margins_do_not_round_to_zero(margin, shown):
 
 def test_peaks_next_to_a_singular_step_are_short():
     row = line(render(report(replace(QUIET, peak_tau_motor=(1.2345678e9, 98.87)))), "elbow ")
-    assert "1.23e+09 / 98.9 N m" in row
+    assert "1.23e+09 / 98.9 " in row
 
 
 def test_peak_that_never_existed_is_a_dash():
     row = line(render(report(replace(QUIET, peak_tau_motor=(NAN, NAN)))), "elbow ")
-    assert "- / - N m" in row
+    assert "- / - " in row
 
 
 def test_starts_of_many_joints_are_three_to_a_line():
     joints = [replace(QUIET, name=f"joint_{number}") for number in range(1, 8)]
     text = render(report(*joints))
-    start = text[text.index("start motors at: ") : text.index("torque step")]
+    start = text[text.index("initial motor positions: ") : text.index("initial torque")]
     lines = start.splitlines()
     assert [each.count(" rad") for each in lines] == [3, 3, 1]
     assert [each.endswith(",") for each in lines] == [True, True, False]
-    assert {each.index("joint_") for each in lines} == {len("start motors at: ")}
+    assert {each.index("joint_") for each in lines} == {len("initial motor positions: ")}
 
 
 def test_motors_that_move_at_an_end_are_named():
     fast = replace(QUIET, name="base", start_dtheta=(2.8, -2.75), end_dtheta=(0.0, 0.0009))
     slide = replace(QUIET, name="slide", type="prismatic", start_dtheta=(0.01, 0.0))
     text = render(report(QUIET, fast, slide))
-    assert line(text, "motors move at the start") == (
-        "motors move at the start: base +2.8 -2.75 rad/s, slide +0.01 +0 m/s"
+    assert line(text, "initial motor velocities") == (
+        "initial motor velocities: base +2.8 -2.75 rad/s, slide +0.01 +0 m/s"
     )
-    assert line(text, "motors move at the end") == "motors move at the end: base +0 +0.0009 rad/s"
+    assert line(text, "final motor velocities") == "final motor velocities: base +0 +0.0009 rad/s"
 
 
 def test_motors_that_rest_but_for_rounding_are_not_named():
     at_rest = replace(QUIET, start_dtheta=(1e-4, -1e-17), end_dtheta=(NAN, NAN))
     held = replace(QUIET, start_dtheta=(1e-12, 1e-12), peak_dtheta=(1e-12, 1e-12))
-    assert "motors move" not in render(report(at_rest, held))
+    assert "motor velocities" not in render(report(at_rest, held))
 
 
 def test_ends_are_missing_in_reports_that_were_written_before():
@@ -297,33 +330,41 @@ def test_ends_are_missing_in_reports_that_were_written_before():
     for joint in content["joints"]:
         del joint["end"], joint["start"]["dtheta"], joint["peak"]["dtheta"]
     text = str(Report.from_json(content))
-    assert "start motors at: elbow +0.07276 -0.05513 rad" in text
-    assert "end motors" not in text
+    assert "initial motor positions: elbow +0.07276 -0.05513 rad" in text
+    assert "final motor" not in text
 
 
-def test_start_at_an_infeasible_step_is_undefined():
-    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
-    assert line(text, "start motors") == "start motors at: elbow undefined (first step infeasible)"
-    assert "torque step" not in text
+def test_start_at_an_infeasible_sample_is_undefined():
+    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_discontinuity=(NAN, NAN))))
+    assert line(text, "initial") == (
+        "initial motor positions: undefined, since the first sample is infeasible at every joint"
+    )
+    assert "discontinuity" not in text
+    some = render(report(QUIET, replace(QUIET, name="base", start_theta=(NAN, NAN))))
+    assert "base undefined (first sample infeasible)" in line(some, "initial motor positions")
 
 
-def test_start_at_a_singular_step_has_no_torque_step():
-    text = render(report(replace(QUIET, torque_step=(NAN, NAN))))
-    assert line(text, "start motors") == "start motors at: elbow +0.07276 -0.05513 rad"
-    assert "torque step" not in text
+def test_start_at_a_singular_sample_has_no_torque_discontinuity():
+    text = render(report(replace(QUIET, torque_discontinuity=(NAN, NAN))))
+    assert line(text, "initial") == "initial motor positions: elbow +0.07276 -0.05513 rad"
+    assert "discontinuity" not in text
 
 
-def test_warnings_and_notes_about_the_inputs_follow_the_table():
+def test_a_torque_discontinuity_of_rounding_is_not_printed():
+    assert "discontinuity" not in render(report(replace(QUIET, torque_discontinuity=(5e-13, 0.0))))
+
+
+def test_warnings_and_notes_about_the_inputs_follow_the_findings():
     lines = render(report(warnings=("its mass is zero",), notes=("the rate is 8 per second",))).splitlines()
-    assert lines[3:5] == ["warning: its mass is zero", "note: the rate is 8 per second"]
+    assert lines[1:3] == ["warning: its mass is zero", "note: the rate is 8 per second"]
 
 
 def test_failed_self_check_warns_against_the_torques():
     text = render(report(self_check=SelfCheck(spring_residual=1e-15, ladder=3.3e-3, shaft_residual=2e-2)))
-    assert text.splitlines()[0].endswith("SELF CHECK FAILED")
-    assert text.splitlines()[-1] == (
-        "SELF-CHECK FAILED: derivatives are off by 3.3e-03 (bound 1e-08), "
-        "motors by 2.0e-02 (bound 1e-11), springs by 1.0e-15 (bound 1e-11); do not use these torques"
+    assert text.splitlines()[0].startswith("SELF CHECK FAILED  ")
+    assert text.splitlines()[1] == (
+        "do not use these torques: the self-check failed; relative residuals are 0.003 of derivatives "
+        "(bound 1e-08), 0.02 of motors (bound 1e-11), 1e-15 of springs (bound 1e-11)"
     )
 
 
@@ -341,44 +382,48 @@ def test_what_lacks_what_every_report_has_is_none(key):
         Report.from_json(content)
 
 
-def many(worst: Worst, steps: list[int]) -> list[JointReport]:
-    return [replace(troubled(worst, steps=each), name=f"j{number}") for number, each in enumerate(steps)]
+def many(worst: Worst, samples: list[int]) -> list[JointReport]:
+    return [replace(troubled(worst, samples=each), name=f"j{number}") for number, each in enumerate(samples)]
 
 
-def test_five_joints_in_trouble_are_told_one_by_one():
-    told = list(sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [5, 4, 3, 2, 1])))
-    assert [sentence.partition(":")[0] for sentence in told] == ["j0", "j1", "j2", "j3", "j4"]
+def test_four_joints_with_a_problem_have_a_sentence_each():
+    found = list(findings(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [4, 3, 2, 1]), 4001))
+    assert [sentence.partition(":")[0] for sentence in found] == ["j0", "j1", "j2", "j3"]
 
 
-def test_of_many_joints_those_with_most_steps_are_told_and_none_is_left_out():
-    *told, rest = sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [1, 7, 2, 9, 8, 6, 3]))
-    assert [sentence.partition(":")[0] for sentence in told] == ["j1", "j3", "j4", "j5"]
-    assert rest == ("also infeasible: j0 (1 step), j2 (2 steps, from 3.588 s), j6 (3 steps, from 3.588 s)")
+def test_of_many_joints_those_with_most_samples_come_first_and_none_is_left_out():
+    worst = Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad")
+    *full, rest = findings(many(worst, [1, 7, 2, 9, 8, 6, 3]), 4001)
+    assert [sentence.partition(":")[0] for sentence in full] == ["j3", "j4", "j1"]
+    assert rest == (
+        "also infeasible: j0 (1 sample), j2 (2 samples, from 3.588 s), j5 (6 samples, from 3.588 s),\n"
+        "                 j6 (3 samples, from 3.588 s)"
+    )
 
 
-def test_of_many_limits_those_farthest_off_are_told():
+def test_of_many_limits_those_farthest_exceeded_come_first():
     joints = [
         replace(troubled(Worst("velocity_limit", 1.0, 3.0 + k, 3.0, "rad/s")), name=f"j{k}")
-        for k in range(1, 7)
+        for k in range(1, 6)
     ]
-    *told, rest = sentences(joints)
-    assert [sentence.partition(":")[0] for sentence in told] == ["j3", "j4", "j5", "j6"]
+    *full, rest = findings(joints, 4001)
+    assert [sentence.partition(":")[0] for sentence in full] == ["j5", "j4", "j3"]
     assert rest == "also over the velocity limit: j1 (4 rad/s, limit 3), j2 (5 rad/s, limit 3)"
 
 
-def test_of_many_joints_those_alike_are_named_together():
-    steps = [2, 2, 2, 9, 8, 7, 6, 1, 2, 2]
-    *_, rest = sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), steps))
+def test_of_many_joints_equal_ones_are_named_together():
+    samples = [2, 2, 2, 9, 8, 7, 1, 2, 2]
+    *_, rest = findings(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), samples), 4001)
     assert rest.splitlines() == [
-        "also infeasible: j0 to j2, j8, j9 (2 steps, from 3.588 s);",
-        "                 j7 (1 step)",
+        "also infeasible: j0 to j2, j7, j8 (2 samples, from 3.588 s);",
+        "                 j6 (1 sample)",
     ]
 
 
-def test_motors_of_many_joints_that_start_alike_are_named_together():
+def test_motors_of_many_joints_that_start_equal_are_named_together():
     joints = [replace(QUIET, name=f"j{number}") for number in range(8)]
     joints[5] = replace(joints[5], start_theta=(0.1, 0.2))
     text = render(report(*joints))
-    assert "start motors at: j0 to j4, j6, j7 +0.07276 -0.05513 rad;\n" in text
-    assert "                 j5 +0.1 +0.2 rad\n" in text
-    assert "end motors at: j0 to j7 -0.8426 -1.24 rad\n" in text
+    assert "initial motor positions: j0 to j4, j6, j7 +0.07276 -0.05513 rad;\n" in text
+    assert "                         j5 +0.1 +0.2 rad\n" in text
+    assert "final motor positions: j0 to j7 -0.8426 -1.24 rad\n" in text

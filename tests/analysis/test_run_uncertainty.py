@@ -100,7 +100,7 @@ def test_results_do_not_depend_on_the_size_of_blocks():
 def test_limits_of_recorded_motions_count_beyond_two_deviations_but_one_percent(limit, deviation, exceeded):
     result = inverse_dynamics(limited(position=limit), swinging((deviation, *STEADY[1:])))
     joint = result.report.joints[0]
-    assert bool(joint.steps["over_limit"]) == exceeded
+    assert bool(joint.samples["over_limit"]) == exceeded
     assert has(result.flags[:, 0], LIMITS).any() == exceeded
     within = joint.uncertainty.limits
     assert ("position_limit" in within) == (limit < AMPLITUDE)
@@ -211,18 +211,18 @@ def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible
     soft = swinging((1e-4, 1e-3, 1.0, 0.1, 1.0), stiffness=802.0)
     result = inverse_dynamics(vsa_3r(), soft)
     base = result.report.joints[0]
-    within, all_of_them = base.uncertainty.steps["infeasible"], base.steps["infeasible"]
+    within, all_of_them = base.uncertainty.samples["infeasible"], base.samples["infeasible"]
     assert 0 < within < all_of_them
     assert f"base: {within} of {all_of_them} steps that are infeasible" in str(result.report)
     surer = inverse_dynamics(vsa_3r(), swinging(STEADY, stiffness=802.0)).report.joints[0]
-    assert surer.steps["infeasible"] == all_of_them
-    assert surer.uncertainty.steps["infeasible"] < within
+    assert surer.samples["infeasible"] == all_of_them
+    assert surer.uncertainty.samples["infeasible"] < within
 
 
 def test_unreliable_is_worse_than_infeasible():
     assert VERDICTS.index("infeasible") < VERDICTS.index("unreliable") < VERDICTS.index("self_check_failed")
     both = inverse_dynamics(vsa_3r(), swinging(SHAKY, stiffness=802.0)).report
-    assert both.joints[0].steps["infeasible"]
+    assert both.joints[0].samples["infeasible"]
     assert both.verdict == "unreliable"
 
 

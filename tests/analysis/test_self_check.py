@@ -133,7 +133,7 @@ def test_motion_close_to_a_fold_passes(least_margin: float):
     lower = inverse_dynamics(vsa_3r(), motion(duration=4)).stiffness_lower.max()
     stiffness = (float(lower / (1 - least_margin)),) * 3
     report = inverse_dynamics(vsa_3r(), motion(duration=4, stiffness=stiffness)).report
-    assert sum(joint.steps["near_singular"] for joint in report.joints) > 0
+    assert sum(joint.samples["near_singular"] for joint in report.joints) > 0
     assert_sound(report)
 
 

@@ -75,12 +75,12 @@ def test_report_counts_and_dates_each_trouble():
     for index, joint in enumerate(result.report.joints):
         for kind, bits in kinds.items():
             hit = (result.flags[:, index] & bits) != 0
-            assert joint.steps[kind] == hit.sum()
+            assert joint.samples[kind] == hit.sum()
             assert joint.first_time.get(kind) == (result.time[hit.argmax()] if hit.any() else None)
     base, shoulder, elbow = result.report.joints
-    assert (base.steps["singular"], base.steps["infeasible"]) == (1, 0)
-    assert shoulder.steps["over_limit"] > 0
-    assert elbow.steps["infeasible"] > 0
+    assert (base.samples["singular"], base.samples["infeasible"]) == (1, 0)
+    assert shoulder.samples["over_limit"] > 0
+    assert elbow.samples["infeasible"] > 0
 
 
 def test_report_names_the_worst_step_and_what_it_allows():
@@ -89,7 +89,7 @@ def test_report_names_the_worst_step_and_what_it_allows():
     gap = margin(result.stiffness, result.stiffness_lower, result.stiffness_upper)[:, 2]
     step = gap.argmin()
     assert (elbow.margin, elbow.margin_time) == (gap[step], result.time[step])
-    assert elbow.reachable == (result.stiffness_lower[step, 2], math.inf)
+    assert elbow.attainable == (result.stiffness_lower[step, 2], math.inf)
     worst = elbow.worst["infeasible"]
     assert (worst.time, worst.value, worst.bound) == (
         result.time[step],
@@ -153,7 +153,7 @@ def test_start_tells_where_the_motors_wait_and_how_their_torque_jumps():
     base = result.report.joints[0]
     assert base.start_theta == tuple(result.theta[0, 0])
     # At rest only the inertia B theta'' is missing from the torque that holds the spring.
-    np.testing.assert_allclose(base.torque_step, 3.2 * np.abs(result.ddtheta[0, 0]), rtol=1e-12)
+    np.testing.assert_allclose(base.torque_discontinuity, 3.2 * np.abs(result.ddtheta[0, 0]), rtol=1e-12)
 
 
 def test_ends_tell_where_the_motors_are_and_how_fast():
@@ -186,7 +186,7 @@ def test_report_names_the_other_branch_if_it_does_for_every_step():
     ]:
         robot = with_joint(vsa_3r(), 2, with_branch(weak, branch))
         report = inverse_dynamics(robot, motion(stiffness=(850.0, 850.0, asked))).report.joints[2]
-        assert (report.steps["infeasible"] > 0) == infeasible
+        assert (report.samples["infeasible"] > 0) == infeasible
         assert report.other_branch == other
 
 
@@ -201,7 +201,7 @@ def test_stop_on_infeasible_ends_with_the_first_infeasible_step():
         np.testing.assert_array_equal(flags, whole.flags[: first + 1])
         report = run.report()
         assert (report.samples, report.complete, report.verdict) == (first + 1, False, "infeasible")
-        assert report.joints[2].steps["infeasible"] == 1
+        assert report.joints[2].samples["infeasible"] == 1
 
 
 def test_stop_on_infeasible_changes_nothing_where_all_is_feasible():
@@ -220,7 +220,7 @@ def test_springs_that_cannot_carry_the_load_leave_no_margin():
     assert 0 < carried.sum() < len(carried)
     np.testing.assert_array_equal(np.isfinite(result.stiffness_lower[:, 1]), carried)
     report = result.report.joints[1]
-    assert report.steps["infeasible"] >= (~carried).sum()
+    assert report.samples["infeasible"] >= (~carried).sum()
     assert math.isnan(report.margin)
     assert math.isnan(report.worst["infeasible"].bound)
     assert report.worst["infeasible"].time == report.margin_time == result.time[(~carried).argmax()]
@@ -241,7 +241,7 @@ def test_json_holds_plain_finite_values():
         report = inverse_dynamics(robot, trajectory).report.as_json()
         plain = json.loads(json.dumps(report, allow_nan=False))
         assert plain == report
-        assert plain["joints"][0]["margin"]["reachable"][1] is None
+        assert plain["joints"][0]["margin"]["attainable"][1] is None
 
 
 def verdict_of(report: Report, **steps: int) -> str:
@@ -278,7 +278,7 @@ def test_what_is_not_finite_counts_as_infeasible_and_is_named():
         "its springs cannot carry 1e160 N m at that stiffness: that is why there are no numbers"
     )
     of_elastic = result.report.joints[robot.joint_names.index(kinds["elastic"])]
-    assert of_elastic.steps["infeasible"] == 6
+    assert of_elastic.samples["infeasible"] == 6
     assert of_elastic.first_time["not_finite"] == of_elastic.worst["not_finite"].time == 0.375
     assert f"{kinds['elastic']}: a number of its motors is not finite at t = 0.375 s" in str(result.report)
     stored = Report.from_json(json.loads(json.dumps(result.report.as_json())))

@@ -70,7 +70,7 @@ def test_what_lies_between_the_steps_counts(vsacli, tmp_path):
         infeasible = result.flags[:, 1] & Flag.INFEASIBLE != 0
         assert result.report.as_json() == report
         assert np.isfinite(result.tau_motor).all(), "every step by itself can be done"
-    assert shoulder["steps"]["infeasible"] == np.count_nonzero(infeasible) > 0
+    assert shoulder["samples"]["infeasible"] == np.count_nonzero(infeasible) > 0
     assert "load allows, raise it" in (text := vsacli("check-feasibility", *task).out)
     assert "between the steps" in text
     stopped = json.loads(vsacli("check-feasibility", *task, "--json", "--stop-on-infeasible").out)

@@ -183,7 +183,7 @@ def test_margins_out_of_range_are_refused(vsacli, motion, margin):
 def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
     def near_singular(*options):
         report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", *options).out)
-        return sum(joint["steps"]["near_singular"] for joint in report["joints"]), report["verdict"]
+        return sum(joint["samples"]["near_singular"] for joint in report["joints"]), report["verdict"]
 
     assert near_singular() == near_singular("--near-singular", "0.01") == (0, "ok")
     steps, verdict = near_singular("--near-singular", "0.1")

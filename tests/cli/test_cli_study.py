@@ -67,7 +67,7 @@ def test_a_row_is_what_a_run_with_its_values_says(vsacli: Any, grid_study: str) 
             peak, spent = (
                 column("study.h5", name)[number, place] for name in ("peak_tau_motor", "energy_spent")
             )
-            if joint["steps"]["infeasible"]:
+            if joint["samples"]["infeasible"]:
                 assert np.isnan([*peak, spent]).all()
             else:
                 assert (peak.tolist(), spent) == (joint["peak"]["tau_motor"], joint["energy"]["spent"])

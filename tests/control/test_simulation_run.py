@@ -52,7 +52,7 @@ def test_motors_saturate():
     flagged = (past.flags[:, 0] & Flag.MOTOR_TORQUE_LIMIT) != 0
     assert flagged.any()
     assert np.array_equal(flagged, beyond.any(axis=1))
-    assert base.steps_over_limit == flagged.sum()
+    assert base.samples_over_limit == flagged.sum()
     assert simulation.report.verdict == "off_target"  # without the torque asked for; worse than a limit
     worst = base.worst["motor_torque_limit"]
     assert abs(worst.bound) == limit

@@ -136,7 +136,7 @@ def test_what_was_integrated_when_the_budget_is_used_up_is_kept():
     assert 2 < kept < len(whole.history.time)
     assert cut.history.q_actual[:kept] == pytest.approx(whole.history.q_actual[:kept], abs=1e-8)
     assert simulate(vsa_3r(), short_motion(3), budget=300).report == report
-    assert not report.joints[0].steps_over_limit
+    assert not report.joints[0].samples_over_limit
 
 
 def test_a_run_that_ends_within_its_budget_does_not_depend_on_it():

@@ -77,7 +77,7 @@ def test_report_says_when_and_why(touching: Result):
         "its decoupling matrix becomes singular (infeasible: 71 steps)"
     ) in text.splitlines()
     assert touching.report.verdict == "infeasible"
-    assert touching.report.joints[0].steps["infeasible"] == 71
+    assert touching.report.joints[0].samples["infeasible"] == 71
 
 
 def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Result):

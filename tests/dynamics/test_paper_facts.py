@@ -177,7 +177,7 @@ def test_motor_torque_grows_without_bound_towards_it(
 def test_below_the_threshold_joint_1_is_named(threshold: float):
     report = inverse_dynamics(ARM, motion(duration=0.999 * threshold, rate=1e4)).report
     assert report.verdict == "infeasible"
-    assert [joint.name for joint in report.joints if joint.steps["infeasible"]] == ["base"]
+    assert [joint.name for joint in report.joints if joint.samples["infeasible"]] == ["base"]
     worst = report.joints[0].worst["infeasible"]
     assert worst.value == 850
     assert worst.bound > 850

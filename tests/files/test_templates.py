@@ -119,7 +119,9 @@ def test_a_robot_that_cannot_hold_itself_is_told_so(tmp_path: Path) -> None:
 
 def torque_steps(robot: Robot, text: str, folder: Path) -> list[float]:
     """The jump of each motor torque at the start."""
-    return [abs(step) for joint in report_of(robot, text, folder).joints for step in joint.torque_step]
+    return [
+        abs(step) for joint in report_of(robot, text, folder).joints for step in joint.torque_discontinuity
+    ]
 
 
 def test_its_torques_start_without_a_step(tmp_path: Path) -> None:

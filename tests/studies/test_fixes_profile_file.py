@@ -95,7 +95,7 @@ def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
         np.testing.assert_allclose(array, expected, rtol=0, atol=bound)
     report = inverse_dynamics(robot, again).report
     assert report.verdict == "ok"
-    assert all(joint.steps["near_singular"] == 0 for joint in report.joints)
+    assert all(joint.samples["near_singular"] == 0 for joint in report.joints)
 
 
 @pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", Constant)])

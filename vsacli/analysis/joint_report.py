@@ -90,14 +90,14 @@ class JointUncertainty(Stored):
     Attributes:
         variables: Uncertainty of the motor torque, and of each requested variable.
         asked: Names of the requested variables, which decide on the verdict.
-        steps: Number of infeasible, and of singular samples that are not so within twice the standard
+        samples: Number of infeasible, and of singular samples that are not so within twice the standard
             deviation of the margin.
         limits: Worst sample of each limit that is exceeded only within the uncertainty, and not flagged.
     """
 
     variables: dict[str, Spread] = field(default_factory=dict)
     asked: tuple[str, ...] = (JUDGED,)
-    steps: dict[str, int] = field(default_factory=dict)
+    samples: dict[str, int] = field(default_factory=dict)
     limits: dict[str, Worst] = field(default_factory=dict)
 
     @property
@@ -116,19 +116,19 @@ class JointReport(Stored):
         name: Name of the joint.
         type: "revolute" or "prismatic".
         actuator: Kind of the actuator; values that it lacks are NaN: motor 2, margin, stiffness range.
-        steps: Number of samples with each kind of trouble.
+        samples: Number of samples with each kind of trouble.
         first_time: Time of the first sample of each kind that occurs, s.
         worst: Worst sample of each kind that occurs; limits one by one.
         margin: Smallest margin, relative to the stiffness; NaN if a torque cannot be carried.
         margin_time: Time of the smallest margin, s.
-        reachable: Attainable range of the stiffness at that time.
+        attainable: Attainable range of the stiffness at that time.
         stiffness_min: Smallest commanded stiffness.
         stiffness_max: Largest commanded stiffness.
         peak_tau_e: Largest |tau_e|.
         peak_tau_motor: Largest |tau_motor| of motors 1 and 2, over the samples at which it exists.
         start_theta: Initial motor positions.
-        torque_step: |tau_motor - tau_spring| at the first sample: discontinuity of the torque of motors that
-            rest before the start; NaN at a rigid joint, where tau_e may jump as well.
+        torque_discontinuity: |tau_motor - tau_spring| at the first sample, of motors that rest before the
+            start; NaN at a rigid joint, where tau_e may jump as well.
         other_branch: Whether every infeasible sample is feasible on the opposite branch.
         energy: Work of the motors, elastic energy, co-contraction.
         start_dtheta: Initial motor velocities.
@@ -144,18 +144,18 @@ class JointReport(Stored):
     name: str
     type: str
     actuator: str
-    steps: dict[str, int]
+    samples: dict[str, int]
     first_time: dict[str, float]
     worst: dict[str, Worst]
     margin: float
     margin_time: float
-    reachable: tuple[float, float]
+    attainable: tuple[float, float]
     stiffness_min: float
     stiffness_max: float
     peak_tau_e: float
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
-    torque_step: tuple[float, float]
+    torque_discontinuity: tuple[float, float]
     other_branch: bool
     energy: JointEnergy
     start_dtheta: tuple[float, float] = UNKNOWN
@@ -167,11 +167,15 @@ class JointReport(Stored):
     dry_friction: tuple[DryFriction, ...] = ()
 
     shape: ClassVar = {
-        **named("name", "type", "actuator", "steps", "first_time", "worst"),
-        "margin": {"min": "margin", "time": "margin_time", "reachable": "reachable"},
+        **named("name", "type", "actuator", "samples", "first_time", "worst"),
+        "margin": {"min": "margin", "time": "margin_time", "attainable": "attainable"},
         "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
         "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
-        "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
+        "start": {
+            "theta": "start_theta",
+            "dtheta": "start_dtheta",
+            "torque_discontinuity": "torque_discontinuity",
+        },
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
         **named("other_branch", "energy"),
         "uncertainty?": "uncertainty",
@@ -183,15 +187,15 @@ class JointReport(Stored):
         """Return whether the joint is a reason for a verdict that is not ok."""
         if verdict == "unreliable":
             return self.uncertainty is not None and bool(self.uncertainty.undetermined)
-        return bool(self.steps.get(verdict))
+        return bool(self.samples.get(verdict))
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
         """Return a report from the output of `as_json`; a missing upper end alone stands for infinity."""
         joint = super().from_json(content, **further)
-        lower, upper = joint.reachable
+        lower, upper = joint.attainable
         if math.isnan(upper) and not math.isnan(lower):
-            return replace(joint, reachable=(lower, math.inf))
+            return replace(joint, attainable=(lower, math.inf))
         return joint
 
 

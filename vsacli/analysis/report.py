@@ -10,9 +10,9 @@ from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfChec
 from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import sentences, uncertainty_lines
+from vsacli.analysis.trouble_text import counts, findings, uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, headline
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_check_failed")
 """Verdicts from best to worst; the worst that applies wins."""
@@ -69,13 +69,21 @@ class Report(Stored):
         """Method for the deflections: "root" of (14) at each sample, or "integrate"."""
         return "integrate" if self.drifts else "root"
 
-    def as_text(self) -> ReportText:
-        """Return the report in its parts, for a reader."""
-        lines = [
-            *text.warnings_and_notes(self.warnings, self.notes),
-            *sentences(self.joints),
-            *uncertainty_lines(self.joints),
+    def as_text(self, hint: str = "") -> ReportText:
+        """Return the report in its parts, as people read it.
+
+        Args:
+            hint: a line below the findings, such as the command that lists fixes; none if empty.
+        """
+        found = [
+            *self._failed_check(),
+            *findings(self.joints, self.samples),
             *text.stops(self.joints, self.drifts),
+            *([hint] if hint else []),
+            *uncertainty_lines(self.joints),
+            *text.warnings_and_notes(self.warnings, self.notes),
+        ]
+        lines = [
             *text.start(self.joints),
             *text.end(self.joints),
             *dry_friction_lines(
@@ -83,19 +91,22 @@ class Report(Stored):
             ),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
             *text.drift_lines(self.drifts),
-            text.self_check_line(self.self_check),
+            *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
         ]
-        return ReportText(self._headline(), text.joint_rows(self.joints), lines)
+        return ReportText(headline(self.verdict, self._title()), text.joint_rows(self.joints), lines, found)
 
     def __str__(self) -> str:
         """Return the lines that the commands print, without a final newline."""
         return str(self.as_text())
 
-    def _headline(self) -> str:
-        left = f"{self.robot}, {self.trajectory}: {text.count(self.samples)}, {self.duration:g} s"
-        if not self.complete:
-            left += " planned, stopped early"
-        return text.headline(left, self.verdict, self.joints)
+    def _failed_check(self) -> list[str]:
+        return [] if self.self_check.passed else [text.self_check_line(self.self_check)]
+
+    def _title(self) -> str:
+        """Return names, size, and how many joints fail which requirement."""
+        length = text.count(self.samples) + ("" if self.complete else ", stopped early")
+        title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
+        return "; ".join([title, *filter(None, [counts(self.joints)])])
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:

@@ -1,4 +1,4 @@
-"""The report of a run as text for a terminal: headline, table, energy, initial and final motor positions."""
+"""The report of a run as text for a terminal: table, motor positions at both ends, energy, self-check."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.base.texts import together
-from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
+from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
 from vsacli.dynamics.energy import JointEnergy
 
 
@@ -22,30 +22,29 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
             number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
         name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
-        held = f"; springs hold up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
-        yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
+        stored = f"; springs store up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        yield f"energy: motors deliver {spent} J and recover {recovered} J{stored}"
         yield from _losses(energies)
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
         unit = TORQUE.unit(joint_type)
         effort, load = f"{number(most.co_contraction)} {unit}", f"{number(most.load)} {unit}"
-        yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
+        yield f"co-contraction: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
 def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
     """Yield the losses by friction and in windings, if the robot file has them."""
-    taken = {
-        "friction and damping take {} J": [energy.dissipated for energy in energies],
-        "the windings turn {} J into heat": [energy.copper_loss for energy in energies],
+    lost = {
+        "friction and damping": [energy.dissipated for energy in energies],
+        "motor windings": [energy.copper_loss for energy in energies],
     }
-    known = {words: [loss for loss in losses if loss is not None] for words, losses in taken.items()}
-    sums = [words.format(number(sum(losses))) for words, losses in known.items() if losses]
+    known = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
+    sums = [f"{words} {number(sum(losses))} J" for words, losses in known.items() if losses]
     if sums:
         yield "losses: " + ", ".join(sums)
 
 
-WIDTH = 78
 JOINTS_PER_LINE = 3
 MOST_APART = 7
 """Largest number of joints that are described one by one."""
@@ -61,9 +60,6 @@ rounded to four digits or with noise of 1e-4 rad, had 1e-4."""
 ROUNDING_SHARE = 1e-9
 """Share of the largest velocity of any motor that may be rounding, for a joint held still."""
 
-TROUBLE = ("unreliable", "infeasible", "singular", "over_limit")
-"""Kinds that make the verdict worse than ok."""
-
 
 def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
     """Yield one line for each warning and each note, labeled."""
@@ -71,31 +67,29 @@ def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterato
     yield from (f"note: {note}" for note in notes)
 
 
-def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
-    """Return robot and trajectory at the left, the verdict in capitals at the right."""
-    words = verdict.upper().replace("_", " ")
-    if verdict in TROUBLE:
-        concerned = sum(any(map(joint.shows, TROUBLE)) for joint in joints)
-        words = f"{words} ({concerned} of {len(joints)} joints)"
-    return f"{left:<{WIDTH - 32}} {words:>31}".rstrip()
-
-
-def joint_rows(joints: Iterable[JointReport]) -> list[tuple[str, ...]]:
-    """Return a table of peaks, stiffness and attainable range, with its header."""
-    header = ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
+def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
+    """Return a table of peaks, commanded and attainable stiffness, below its header with units."""
+    types = [joint.type for joint in joints]
+    torque, stiffness = (units_of(quantity, types) for quantity in (TORQUE, STIFFNESS))
+    header = (
+        "joint",
+        f"peak tau_e\n{torque}",
+        f"peak motor 1 / 2\n{torque}",
+        f"stiffness\n{stiffness}",
+        f"attainable\n{stiffness}",
+        "margin\n%",
+    )
     return [header, *map(_row, joints)]
 
 
 def _row(joint: JointReport) -> tuple[str, ...]:
-    torque = TORQUE.unit(joint.type)
-    motors = " / ".join(number(peak) for peak in of_motors(joint, joint.peak_tau_motor))
     return (
         joint.name,
-        f"{number(joint.peak_tau_e)} {torque}",
-        f"{motors} {torque}",
+        number(joint.peak_tau_e),
+        " / ".join(number(peak) for peak in of_motors(joint, joint.peak_tau_motor)),
         _span(joint.stiffness_min, joint.stiffness_max),
         *(
-            (_corridor(*joint.reachable), percent(joint.margin))
+            (_attainable(*joint.attainable), percent(joint.margin).removesuffix(" %"))
             if "stiffness" in kind_of(joint).commanded
             else ("-", "-")
         ),
@@ -113,16 +107,16 @@ def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...
     return pair[: kind_of(joint).motor_count]
 
 
-def _corridor(lower: float, upper: float) -> str:
+def _attainable(lower: float, upper: float) -> str:
     if math.isnan(lower):
-        return "nothing"
+        return "none"
     return f"from {number(lower)}" if math.isinf(upper) else f"{number(lower)}-{number(upper)}"
 
 
 def _span(low: float, high: float) -> str:
     if math.isnan(low):
         return "-"
-    return f"{low:.6g}" if low == high else f"{low:.6g}-{high:.6g}"
+    return "-".join(dict.fromkeys(_rounded(value, 4) for value in (low, high)))
 
 
 def number(value: float) -> str:
@@ -151,41 +145,48 @@ def _rounded(value: float, digits: int) -> str:
     return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
-def count(steps: int) -> str:
-    """Return a number of samples as text."""
-    return f"{steps} step" if steps == 1 else f"{steps} steps"
+def count(samples: int) -> str:
+    """Return a number of samples, in words."""
+    return f"{samples} sample" if samples == 1 else f"{samples} samples"
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Yield the initial motor positions, the moving motors, and the largest initial torque discontinuity."""
-    yield _all(
-        "start motors at: ", joints, [_positions(joint, joint.start_theta, "first") for joint in joints]
-    )
-    yield from _moving("motors move at the start: ", joints, [joint.start_dtheta for joint in joints])
-    steps = [(max(of_motors(joint, joint.torque_step)), joint) for joint in joints]
-    defined = [entry for entry in steps if not math.isnan(entry[0])]
+    """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
+    yield from _positions("initial", joints, [joint.start_theta for joint in joints], "first")
+    yield from _moving("initial motor velocities: ", joints, [joint.start_dtheta for joint in joints])
+    jumps = [(max(of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
+    defined = [entry for entry in jumps if not math.isnan(entry[0])]
     if defined:
-        step, joint = max(defined, key=lambda entry: entry[0])
-        yield f"torque step at start: {step:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
+        jump, joint = max(defined, key=lambda entry: entry[0])
+        peak = max((peak for each in joints for peak in each.peak_tau_motor if peak > 0), default=0.0)
+        if jump > ROUNDING_SHARE * peak:
+            yield f"initial torque discontinuity: {jump:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
 
 def end(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the final motor positions, and the motors that still move; nothing if not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
-    yield _all("end motors at: ", joints, [_positions(joint, joint.end_theta, "last") for joint in joints])
-    yield from _moving("motors move at the end: ", joints, [joint.end_dtheta for joint in joints])
+    yield from _positions("final", joints, [joint.end_theta for joint in joints], "last")
+    yield from _moving("final motor velocities: ", joints, [joint.end_dtheta for joint in joints])
 
 
-def _all(label: str, joints: Sequence[JointReport], said: Sequence[str]) -> str:
-    return of_joints(label, dict(enumerate(said)), [joint.name for joint in joints])
-
-
-def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str:
-    positions = of_motors(joint, theta)
-    if any(map(math.isnan, positions)):
-        return f"undefined ({step} step infeasible)"
-    return f"{_signed(positions)} {POSITION.unit(joint.type)}"
+def _positions(
+    which: str, joints: Sequence[JointReport], positions: Sequence[tuple[float, float]], sample: str
+) -> Iterator[str]:
+    """Yield the motor positions at one end of a motion; once that there are none, if no joint has any."""
+    of_joint = [of_motors(joint, theta) for joint, theta in zip(joints, positions, strict=True)]
+    undefined = [any(map(math.isnan, theta)) for theta in of_joint]
+    if all(undefined):
+        yield f"{which} motor positions: undefined, since the {sample} sample is infeasible at every joint"
+        return
+    said = {
+        number: f"undefined ({sample} sample infeasible)"
+        if undefined[number]
+        else f"{_signed(of_joint[number])} {POSITION.unit(joint.type)}"
+        for number, joint in enumerate(joints)
+    }
+    yield of_joints(f"{which} motor positions: ", said, [joint.name for joint in joints])
 
 
 def _moving(
@@ -210,24 +211,24 @@ def _signed(values: Iterable[float]) -> str:
 
 
 def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
-    """Yield the times from which deflections could not be integrated."""
-    infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
+    """Yield from when on deflections could not be integrated."""
+    infeasible = {joint.name: joint.samples["infeasible"] for joint in joints}
     for drift in drifts:
         if drift.stop is not None:
             time, reason = time_text(drift.stop.time), drift.stop.reason
-            steps = f"infeasible: {count(infeasible[drift.joint])}"
-            yield f"{drift.joint}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
+            samples = f"infeasible: {count(infeasible[drift.joint])}"
+            yield f"{drift.joint}: deflections cannot be integrated beyond t = {time}: {reason} ({samples})"
 
 
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
     """Yield the drift of integrated deflections, if there are any."""
     if drifts:
-        yield by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
+        yield by_joint("integration drift: ", [_drift_of(drift) for drift in drifts])
 
 
 def _drift_of(drift: JointDrift) -> str:
     if math.isnan(drift.largest):
-        return f"{drift.joint} none (no step followed)"
+        return f"{drift.joint} none (no sample integrated)"
     return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {time_text(drift.time)}"
 
 
@@ -256,7 +257,7 @@ def self_check_line(check: SelfCheck) -> str:
     if check.passed:
         return f"self-check passed ({check.ladder:.1g}, bound {check.ladder_bound:.0e})"
     return (
-        f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {check.ladder_bound:.0e}), "
-        f"motors by {check.shaft_residual:.1e} (bound {SHAFT_BOUND:.0e}), "
-        f"springs by {check.spring_residual:.1e} (bound {check.spring_bound:.0e}); do not use these torques"
+        f"do not use these torques: the self-check failed; relative residuals are {check.ladder:.1g} of "
+        f"derivatives (bound {check.ladder_bound:.0e}), {check.shaft_residual:.1g} of motors (bound "
+        f"{SHAFT_BOUND:.0e}), {check.spring_residual:.1g} of springs (bound {check.spring_bound:.0e})"
     )

@@ -134,7 +134,7 @@ class RunUncertainty:
             JointUncertainty(
                 variables={each.name: each for at, each in spreads if at == index},
                 asked=tuple(self._asked),
-                steps=dict(self._steps[index]),
+                samples=dict(self._steps[index]),
                 limits={label: worst for label, (_, worst) in self._limits[index].items()},
             )
             for index in range(len(types))

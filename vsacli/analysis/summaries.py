@@ -47,7 +47,7 @@ class JointSummary:
         stiffness = block.stiffness[:, index]
 
         if self._start is None:
-            self._start = np.stack((*_motors_at(block, 0, index), self._torque_step(block)))
+            self._start = np.stack((*_motors_at(block, 0, index), self._torque_discontinuity(block)))
         self._end = np.stack(_motors_at(block, -1, index))
         if flags.any():
             self._count(flags, block.time)
@@ -107,25 +107,25 @@ class JointSummary:
             complete: Whether the last sample that was added is the last of the trajectory.
         """
         assert self._start is not None
-        least, time, reachable = self._margin
-        start_theta, start_dtheta, torque_step = map(_pair, self._start)
+        least, time, attainable = self._margin
+        start_theta, start_dtheta, torque_discontinuity = map(_pair, self._start)
         end_theta, end_dtheta = map(_pair, self._end) if complete else (UNKNOWN, UNKNOWN)
         return JointReport(
             name=self._joint.name,
             type=self._joint.type,
             actuator=self._joint.actuator_type,
-            steps=dict(self._steps),
+            samples=dict(self._steps),
             first_time=dict(self._first_time),
             worst={kind: worst for kind, (_, worst) in self._worst.items()},
             margin=least if math.isfinite(least) else math.nan,
             margin_time=time,
-            reachable=reachable,
+            attainable=attainable,
             stiffness_min=float(self._stiffness[0]),
             stiffness_max=float(self._stiffness[1]),
             peak_tau_e=float(self._peaks[0]),
             peak_tau_motor=_pair(self._peaks[1:3]),
             start_theta=start_theta,
-            torque_step=torque_step,
+            torque_discontinuity=torque_discontinuity,
             other_branch="infeasible" in self._worst and self._other_branch,
             energy=energy,
             between=between,
@@ -207,7 +207,7 @@ class JointSummary:
                 worst = Worst(label, time, excess.value, excess.bound, unit, check.motor)
                 self._keep(excess.size, worst)
 
-    def _torque_step(self, block: Block) -> FloatArray:
+    def _torque_discontinuity(self, block: Block) -> FloatArray:
         """Return the initial torque discontinuity of motors with springs, whose torques are continuous."""
         if not self._joint.actuator.sprung:
             return np.full(len(MOTORS), np.nan)

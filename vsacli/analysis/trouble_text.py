@@ -1,4 +1,7 @@
-"""Sentences of the report on the trouble of joints: kind, time, amount, uncertainty, and possible fixes."""
+"""Findings of a run as sentences: what fails, when, by how much, how uncertain it is, and what to do.
+
+`counts` is for the first line of a report, `findings` for the lines below it, the most critical first.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +25,18 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     torques = [(joint.name, each.variables[JUDGED]) for joint, each in found if JUDGED in each.variables]
     if torques:
         yield by_joint(
-            "motor torque, random noise only: ", [_spread(name, spread) for name, spread in torques]
+            "standard deviation of motor torque, random noise only: ",
+            [_spread(name, spread) for name, spread in torques],
         )
 
 
 def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:
     yield from map(undetermined_text, uncertainty.undetermined)
-    for kind, steps in uncertainty.steps.items():
-        if steps:
-            all_of_them = count(joint.steps[kind])
-            yield f"{steps} of {all_of_them} that are {kind} may be otherwise within their uncertainty"
+    for kind, samples in uncertainty.samples.items():
+        if samples:
+            yield f"{samples} of {count(joint.samples[kind])} that are {kind} may not be: uncertainty decides"
     for worst in uncertainty.limits.values():
-        yield f"{excess(worst)} by less than its uncertainty, and does not count"
+        yield f"{excess(worst)}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
         yield from _peak_at_an_end(joint, uncertainty.variables[JUDGED])
 
@@ -42,7 +45,7 @@ def _peak_at_an_end(joint: JointReport, spread: Spread) -> Iterator[str]:
     largest = max(of_motors(joint, joint.peak_tau_motor))
     if largest > DIFFERENT_PEAK * spread.peak:
         outside, inside = (f"{number(peak)} {spread.unit}" for peak in (largest, spread.peak))
-        yield f"its peak motor torque of {outside} is at an unreliable end of the record, else it is {inside}"
+        yield f"its peak motor torque {outside} is at an unreliable end of the recording; inside {inside}"
 
 
 def _spread(name: str, spread: Spread) -> str:
@@ -54,55 +57,78 @@ def _spread(name: str, spread: Spread) -> str:
 
 def undetermined_text(spread: Spread) -> str:
     """Return that a recording does not determine a variable, and its possible error."""
-    what = f"{spread.name} is not determined by the record"
+    subject = f"{spread.name} is not determined by the recording"
     if math.isnan(spread.bound):
-        return f"{what}, since a signal that it depends on is not"
-    wrong = f"it may be wrong by {percent(spread.bound)} of its root mean square"
+        return f"{subject}, since a signal that it depends on is not"
+    error = f"its error may reach {percent(spread.bound)} of its root mean square"
     if not math.isnan(spread.rms):
-        wrong += f", twice its standard deviation of {spread.rms:.2g} {spread.unit}"
-    return f"{what}: {wrong}; {100 * DETERMINED:.0f} % is allowed"
+        error += f", twice its standard deviation of {spread.rms:.2g} {spread.unit}"
+    return f"{subject}: {error}; {100 * DETERMINED:.0f} % is allowed"
 
 
-MOST_TOLD = 4
-"""Number of joints with one kind of trouble that are described in full, if at least two more have it."""
+MOST_IN_FULL = 3
+"""Joints with a full sentence on a kind of problem, where more than one more have it."""
+
+FAILURES = {
+    "infeasible": "infeasible",
+    "singular": "singular",
+    "over_limit": "over a limit",
+    "unreliable": "unreliable",
+}
+"""Verdicts that joints are counted for in the first line of a report, and their words there."""
+
+GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular")
+"""Kinds of problems that come first; limits follow, and warnings come last."""
 
 
-def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Return one sentence for each kind of trouble of a joint, with its name.
+def counts(joints: Sequence[JointReport]) -> str:
+    """Return how many joints fail which requirement; empty if none does, or there is only one."""
+    failing = {words: sum(joint.shows(verdict) for joint in joints) for verdict, words in FAILURES.items()}
+    failed = [(words, number) for words, number in failing.items() if number]
+    if len(joints) == 1 or not failed:
+        return ""
+    (words, first), *others = failed
+    return ", ".join(
+        [f"{first} of {len(joints)} joints {words}", *(f"{number} {words}" for words, number in others)]
+    )
 
-    If many joints have a kind, the others follow in a few words each.
+
+def findings(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
+    """Yield a sentence for each kind of problem of a joint, the most critical first.
+
+    Where many joints have a kind, those beyond `MOST_IN_FULL` follow in a few words each.
+
+    Args:
+        joints: reports of the joints, base to tip.
+        samples: number of samples of the run.
     """
-    kinds = dict.fromkeys(kind for joint in joints for kind in joint.worst)
-    told = {kind: _worst_of([joint for joint in joints if kind in joint.worst], kind) for kind in kinds}
-    for joint in joints:
-        between = {worst.time for worst in joint.between.values()}
-        for kind, worst in joint.worst.items():
-            if joint in told[kind]:
-                where = "; this lies between the steps" if worst.time in between else ""
-                yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}{where}"
+    kinds = sorted(dict.fromkeys(kind for joint in joints for kind in joint.worst), key=_rank)
     for kind in kinds:
-        others = {
-            number: _briefly(joint, kind)
-            for number, joint in enumerate(joints)
-            if kind in joint.worst and joint not in told[kind]
-        }
-        if others:
+        numbered = [(number, joint) for number, joint in enumerate(joints) if kind in joint.worst]
+        numbered.sort(key=lambda each: _size(each[1], kind), reverse=True)
+        in_full = len(numbered) if len(numbered) <= MOST_IN_FULL + 1 else MOST_IN_FULL
+        for _, joint in numbered[:in_full]:
+            yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, joint.worst[kind], samples)}"
+        if others := {number: _briefly(joint, kind, samples) for number, joint in sorted(numbered[in_full:])}:
             yield of_joints(f"also {_words(kind)}: ", others, [joint.name for joint in joints])
 
 
-def _worst_of(joints: Sequence[JointReport], kind: str) -> Sequence[JointReport]:
-    """Return the joints with the most samples of a kind of trouble, or farthest beyond their limit."""
-    if len(joints) <= MOST_TOLD + 1:
-        return joints
+def _rank(kind: str) -> tuple[int, int]:
+    """Return the place of a kind of problem in a report; limits in the order of their flags."""
+    if kind in GRAVEST:
+        return 0, GRAVEST.index(kind)
+    return (2, 0) if kind == "near_singular" else (1, Flag.labelled(kind).value)
 
-    def size(joint: JointReport) -> float:
-        return joint.steps.get(kind, _share_beyond(joint.worst[kind]))
 
-    return sorted(joints, key=size, reverse=True)[:MOST_TOLD]
+def _size(joint: JointReport, kind: str) -> tuple[float, int]:
+    """Return how large a problem is: by which share the bound is missed, then in how many samples."""
+    return _share_beyond(joint.worst[kind]), joint.samples.get(kind, 0)
 
 
 def _share_beyond(worst: Worst) -> float:
-    return abs(worst.value - worst.bound) / abs(worst.bound) if worst.bound else math.inf
+    """Return the excess as a share of the bound; infinite where there is none, as no stiffness would do."""
+    known = worst.bound and not math.isnan(worst.bound)
+    return abs(worst.value - worst.bound) / abs(worst.bound) if known else math.inf
 
 
 def _words(kind: str) -> str:
@@ -110,75 +136,88 @@ def _words(kind: str) -> str:
     return f"over the {words}" if kind.endswith("limit") else words
 
 
-def _briefly(joint: JointReport, kind: str) -> str:
-    if kind in joint.steps:
-        return f"({_steps(joint, kind)})"
+def _briefly(joint: JointReport, kind: str, samples: int) -> str:
+    if kind in joint.samples:
+        return f"({_when(joint, kind, samples)})"
     worst = joint.worst[kind]
     value, bound = apart(worst.value, worst.bound)
     return f"({value} {worst.unit}, limit {bound})"
 
 
-def _steps(joint: JointReport, kind: str) -> str:
-    found = joint.steps[kind]
+def _when(joint: JointReport, kind: str, samples: int) -> str:
+    """Return in how many samples a joint has a kind of problem, and from when on."""
+    found = joint.samples[kind]
+    if found == samples:
+        return "all samples"
     return count(found) if found == 1 else f"{count(found)}, from {time_text(joint.first_time[kind])}"
 
 
-def _infeasible(joint: JointReport, worst: Worst) -> str:
-    steps = _steps(joint, "infeasible")
-    slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
-    branch = "; the opposite branch reaches it" if joint.other_branch else ""
-    hints = f"({steps}){slack}{branch}"
-    when = f"at t = {time_text(worst.time)}"
+def _between(joint: JointReport, worst: Worst) -> str:
+    """Return a clause that the worst instant lies between two samples; empty if it is a sample."""
+    return ", between two samples" if worst.time in {each.time for each in joint.between.values()} else ""
+
+
+def _at(joint: JointReport, worst: Worst) -> str:
+    return f"at t = {time_text(worst.time)}{_between(joint, worst)}"
+
+
+def _infeasible(joint: JointReport, worst: Worst, samples: int) -> str:
+    when, hints = _at(joint, worst), f"({_when(joint, 'infeasible', samples)}){_hints(joint)}"
     if math.isnan(worst.bound):
-        return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"
+        return f"the springs cannot carry the elastic torque {when} at any stiffness; reduce the load {hints}"
     value, bound = apart(worst.value, worst.bound)
+    low = worst.value < worst.bound
+    relation = "below the minimum" if low else "above the maximum"
     if "stiffness" not in kind_of(joint).commanded:
-        relation = "below" if worst.value < worst.bound else "above"
-        load = f"elastic torque {value} {worst.unit} {when}"
-        return f"{load} is {relation} the {bound} that its spring carries {hints}"
-    relation, advice = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
+        load = f"elastic torque {value} {worst.unit} {when} is {relation} of {bound} {worst.unit}"
+        return f"{load} that its spring carries; reduce the load {hints}"
     return (
-        f"stiffness {value} {worst.unit} {when} is {relation} the {bound} "
-        f"its load allows, {advice} it {hints}"
+        f"stiffness {value} {worst.unit} {when} is {relation} of {bound} {worst.unit} at this load; "
+        f"{'increase' if low else 'decrease'} it {hints}"
     )
 
 
-def _singular(joint: JointReport, worst: Worst) -> str:
+def _hints(joint: JointReport) -> str:
+    slack = f"; a tendon goes slack at {count(joint.samples['slack'])}" if joint.samples["slack"] else ""
+    return slack + ("; the opposite branch reaches it" if joint.other_branch else "")
+
+
+def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
+    when, where = _when(joint, "singular", samples), _at(joint, worst)
     if math.isnan(worst.bound):
-        when = f"at t = {time_text(worst.time)}"
-        return f"its spring is slack {when}: motor torques are undefined ({_steps(joint, 'singular')})"
-    advice = "lower" if worst.bound == joint.reachable[1] else "raise"
+        return f"the spring is slack {where}, so that motor torques are undefined ({when})"
+    change = "decrease" if worst.bound == joint.attainable[1] else "increase"
     return (
-        f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "
-        f"motor torques are undefined at the end of its range, {advice} it ({_steps(joint, 'singular')})"
+        f"stiffness {worst.value:.6g} {worst.unit} {where} is singular: motor torques are undefined at the "
+        f"end of the attainable range; {change} it ({when})"
     )
 
 
-def _near_singular(joint: JointReport, worst: Worst) -> str:
-    gap, when = abs(worst.value - worst.bound) / worst.value, f"at t = {time_text(worst.time)}"
+def _near_singular(joint: JointReport, worst: Worst, samples: int) -> str:
+    gap = abs(worst.value - worst.bound) / worst.value
     return (
-        f"warning: stiffness {worst.value:.6g} {worst.unit} {when} is {100 * gap:.2g} % "
-        f"from singular, where motor torques grow without bound ({_steps(joint, 'near_singular')})"
+        f"warning: stiffness {worst.value:.6g} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
+        f"from singular, where motor torques grow without bound ({_when(joint, 'near_singular', samples)})"
     )
 
 
-def _not_finite(joint: JointReport, worst: Worst) -> str:
+def _not_finite(joint: JointReport, worst: Worst, samples: int) -> str:
     return (
-        f"a number of its motors is not finite at t = {time_text(worst.time)}: motion, stiffness or load are "
-        f"too large, or no numbers (infeasible: {_steps(joint, 'infeasible')})"
+        f"a motor variable is not finite {_at(joint, worst)}: motion, stiffness or load are too large or not "
+        f"numbers (infeasible: {_when(joint, 'infeasible', samples)})"
     )
 
 
-def _unstable(joint: JointReport, worst: Worst) -> str:
+def _unstable(joint: JointReport, worst: Worst, samples: int) -> str:
     return (
-        f"what moves inside its transmission is unstable from t = {time_text(worst.time)} on: its damper "
-        f"carries {number(worst.value)} {worst.unit} that the springs cannot; raise the stiffness "
-        f"({_steps(joint, 'singular')})"
+        f"the motion inside its damped transmission is unstable from t = {time_text(worst.time)} on: its "
+        f"damper carries {number(worst.value)} {worst.unit} that the springs cannot; increase the stiffness "
+        f"({_when(joint, 'singular', samples)})"
     )
 
 
-def _limit(joint: JointReport, worst: Worst) -> str:
-    return f"{excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
+def _limit(joint: JointReport, worst: Worst, _samples: int) -> str:
+    return f"{excess(worst)}{_between(joint, worst)} (first at {time_text(joint.first_time[worst.kind])})"
 
 
 def excess(worst: Worst) -> str:
@@ -186,7 +225,8 @@ def excess(worst: Worst) -> str:
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
-    return f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound}"
+    when = f"at t = {time_text(worst.time)}"
+    return f"{whose} is {value} {worst.unit} {when}, {relation} its limit of {bound} {worst.unit}"
 
 
 _SENTENCES = {

@@ -64,12 +64,9 @@ def _joined(lines: Sequence[str]) -> list[str]:
 
 
 def _broken(line: str, width: int) -> list[str]:
-    """Return a line broken between words; right-aligned text, such as a verdict, gets its own line."""
+    """Return a line broken between words."""
     if len(line) <= width:
         return [line]
-    if _has_cells(line):
-        left, _, right = line.rpartition(BETWEEN_CELLS)
-        return [*_broken(left.rstrip(), width), right.strip().rjust(width)]
     wrapped = textwrap.wrap(
         BEFORE_UNIT.sub(HARD_BLANK, line),
         width,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import zip_longest
 from typing import NamedTuple
 
 BETWEEN_CELLS = "   "
@@ -11,32 +12,49 @@ BETWEEN_CELLS = "   "
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield the lines of a table: the first column aligned left, the others right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
+    """Yield the lines of a table: the first column to the left, the others to the right.
+
+    A cell may have several lines, as a header with the unit below the name of a column.
+    """
+    lines = [line for row in rows for line in zip_longest(*(c.split("\n") for c in row), fillvalue="")]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
         name, *cells = (
             cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
         )
         yield BETWEEN_CELLS.join([name, *cells])
 
 
 class ReportText(NamedTuple):
-    """A report in its parts; as a string, its lines without a final newline.
+    """A report as people read it, in its parts; as a text, these with blank lines between them.
 
     Attributes:
-        headline: robot and trajectory of the run, and the verdict.
-        rows: rows of a table, header first; empty if there is no table.
-        lines: further findings, one or more lines each.
+        headline: the verdict, and what it is about.
+        rows: a table, its header first; none if there is no table.
+        lines: further values, a line or more each.
+        findings: problems and warnings, a line or more each, the most critical first.
     """
 
     headline: str
     rows: Sequence[tuple[str, ...]]
     lines: Sequence[str]
+    findings: Sequence[str] = ()
 
     def __str__(self) -> str:
-        table = aligned(self.rows) if self.rows else ()
-        return "\n".join([self.headline, *table, *self.lines])
+        table = "\n".join(line.rstrip() for line in aligned(self.rows)) if self.rows else ""
+        parts = ("\n".join([self.headline, *self.findings]), table, "\n".join(self.lines))
+        return "\n\n".join(filter(None, parts))
+
+
+def verdict_words(verdict: str) -> str:
+    """Return a verdict as the first line of a report shows it."""
+    return verdict.upper().replace("_", " ")
+
+
+def headline(verdict: str, title: str) -> str:
+    """Return the first line of a report: the verdict in capitals, then what it is about."""
+    return f"{verdict_words(verdict)}  {title}"
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
@@ -48,4 +66,5 @@ def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def _html_row(row: tuple[str, ...], cell: str) -> str:
-    return "<tr>" + "".join(f"<{cell}>{escape(text)}</{cell}>" for text in row) + "</tr>"
+    texts = (escape(text.replace("\n", ", ")) for text in row)
+    return "<tr>" + "".join(f"<{cell}>{text}</{cell}>" for text in texts) + "</tr>"

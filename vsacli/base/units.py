@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -35,6 +36,11 @@ class WrenchQuantity(Quantity):
 
     def __str__(self) -> str:
         return f"{self.prismatic} (forces), {self.revolute} (moments)"
+
+
+def units_of(quantity: Quantity, joint_types: Iterable[str]) -> str:
+    """Return the unit of a quantity; of both types of joints where there are both."""
+    return " | ".join(dict.fromkeys(map(quantity.unit, joint_types)))
 
 
 def time_text(time: float) -> str:

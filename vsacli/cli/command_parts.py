@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -217,12 +218,27 @@ def result_line(result: StoredResult) -> str:
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
 
 
-def show_report(report: Report, as_json: bool, fixes: Fixes | None = None) -> Exit:
-    """Print the report and any fixes; return the exit code of the verdict."""
+FIXABLE = ("infeasible", "singular", "over_limit")
+"""Verdicts for which fixes are searched."""
+
+
+def show_report(report: Report, as_json: bool, files: tuple[str, str], fixes: Fixes | None = None) -> Exit:
+    """Print the report, with fixes if there are any; the exit code follows from the verdict.
+
+    Without fixes, the report says by which command the `files` of robot and trajectory get them.
+    """
     if as_json:
         extra = {} if fixes is None else {"fixes": fixes.as_json()}
         say_json({**report.as_json(), **extra})
     else:
-        texts = [str(report)] if fixes is None else [str(report), str(fixes)]
+        hint = _hint(report, files) if fixes is None else ""
+        texts = [str(report.as_text(hint)), *([] if fixes is None else [str(fixes)])]
         say_text("\n".join(texts), report.verdict)
     return EXIT_OF_VERDICT[report.verdict]
+
+
+def _hint(report: Report, files: tuple[str, str]) -> str:
+    """Return how to list fixes of a motion that cannot be executed; empty if it can."""
+    if report.verdict not in FIXABLE or STANDARD in files:
+        return ""
+    return f"to list fixes: vsacli check-feasibility {shlex.join(files)} --fixes"

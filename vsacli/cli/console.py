@@ -7,7 +7,6 @@ import errno
 import io
 import json
 import os
-import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -20,6 +19,7 @@ import click
 
 from vsacli.base.errors import StorageError
 from vsacli.base.progress import NoBar, unseen
+from vsacli.base.tables import verdict_words
 from vsacli.base.texts import for_terminal
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ PLAIN = "\x1b[0m"
 """Escape sequence that ends a color. All colors are bold too, so that verdicts stand out without them."""
 
 COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "unreliable", "off_target", "unidentifiable"), YELLOW)}
-"""Color of each verdict; verdicts not listed are red."""
+"""Color of a verdict; every other is red."""
 
 EXIT_OF_VERDICT = {
     "ok": Exit.OK,
@@ -119,9 +119,9 @@ def say_json(content: Mapping[str, Any]) -> None:
 
 
 def say_text(text: str, verdict: str = "") -> None:
-    """Print a text; on a terminal, fit it to the width and color the verdict at the end of the headline."""
+    """Print a text: on a terminal fitted to its width, the verdict at its beginning in color."""
     text = for_width(text)
-    place = headline_end(text, verdict)
+    place = verdict_place(text, verdict)
     with _read_enough():
         if place is not None and isinstance(sys.stdout, _CheckedOutput) and _colored():
             sys.stdout.write_colored(text, place, COLORS.get(verdict, RED))
@@ -149,11 +149,10 @@ def _read_enough() -> Iterator[None]:
         _discard_buffer(sys.stdout)
 
 
-def headline_end(text: str, verdict: str) -> slice | None:
-    """Return the slice of the verdict at the end of a line, with its parenthesis; None if absent."""
-    words = re.escape(verdict.upper().replace("_", " "))
-    found = re.search(rf"(?<!\S){words}( \([^()\n]*\))?$", text, re.MULTILINE) if verdict else None
-    return slice(*found.span()) if found else None
+def verdict_place(text: str, verdict: str) -> slice | None:
+    """Return where the verdict stands at the beginning of a report; None without one."""
+    words = verdict_words(verdict)
+    return slice(0, len(words)) if verdict and text.startswith(words) else None
 
 
 def _terminal_width(stream: TextIO | None) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,10 +12,10 @@ import numpy as np
 from vsacli.analysis.joint_report import Worst
 from vsacli.base.arrays import FloatArray, by_joint, of_joint
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, has
 from vsacli.base.json_records import Stored, named
 from vsacli.base.simulation_variables import actual
-from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
+from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
 from vsacli.dynamics.limits import limit_checks
@@ -67,8 +67,6 @@ class GoalTolerance:
         return self.share * commanded_range + self.absolute
 
 
-HEADER = ("joint", "q error: peak", "end", "stiffness error: peak", "end", "peak motor 1 / 2")
-
 STIFFNESS_SHARE = 0.01
 """Error of the stiffness at the end without a warning, as a share of the largest commanded stiffness."""
 
@@ -100,7 +98,7 @@ class JointTracking(Stored):
         q: deviation of the position, rad (m).
         stiffness: deviation of the stiffness, N m/rad (N/m).
         peak_tau_motor: largest |torque| that motors 1 and 2 exerted, N m (N).
-        steps_over_limit: number of samples at which a limit is exceeded.
+        samples_over_limit: number of samples at which a limit is exceeded.
         worst: worst excess of each limit, by its name.
         energy: work of the motors, elastic energy, co-contraction.
         tolerance: largest error of q at the end, rad (m); NaN in reports of versions without it.
@@ -111,7 +109,7 @@ class JointTracking(Stored):
     q: Deviation
     stiffness: Deviation
     peak_tau_motor: tuple[float, float]
-    steps_over_limit: int
+    samples_over_limit: int
     worst: dict[str, Worst]
     energy: JointEnergy
     tolerance: float = math.nan
@@ -122,7 +120,7 @@ class JointTracking(Stored):
         "tolerance": "tolerance",
         "stiffness_error": "stiffness",
         "peak": {"tau_motor": "peak_tau_motor"},
-        "steps": {"over_limit": "steps_over_limit"},
+        "samples": {"over_limit": "samples_over_limit"},
         **named("worst", "energy"),
     }
 
@@ -171,7 +169,7 @@ def _tracking(
         q=Deviation.of(history.time, history.q_error[:, index]),
         stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
         peak_tau_motor=(first, second),
-        steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
+        samples_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
         energy=energy,
         tolerance=goal.of(float(np.ptp(history.q[:, index]))),
@@ -199,44 +197,38 @@ def _checked(variable: str) -> str:
     return variable if variable == "tau_motor" else actual(variable)
 
 
-def row(joint: JointTracking) -> tuple[str, ...]:
-    """Return the row of a joint in the table of the report, under `HEADER`."""
-    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
-    return (
-        joint.name,
-        _with_unit(joint.q.peak, POSITION, joint),
-        _with_unit(joint.q.final, POSITION, joint),
-        _with_unit(joint.stiffness.peak, STIFFNESS, joint),
-        _with_unit(joint.stiffness.final, STIFFNESS, joint),
-        f"{motors} {TORQUE.unit(joint.type)}",
+def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
+    """Return a table of errors and peaks, below its header with units."""
+    types = [joint.type for joint in joints]
+    position, stiffness, torque = (units_of(quantity, types) for quantity in (POSITION, STIFFNESS, TORQUE))
+    header = (
+        "joint",
+        f"q error: peak\n{position}",
+        f"end\n{position}",
+        f"stiffness error: peak\n{stiffness}",
+        f"end\n{stiffness}",
+        f"peak motor 1 / 2\n{torque}",
     )
+    return [header, *map(_row, joints)]
 
 
-def _with_unit(value: float, quantity: Quantity, joint: JointTracking) -> str:
-    return "-" if math.isnan(value) else f"{_number(value)} {quantity.unit(joint.type)}"
+def _row(joint: JointTracking) -> tuple[str, ...]:
+    deviations = (joint.q.peak, joint.q.final, joint.stiffness.peak, joint.stiffness.final)
+    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
+    return (joint.name, *map(_number, deviations), motors)
 
 
 def _number(value: float) -> str:
-    """Return a number with one decimal if large, with two digits if small."""
-    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2g}"
-
-
-def limit_sentence(joint: JointTracking, worst: Worst) -> str:
-    """Return a sentence on the largest excess of a limit by a joint."""
-    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
-    relation = "below" if worst.value < worst.bound else "above"
-    return (
-        f"{joint.name}: {whose} is {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s, "
-        f"{relation} its limit {worst.bound:.6g}"
-    )
+    """Return a number with one decimal if it is large, else with two digits."""
+    return "-" if math.isnan(value) else f"{value:.1f}" if abs(value) >= 10 else f"{value:.2g}"
 
 
 def end_sentence(joint: JointTracking) -> str:
-    """Return a sentence on the position error of a joint at the end."""
+    """Return how far off target a joint ends."""
     unit = POSITION.unit(joint.type)
     return (
-        f"{joint.name}: at the end q is {joint.q.final:.3g} {unit} off the command, "
-        f"more than the tolerance of {joint.tolerance:.3g} {unit}"
+        f"{joint.name}: q ends {joint.q.final:.3g} {unit} from the command, more than the goal tolerance of "
+        f"{joint.tolerance:.3g} {unit}"
     )
 
 
@@ -248,6 +240,6 @@ def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
         joint = robot.joints[index]
         unit = STIFFNESS.unit(joint.type)
         yield (
-            f"{joint.name}: at the end the stiffness is {errors[index]:.3g} {unit} off the command "
+            f"{joint.name}: the stiffness ends {errors[index]:.3g} {unit} from the command "
             f"of {history.stiffness[-1, index]:.4g} {unit}"
         )

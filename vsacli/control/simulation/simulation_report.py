@@ -10,21 +10,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.report_text import WIDTH, energy_lines, warnings_and_notes
+from vsacli.analysis.report_text import energy_lines, warnings_and_notes
+from vsacli.analysis.trouble_text import excess
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, headline
 from vsacli.base.units import POSITION, time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
-    HEADER,
     Deviation,
     JointTracking,
     end_sentence,
-    limit_sentence,
-    row,
+    rows,
 )
 
 VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
@@ -125,41 +124,43 @@ class SimulationReport(Stored):
         return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
 
     def as_text(self) -> ReportText:
-        """Return the parts of the printed report."""
-        lines = [
-            *warnings_and_notes(self.warnings, self.notes),
-            *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
-            *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
+        """Return the report in its parts, as people read it."""
+        found = [
             *([] if self.ending is None else [self.ending]),
+            *(f"{joint.name}: {excess(worst)}" for joint in self.joints for worst in joint.worst.values()),
+            *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
+            *warnings_and_notes(self.warnings, self.notes),
+        ]
+        lines = [
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
             *self._loss(),
             *self._effort(),
         ]
-        return ReportText(self._headline(), [HEADER, *map(row, self.joints)], lines)
+        return ReportText(headline(self.verdict, self._title()), rows(self.joints), lines, found)
 
     def __str__(self) -> str:
         """Return the lines that the command prints, without a final newline."""
         return str(self.as_text())
 
-    def _headline(self) -> str:
-        left = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
-        if (error := self.largest_error) is not None:
-            where = f"{error.joint}, t = {time_text(error.time)}"
-            left += f", q off by up to {error.value:.2g} {error.unit} ({where})"
-        verdict = self.verdict.upper().replace("_", " ")
-        return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
+    def _title(self) -> str:
+        title = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
+        if (error := self.largest_error) is None:
+            return title
+        where = f"{error.joint}, t = {time_text(error.time)}"
+        return f"{title}; largest q error {error.value:.2g} {error.unit} ({where})"
 
     def _loss(self) -> Iterator[str]:
         """Yield sentences on the errors with the full state, for comparison with measured positions."""
         for joint, ideal in zip(self.joints, self.with_full_state, strict=False):
             unit = POSITION.unit(joint.type)
             yield (
-                f"{joint.name}: with the full state the q error is {ideal.peak:.2g} {unit} at its peak, "
-                f"{ideal.final:.2g} {unit} at the end"
+                f"{joint.name}: with feedback of the full state the q error would be at most "
+                f"{ideal.peak:.2g} {unit}, {ideal.final:.2g} {unit} at the end"
             )
 
     def _effort(self) -> Iterator[str]:
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)
-            yield f"integrated by {first.name}{changes}: {self.evaluations} evaluations, budget {self.budget}"
+            effort = f"{self.evaluations} of at most {self.budget} evaluations"
+            yield f"integration: {first.name}{changes}; {effort}"

@@ -192,6 +192,7 @@ def _shown(text: str | None) -> str | None:
 
 
 def printable(report: ReportText) -> ReportText:
-    """Return a report with all characters printable; its texts may contain names of files or columns."""
-    rows = [tuple(map(one_line, row)) for row in report.rows]
-    return ReportText(one_line(report.headline), rows, list(map(for_terminal, report.lines)))
+    """Return a report whose texts name files or columns, with nothing in it that a page would not show."""
+    rows = [tuple("\n".join(map(one_line, cell.split("\n"))) for cell in row) for row in report.rows]
+    findings, lines = (list(map(for_terminal, texts)) for texts in (report.findings, report.lines))
+    return ReportText(one_line(report.headline), rows, lines, findings)

@@ -51,7 +51,7 @@ class Column(NamedTuple):
 
     def scalar(self, joint: JointReport) -> float | tuple[float, float]:
         """Return the value in the report of a joint, or those of its motors."""
-        if self.whole and (joint.steps.get("infeasible") or joint.steps.get("singular")):
+        if self.whole and (joint.samples.get("infeasible") or joint.samples.get("singular")):
             return (math.nan, math.nan) if self.dims == MOTOR else math.nan
         found: float | tuple[float, float] = (self.of or attrgetter(self.name))(joint)
         return found
@@ -67,7 +67,7 @@ KEPT = {
             JOINT,
             units.DIMENSIONLESS,
             "number of infeasible steps",
-            lambda joint: float(joint.steps.get("infeasible", 0)),
+            lambda joint: float(joint.samples.get("infeasible", 0)),
         ),
         Column(
             "first_infeasible",
