@@ -23,7 +23,7 @@ from samples.marks import slow
 
 import vsacli
 from vsacli.analysis.derivative_check import LADDER_BOUND, SPRING_BOUND
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
 from vsacli.cli.main import vsacli as group
 from vsacli.documents.source import MAX_DOCUMENT_BYTES
 from vsacli.documents.tree import MAX_LEVELS, MAX_NODES
@@ -220,7 +220,7 @@ def test_every_attribute_and_group_of_a_result_is_documented(result: Path, forma
 
 def test_the_numbers_in_the_text_are_those_of_the_code(format_page: str) -> None:
     theory = (REPOSITORY / "docs" / "theory.md").read_text(encoding="utf-8")
-    for number in (SINGULAR_MARGIN, NEAR_SINGULAR_MARGIN, SPRING_BOUND, LADDER_BOUND):
+    for number in (SINGULAR_MARGIN, MIN_MARGIN, SPRING_BOUND, LADDER_BOUND):
         assert f"{number:g}".replace("e-0", "e-") in theory
     assert f"{MAX_DOCUMENT_BYTES // 10**6} MB, {MAX_LEVELS} levels and {MAX_NODES:,} nodes" in format_page
 

@@ -62,9 +62,9 @@ def test_bad_threshold_is_refused_before_the_integration(vsacli, motion, monkeyp
         "vsacli.dynamics.integrated_deflections.integrate_deflections",
         lambda *_: pytest.fail("has begun to integrate"),
     )
-    done = vsacli("check-feasibility", ROBOT, motion, "--deflections", "integrate", "--near-singular", "2")
+    done = vsacli("check-feasibility", ROBOT, motion, "--deflections", "integrate", "--min-margin", "2")
     assert done.code == 2
-    assert "near-singular margin must lie between" in done.err
+    assert "minimum margin must lie between" in done.err
 
 
 @COMMANDS

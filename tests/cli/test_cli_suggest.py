@@ -1,4 +1,4 @@
-"""`vsacli check-feasibility` with --suggest, --write-fixed and --near-singular."""
+"""`vsacli check-feasibility` with --suggest, --write-fixed and --min-margin."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import pytest
 from samples.command_line import ROBOT, contents, edited
 
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.cli.check_feasibility import check_feasibility
 
 
@@ -35,7 +35,7 @@ def test_json_has_them_under_one_key(vsacli, too_soft):
     report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--suggest").out)
     suggestions = report.pop("suggestions")
     assert report == plain
-    assert suggestions["near_singular"] == NEAR_SINGULAR_MARGIN
+    assert suggestions["min_margin"] == MIN_MARGIN
     assert suggestions["slow_down"]["possible"] is False
     offsets = suggestions["stiffness_offset"]["offsets"]
     assert offsets.keys() == {"base", "shoulder", "elbow"}
@@ -66,7 +66,7 @@ def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
 def test_nothing_needs_to_change(vsacli, motion):
     report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", "--suggest").out)
     assert report["suggestions"] == {
-        "near_singular": 0.01,
+        "min_margin": 0.01,
         "slow_down": None,
         "stiffness_offset": None,
         "stiffness_profile": None,
@@ -86,7 +86,7 @@ def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
     assert run.code == 0
-    assert "near_singular" not in run.out
+    assert "near-singular" not in run.out
 
 
 def test_recorded_trajectory_is_fixed(vsacli, too_soft):
@@ -163,12 +163,9 @@ def test_inputs_are_never_overwritten(vsacli, too_soft):
 
 @pytest.mark.parametrize("margin", ["0", "-0.1", "1e-9", "1", "2", "nan"])
 def test_margins_out_of_range_are_refused(vsacli, motion, margin):
-    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", margin)
+    done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", margin)
     assert (done.code, done.out) == (2, "")
-    assert (
-        done.err
-        == f"the near-singular margin must lie between 1e-09 and 1, as 0.01 does, not {float(margin):g}\n"
-    )
+    assert done.err == f"the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {float(margin):g}\n"
 
 
 def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
@@ -176,16 +173,16 @@ def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
         report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", *options).out)
         return sum(joint["steps"]["near_singular"] for joint in report["joints"]), report["verdict"]
 
-    assert near_singular() == near_singular("--near-singular", "0.01") == (0, "ok")
-    steps, verdict = near_singular("--near-singular", "0.1")
+    assert near_singular() == near_singular("--min-margin", "0.01") == (0, "ok")
+    steps, verdict = near_singular("--min-margin", "0.1")
     assert steps > 0
     assert verdict == "ok"
 
 
 def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
-    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", "0.1", "--write-fixed", "fixed.yaml")
+    done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", "0.1", "--write-fixed", "fixed.yaml")
     assert "a margin of at least 10 %" in done.out
-    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--suggest")
+    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--min-margin", "0.1", "--suggest")
     assert (again.code, again.out.splitlines()[-1]) == (
         0,
         "nothing to change: every step has a margin of at least 10 % and keeps every limit",
@@ -193,5 +190,5 @@ def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
 
 
 def test_help_names_the_default_margin():
-    (option,) = [each for each in check_feasibility.params if each.name == "near_singular"]
-    assert option.help.endswith(f"by default {NEAR_SINGULAR_MARGIN}.")
+    (option,) = [each for each in check_feasibility.params if each.name == "min_margin"]
+    assert option.help.endswith(f"by default {MIN_MARGIN}.")

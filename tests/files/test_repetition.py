@@ -97,7 +97,7 @@ def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert (provenance["engine"], provenance["compiler"]) == ("numpy", "")
     assert provenance["options"] == {
         "stop_on_infeasible": False,
-        "near_singular": 0.01,
+        "min_margin": 0.01,
         "deflections": "root",
     }
     assert provenance["versions"]["scipy"] == scipy.__version__

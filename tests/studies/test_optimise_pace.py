@@ -117,7 +117,7 @@ def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
         "stiffness: {type: constant, value: 4000}\n"
     )
     robot = pendulum()
-    found = optimize(robot, load_trajectory(path, robot), "peak", "timing", margin=0.03)
+    found = optimize(robot, load_trajectory(path, robot), "peak", "timing", min_margin=0.03)
     assert found.together.after < 0.97
     run = inverse_dynamics(robot, found.trajectory)
     half = len(run.time) // 2
@@ -138,7 +138,7 @@ def test_ends_that_move_go_on_as_commanded(tmp_path, criterion):
     )
     robot = pendulum().replace({"joints.0.actuator.motor.max_torque": 250.0})
     asked = load_trajectory(path, robot)
-    found = optimize(robot, asked, criterion, "timing", margin=0.03)
+    found = optimize(robot, asked, criterion, "timing", min_margin=0.03)
     before, after = (inverse_dynamics(robot, each) for each in (asked, found.trajectory))
     assert after.report.verdict == "ok"
     for name in ("q", "dq", "ddq", "d3q", "d4q"):

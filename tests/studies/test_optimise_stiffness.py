@@ -160,7 +160,7 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
         "optimize",
         ROBOT,
         REST_TO_REST,
-        "--margin",
+        "--min-margin",
         "2%",
         "--json",
         "-o",

@@ -22,7 +22,7 @@ from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
+from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
@@ -53,7 +53,7 @@ class Run:
         trajectory: Commanded motion.
         stop_on_infeasible: Whether to end with the first infeasible sample, as the paper's algorithm does;
             also with the sample nearest to an infeasible point between samples.
-        near_singular: Margin below which a sample is near-singular.
+        min_margin: Margin below which a sample is near-singular.
         deflections: "root" solves (14) at each sample; "integrate" follows the root of the first sample by
             (19); or deflections that were integrated before.
         block_samples: Samples in a block, `usual_block` if None; results do not depend on it.
@@ -77,7 +77,7 @@ class Run:
         trajectory: Trajectory,
         *,
         stop_on_infeasible: bool = False,
-        near_singular: float = NEAR_SINGULAR_MARGIN,
+        min_margin: float = MIN_MARGIN,
         deflections: str | IntegratedDeflections = "root",
         block_samples: int | None = None,
         engine: str = "numpy",
@@ -85,19 +85,19 @@ class Run:
         asked: Collection[str] = (JUDGED,),
         tell: Tell = unheard,
     ) -> None:
-        check_near_singular(near_singular)
+        check_min_margin(min_margin)
         trajectory = fitted(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
-        self._near_singular = near_singular
+        self._min_margin = min_margin
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
         self._deflections = _integrated(deflections, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self._internal = _internal_motions(robot, trajectory)
         inside = () if self._internal is None else self._internal.joints
         integrated = self._deflections is not None
-        self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
+        self._kernel = BalancedDynamics(robot, frame, min_margin, integrated, inside)
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)
@@ -106,7 +106,7 @@ class Run:
         self._energy = RunEnergy(robot, self.choice.engine)
         self._passages = FrictionPassages(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
-        self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
+        self._between = Between(robot, trajectory, min_margin, self._compute, self._judged)
         self._balances = BalanceCheck(robot, trajectory.samples)
         self._samples = 0
         self._stopped = False
@@ -178,7 +178,7 @@ class Run:
         """Engine and options, for repeating the run."""
         options = {
             "stop_on_infeasible": self._stop_on_infeasible,
-            "near_singular": self._near_singular,
+            "min_margin": self._min_margin,
             "deflections": "root" if self._deflections is None else "integrate",
         }
         return {**self.choice.provenance, "options": json.dumps(options)}

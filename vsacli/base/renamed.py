@@ -26,7 +26,15 @@ class Renaming(NamedTuple):
     place: str
 
 
-RENAMINGS: tuple[Renaming, ...] = ()
+RENAMINGS: tuple[Renaming, ...] = (
+    Renaming("option", "--near-singular", "--min-margin", "check-feasibility"),
+    Renaming("option", "--margin", "--min-margin", "optimize"),
+    Renaming("key of studies", "margin", "min_margin", "optimize"),
+    Renaming("parameter", "near_singular", "min_margin", "suggest"),
+    Renaming("parameter", "margin", "min_margin", "optimize"),
+    Renaming("key of reports", "near_singular", "min_margin", "suggestions of check-feasibility"),
+    Renaming("key of reports", "margin", "min_margin", "optimize"),
+)
 
 
 def successor(word: str, valid: Iterable[str]) -> str | None:

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 @json_option
 @stop_option
 @click.option(
-    "--near-singular",
+    "--min-margin",
     metavar="MARGIN",
     type=float,
     help="Relative margin below which a step is near-singular; by default 0.01.",
@@ -77,7 +77,7 @@ def check_feasibility(
     changes: tuple[str, ...],
     as_json: bool,
     stop_on_infeasible: bool,
-    near_singular: float | None,
+    min_margin: float | None,
     deflections: str,
     plot_folder: str | None,
     advise: bool,
@@ -103,19 +103,19 @@ def check_feasibility(
         raise click.UsageError("--write-fixed starts from the files as they are; change them instead")
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+    from vsacli.base.flags import MIN_MARGIN, check_min_margin
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import check_fixed_target, suggest
 
-    margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
-    check_near_singular(margin)
+    min_margin = MIN_MARGIN if min_margin is None else min_margin
+    check_min_margin(min_margin)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if fixed is not None:
             check_fixed_target(fixed, outputs)
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
-            near_singular=margin,
+            min_margin=min_margin,
             deflections=deflections,
             engine=engine,
             threads=threads,
@@ -126,7 +126,7 @@ def check_feasibility(
             report = compute(run, talk)
         else:
             report = _compute_and_draw(run, plot_folder, run_stem(robot, trajectory), outputs, talk)
-        suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
+        suggestions = suggest(*inputs, min_margin) if advise or fixed is not None else None
         if suggestions is not None and fixed is not None:
             _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, outputs, talk)
     talk.wrote(outputs)

@@ -68,7 +68,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
     help="What may change: by default the stiffness, for time the timing.",
 )
 @click.option(
-    "--margin",
+    "--min-margin",
     metavar="SHARE",
     callback=_share,
     help="Relative margin that every step shall keep to the ends of its corridor, e.g. 3%; by default 1%.",
@@ -92,7 +92,7 @@ def optimize(
     changes: tuple[str, ...],
     minimize: str,
     vary: str | None,
-    margin: float | None,
+    min_margin: float | None,
     output: str | None,
     folder: str | None,
     seed: int,
@@ -107,7 +107,7 @@ def optimize(
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next
     inputs = load_inputs(robot, trajectory, talk, changes)
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.flags import MIN_MARGIN
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import Remedy, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
@@ -127,7 +127,7 @@ def optimize(
                 *inputs,
                 minimize,
                 vary,
-                margin=NEAR_SINGULAR_MARGIN if margin is None else margin,
+                min_margin=MIN_MARGIN if min_margin is None else min_margin,
                 seed=seed,
                 progress=progress.update,
             )

@@ -12,7 +12,7 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
@@ -100,7 +100,7 @@ def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, Of
     for number, joint in checked.driven:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
             command = Command.at_rest(np.array([0.0, checked.sizes.loads[number]]), np.zeros(2))
-            held = joint.actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
+            held = joint.actuator.transmit(command, MIN_MARGIN, None)
             constant = getattr(joint.actuator, "stiffness", None)
             path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
             value = math.nan if constant is None else constant
@@ -154,7 +154,7 @@ def _least_stiffness(joint: Joint) -> float:
     found = corridor(joint)
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
-    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), NEAR_SINGULAR_MARGIN, None)
+    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
     return float(held["stiffness"][0])
 
 

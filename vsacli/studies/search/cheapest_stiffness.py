@@ -104,7 +104,7 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
 
     None means that it keeps them; an empty array means that only the self-check fails.
     """
-    task = Task(Acceptance(what.robot, what.margin), trajectory)
+    task = Task(Acceptance(what.robot, what.min_margin), trajectory)
     return task.falls_short(Remedy(0.0, what.robot, trajectory))
 
 
@@ -124,7 +124,7 @@ def cheapest_stiffness(
     progress: Callable[[int], object],
 ) -> Optimum:
     """Return the best stiffness of all joints, confirmed by a run."""
-    search = CheapestStiffness(Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress)
+    search = CheapestStiffness(Acceptance(what.robot, what.min_margin), trajectory, criterion, seed, progress)
     try:
         found = search.confirmed(what)
     except ImpossibleError as error:

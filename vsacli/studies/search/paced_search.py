@@ -282,7 +282,7 @@ class TimingSearch(PacedSearch):
             PacedJoint(
                 motion,
                 index,
-                acceptance.near_singular,
+                acceptance.min_margin,
                 reserve=acceptance.reserve,
                 varied=index in varied,
             )

@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import driven_by
@@ -100,7 +100,7 @@ class FixedMotion:
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), NEAR_SINGULAR_MARGIN)
+            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
 
 INSIDE = 1e-3
