@@ -191,4 +191,4 @@ def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
 
 def test_help_names_the_default_margin():
     (option,) = [each for each in check_feasibility.params if each.name == "min_margin"]
-    assert option.help.endswith(f"by default {MIN_MARGIN}.")
+    assert option.help.endswith(f"by default {100 * MIN_MARGIN:g}%.")

@@ -5,9 +5,19 @@ from __future__ import annotations
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT
 
+from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory
+from vsacli.cli.main import vsacli as commands
+from vsacli.robot.parameters import parameters
+from vsacli.studies.sensitivities.tolerances import tolerances_of
+
 OF_COMMANDS = [
     (("check-feasibility", ROBOT, REST_TO_REST, "--near-singular", "0.01"), "--min-margin"),
     (("optimize", ROBOT, REST_TO_REST, "--margin", "1%"), "--min-margin"),
+    (("simulate", ROBOT, REST_TO_REST, "--tolerance", "1%"), "--goal-tolerance"),
+    (("simulate", ROBOT, REST_TO_REST, "--measure", "positions"), "--feedback"),
+    (("invdyn", ROBOT, REST_TO_REST, "--deflections", "root"), "--deflection-solver"),
+    (("check-feasibility", ROBOT, REST_TO_REST, "--deflections", "root"), "--deflection-solver"),
+    (("compare", "r.h5", "m.csv", "--begins-at", "0"), "--time-offset"),
 ]
 
 
@@ -17,6 +27,45 @@ def test_an_old_option_is_refused_with_its_successor(vsacli, command, new):
     assert outcome.code == 2
     old = next(word for word in reversed(command) if word.startswith("--"))
     assert f"{old} is now {new}." in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("command", "old", "new"),
+    [
+        (("invdyn", ROBOT, REST_TO_REST, "--deflection-solver"), "integrate", "ode"),
+    ],
+)
+def test_an_old_word_of_an_option_is_refused_with_its_successor(vsacli, command, old, new):
+    outcome = vsacli(*command, old)
+    assert outcome.code == 2
+    assert f"'{old}' is now '{new}'." in outcome.err
+
+
+def test_an_old_word_in_python_is_refused_with_its_successor():
+    arm = load_robot(ROBOT)
+    with pytest.raises(InputError, match="unknown deflection solver 'integrate'; it is now 'ode'"):
+        inverse_dynamics(arm, load_trajectory(REST_TO_REST, arm), deflection_solver="integrate")
+
+
+@pytest.mark.parametrize("share", ["2%", "2 %", "0.02"])
+@pytest.mark.parametrize(
+    ("command", "option", "number"),
+    [
+        ("check-feasibility", "min_margin", 0.02),
+        ("optimize", "min_margin", 0.02),
+        ("simulate", "perturb", 0.02),
+    ],
+)
+def test_shares_are_read_alike_by_every_command(command, option, number, share):
+    (found,) = [each for each in commands.commands[command].params if each.name == option]
+    assert found.type.convert(share, found, None) == pytest.approx(number, rel=1e-15)
+
+
+@pytest.mark.parametrize("share", ["2%", "2 %", "0.02"])
+def test_tolerances_of_all_numbers_are_shares(share):
+    masses = parameters(load_robot(ROBOT), ("joints.*.link.mass",))
+    sizes = [each.size for each in tolerances_of(share, masses)]
+    assert sizes == pytest.approx([0.02 * each.value for each in masses])
 
 
 def test_an_old_key_of_a_study_is_refused_with_its_successor(vsacli, tmp_path):

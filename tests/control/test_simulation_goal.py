@@ -117,9 +117,9 @@ def test_a_tolerance_as_typed(written, share, absolute):
 @pytest.mark.parametrize(
     ("written", "message"),
     [
-        ("wide", "--tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
-        ("%", "--tolerance: expected a number"),
-        ("1 deg", "--tolerance: expected a number"),
+        ("wide", "--goal-tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
+        ("%", "--goal-tolerance: expected a number"),
+        ("1 deg", "--goal-tolerance: expected a number"),
         ("0", "the tolerance must be positive and finite"),
         ("-1", "the tolerance must be positive and finite"),
         ("-1%", "the tolerance must be positive and finite"),

@@ -92,7 +92,7 @@ def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
 
 
 def test_controllers_with_encoders_can_be_stiff(monkeypatch):
-    conditions = {"gains": GAINS, "measured": "positions"}
+    conditions = {"gains": GAINS, "feedback": "positions"}
     trajectory = short_motion(3, rate=100, duration=0.2)
     explicit = simulate(vsa_3r(), trajectory, **conditions)
     go_on_implicitly(monkeypatch, 0.1)
@@ -191,6 +191,6 @@ def test_the_time_from_which_a_method_was_used_is_a_stamp(monkeypatch):
 
 def test_a_run_with_the_full_state_that_ends_early_is_told():
     trajectory = short_motion(3, rate=100, duration=0.3)
-    report = simulate(vsa_3r(), trajectory, gains=GAINS, measured="positions", budget=300).report
+    report = simulate(vsa_3r(), trajectory, gains=GAINS, feedback="positions", budget=300).report
     assert report.verdict == "incomplete"
     assert report.warnings[-1].startswith("the same run with the full state: the budget of 300 evaluations")

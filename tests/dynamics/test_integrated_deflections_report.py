@@ -40,7 +40,7 @@ def test_drift_beyond_its_bound_fails_the_self_check():
 def test_report_as_json():
     report = integrated(ARM, motion(), COARSE).report
     entry = report.as_json()["deflections"]
-    assert entry["method"] == "integrate"
+    assert entry["method"] == "ode"
     assert [joint["joint"] for joint in entry["joints"]] == ["base", "shoulder"]
     for joint, drift in zip(entry["joints"], report.drifts, strict=True):
         assert (joint["drift"], joint["time"]) == (drift.largest, drift.time)

@@ -237,7 +237,7 @@ def test_result_on_the_command_line(vsacli: Any, feasible_result: Path) -> None:
 
 
 @pytest.mark.parametrize("end_stiffness", [1275, 790], ids=["feasible", "infeasible"])
-@pytest.mark.parametrize("options", ["", slow("--deflections integrate"), "--stop-on-infeasible"])
+@pytest.mark.parametrize("options", ["", slow("--deflection-solver ode"), "--stop-on-infeasible"])
 def test_a_result_ends_with_what_invdyn_printed(
     vsacli: Any, tmp_path: Path, end_stiffness: float, options: str
 ) -> None:

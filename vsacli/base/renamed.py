@@ -34,6 +34,16 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("parameter", "margin", "min_margin", "optimize"),
     Renaming("key of reports", "near_singular", "min_margin", "suggestions of check-feasibility"),
     Renaming("key of reports", "margin", "min_margin", "optimize"),
+    Renaming("option", "--tolerance", "--goal-tolerance", "simulate"),
+    Renaming("option", "--measure", "--feedback", "simulate"),
+    Renaming("parameter", "measured", "feedback", "simulate"),
+    Renaming("option", "--deflections", "--deflection-solver", "invdyn, check-feasibility"),
+    Renaming("value", "integrate", "ode", "--deflection-solver, deflections.method of reports"),
+    Renaming("parameter", "deflections", "deflection_solver", "inverse_dynamics"),
+    Renaming("option", "--begins-at", "--time-offset", "compare"),
+    Renaming("parameter", "begins_at", "time_offset", "compare"),
+    Renaming("key of reports", "begins_at", "time_offset", "compare"),
+    Renaming("key of reports", "begins_at_error", "time_offset_error", "compare"),
 )
 
 

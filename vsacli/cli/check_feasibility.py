@@ -8,7 +8,7 @@ import click
 
 from vsacli.cli.command_parts import (
     compute,
-    deflections_option,
+    deflection_solver_option,
     engine_options,
     example,
     json_option,
@@ -23,6 +23,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.option_types import SHARE
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -43,11 +44,10 @@ if TYPE_CHECKING:
 @stop_option
 @click.option(
     "--min-margin",
-    metavar="MARGIN",
-    type=float,
-    help="Relative margin below which a step is near-singular; by default 0.01.",
+    type=SHARE,
+    help="Relative margin below which a step is near-singular, e.g. 3%; by default 1%.",
 )
-@deflections_option
+@deflection_solver_option
 @click.option(
     "--plot",
     "plot_folder",
@@ -78,7 +78,7 @@ def check_feasibility(
     as_json: bool,
     stop_on_infeasible: bool,
     min_margin: float | None,
-    deflections: str,
+    deflection_solver: str,
     plot_folder: str | None,
     advise: bool,
     fixed: str | None,
@@ -94,7 +94,7 @@ def check_feasibility(
     within limits, and a record, if there is one, determines that; else 3.
 
     --suggest looks for what would mend it: slower, another stiffness (by a constant, or as a smooth profile),
-    another preload, or several of these together, so that every step keeps the near-singular margin and all
+    another preload, or several of these together, so that every step keeps --min-margin and all
     limits. The list begins with the smallest change; each was confirmed by a run of its own.
     """
     if remedy is not None and fixed is None:
@@ -116,7 +116,7 @@ def check_feasibility(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
             min_margin=min_margin,
-            deflections=deflections,
+            deflection_solver=deflection_solver,
             engine=engine,
             threads=threads,
             asked=("flags",),

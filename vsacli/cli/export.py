@@ -78,7 +78,6 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 )
 @click.option(
     "--start",
-    metavar="RESULT",
     type=FILE,
     help="Of a robot as MJCF: add a key frame, `start`, with the first step of this result.",
 )

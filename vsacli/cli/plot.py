@@ -53,7 +53,7 @@ RECORDING = "recording"
     callback=words_of("theta,dtheta"),
     help="A figure of each of these variables instead, e.g. theta,dtheta.",
 )
-@click.option("--robot", metavar="ROBOT", type=FILE, help="The robot that a recording is of.")
+@click.option("--robot", type=FILE, help="The robot that a recording is of.")
 @overwrite_option
 @talk_options
 def plot(

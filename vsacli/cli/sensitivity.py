@@ -58,11 +58,18 @@ SHOWN_FROM = 20_000
 @click.option(
     "--monte-carlo",
     "runs",
-    metavar="RUNS",
+    metavar="N",
     type=click.IntRange(min=2),
     help="Compute so many robots drawn from the tolerances as well.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of these draws.")
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of these draws.",
+)
 @click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time as HDF5.")
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of the ranking, and of the bands, there.")
 @json_option
