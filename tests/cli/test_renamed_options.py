@@ -17,6 +17,7 @@ OF_COMMANDS = [
     (("simulate", ROBOT, REST_TO_REST, "--measure", "positions"), "--feedback"),
     (("invdyn", ROBOT, REST_TO_REST, "--deflections", "root"), "--deflection-solver"),
     (("check-feasibility", ROBOT, REST_TO_REST, "--deflections", "root"), "--deflection-solver"),
+    (("size", ROBOT, REST_TO_REST, "--catalogue", "motors.csv"), "--catalog"),
     (("compare", "r.h5", "m.csv", "--begins-at", "0"), "--time-offset"),
 ]
 
@@ -33,6 +34,9 @@ def test_an_old_option_is_refused_with_its_successor(vsacli, command, new):
     ("command", "old", "new"),
     [
         (("invdyn", ROBOT, REST_TO_REST, "--deflection-solver"), "integrate", "ode"),
+        (("optimize", ROBOT, REST_TO_REST, "--minimize"), "copper", "copper_loss"),
+        (("size", ROBOT, REST_TO_REST, "--minimize"), "copper", "copper_loss"),
+        (("size", ROBOT, REST_TO_REST, "--minimize"), "utilisation", "utilization"),
     ],
 )
 def test_an_old_word_of_an_option_is_refused_with_its_successor(vsacli, command, old, new):
@@ -68,12 +72,15 @@ def test_tolerances_of_all_numbers_are_shares(share):
     assert sizes == pytest.approx([0.02 * each.value for each in masses])
 
 
-def test_an_old_key_of_a_study_is_refused_with_its_successor(vsacli, tmp_path):
+@pytest.mark.parametrize(
+    ("entry", "new"), [("margin: 3 %", "min_margin"), ("minimize: copper", "copper_loss")]
+)
+def test_an_old_word_of_a_study_is_refused_with_its_successor(vsacli, tmp_path, entry, new):
     study = tmp_path / "study.yaml"
     study.write_text(
-        "format: vsacli-study/1\nname: s\nrobot: arm.yaml\ntrajectory: move.yaml\noptimize: {margin: 3 %}\n"
+        f"format: vsacli-study/1\nname: s\nrobot: arm.yaml\ntrajectory: move.yaml\noptimize: {{{entry}}}\n"
     )
     outcome = vsacli("validate", study)
     assert outcome.code == 2
     assert "study.yaml:5" in outcome.out
-    assert "it is now 'min_margin'" in outcome.out
+    assert f"it is now {new!r}" in outcome.out

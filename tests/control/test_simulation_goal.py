@@ -53,7 +53,7 @@ def test_the_headline_has_the_largest_error_on_the_way():
     assert largest == {"joint": "axis", "value": pytest.approx(0.05, rel=1e-12), "unit": "rad", "time": 0.0}
 
 
-def test_a_prismatic_joint_strays_in_metres():
+def test_a_prismatic_joint_strays_in_meters():
     report = drifted(0.3, 0.05, "prismatic").report
     assert report.verdict == "strayed"
     assert "axis: at the end q is 0.015 m off the command, more than the tolerance of 0.004 m" in str(report)

@@ -47,7 +47,7 @@ def test_report_as_json():
         assert (joint["unit"], joint["stopped"]) == ("rad", None)
 
 
-def test_drift_of_a_sliding_joint_is_in_metres():
+def test_drift_of_a_sliding_joint_is_in_meters():
     robot, trajectory = shipped_run("rp_2", "rp_2")
     assert [drift.unit for drift in integrated(robot, trajectory, COARSE).report.drifts] == ["rad", "m"]
 

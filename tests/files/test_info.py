@@ -83,7 +83,7 @@ def recursion_torques(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def test_static_load_of_the_published_arm_is_that_of_the_stretched_one() -> None:
-    # Table I: links 2 and 3 of 6.7858 and 5.0894 kg, 0.3 m long, centres in the middle
+    # Table I: links 2 and 3 of 6.7858 and 5.0894 kg, 0.3 m long, centers in the middle
     elbow = 5.0894 * G * 0.15
     shoulder = 6.7858 * G * 0.15 + 5.0894 * G * 0.45
     np.testing.assert_allclose(static_load(ARM).values, [0, shoulder, elbow], rtol=1e-9, atol=1e-12)

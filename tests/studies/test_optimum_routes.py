@@ -29,7 +29,7 @@ def reported(robot: Robot, trajectory: Trajectory, criterion: str, index: int = 
             return float(np.abs(torques).max())
         case "energy":
             return energy.spent + float(run.elastic_energy[0, index])
-        case "copper":
+        case "copper_loss":
             assert energy.copper_loss is not None
             return energy.copper_loss
     mean = np.trapezoid((torques**2).mean(axis=-1), run.time) / trajectory.duration
@@ -104,7 +104,7 @@ def test_costs_of_all_joints_are_those_of_runs(tmp_path: Path) -> None:
         {f"joints.*.actuator.motor.{name}": value for name, value in numbers.items()}
     )
     motion = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", robot, {"rate": 100})
-    for criterion in ("copper", "energy"):
+    for criterion in ("copper_loss", "energy"):
         folder = tmp_path / criterion
         folder.mkdir()
         found = optimize(robot, motion, criterion)

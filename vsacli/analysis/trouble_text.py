@@ -183,7 +183,7 @@ def _limit(joint: JointReport, worst: Worst) -> str:
 
 def excess(worst: Worst) -> str:
     """Return by how much a limit is exceeded, and where."""
-    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
+    whose = Flag.labeled(worst.kind).quantity_of(worst.motor)
     value, bound = apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
     return f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound}"

@@ -77,7 +77,7 @@ class Flag(enum.IntFlag):
         return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
 
     @classmethod
-    def labelled(cls, label: str) -> Flag:
+    def labeled(cls, label: str) -> Flag:
         """Return the flag with this label."""
         return cls[label.upper()]
 

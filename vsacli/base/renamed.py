@@ -43,6 +43,12 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("option", "--begins-at", "--time-offset", "compare"),
     Renaming("parameter", "begins_at", "time_offset", "compare"),
     Renaming("key of reports", "begins_at", "time_offset", "compare"),
+    Renaming("value", "copper", "copper_loss", "minimize of optimize, size and studies"),
+    Renaming("value", "utilisation", "utilization", "minimize of size"),
+    Renaming("option", "--catalogue", "--catalog", "size"),
+    Renaming("parameter", "catalogue", "catalog", "size_drives"),
+    Renaming("key of reports", "catalogue", "catalog", "size"),
+    Renaming("key of reports", "minimised", "minimized", "optimize"),
     Renaming("key of reports", "begins_at_error", "time_offset_error", "compare"),
 )
 

@@ -99,7 +99,7 @@ def optimize(
 ) -> Exit:
     """Find the stiffness or the pace with which ROBOT executes TRAJECTORY at the least cost, or fastest.
 
-    Unless time is minimised, the motion takes as long as commanded. Every step keeps the margin and all
+    Unless time is minimized, the motion takes as long as commanded. Every step keeps the margin and all
     limits. What is found is a local optimum; the report says from how many starts the search came to it.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next

@@ -223,7 +223,7 @@ def _number(value: float) -> str:
 
 def limit_sentence(joint: JointTracking, worst: Worst) -> str:
     """Return a sentence on the largest excess of a limit by a joint."""
-    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
+    whose = Flag.labeled(worst.kind).quantity_of(worst.motor)
     relation = "below" if worst.value < worst.bound else "above"
     return (
         f"{joint.name}: {whose} is {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s, "

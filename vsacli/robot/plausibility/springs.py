@@ -16,7 +16,7 @@ from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETRES, SIZES, TURN
+from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
@@ -28,8 +28,8 @@ TOO_SOFT = (
     OtherUnit("kN m/rad", 1e3, instead_of="N m/rad"),
     OtherUnit("N/mm", 1e3, instead_of="N/m"),
 )
-NEWTON_MILLIMETRES = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
-TOO_STIFF = (NEWTON_MILLIMETRES, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
+NEWTON_MILLIMETERS = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
+TOO_STIFF = (NEWTON_MILLIMETERS, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller number (`TOO_SOFT`) or a larger one than in the expected unit."""
 
 SLIPS_OF_DAMPING = (
@@ -201,7 +201,7 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="springs in joints do not wind up so far",
         finding="is a deflection of more than half a turn (than the reach)",
-        units=(DEGREES, MILLIMETRES), in_angles=True),
+        units=(DEGREES, MILLIMETERS), in_angles=True),
     Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
         size="over the lowest that the springs give at rest", low=1, high=500, usual=2,
         reason="below 1 nothing is within the limits, and springs do not become so much stiffer",

@@ -76,9 +76,9 @@ def optimize(
     Args:
         robot: robot that executes the motion.
         trajectory: motion to improve.
-        minimize: "torque" (rms of the motor torques), "energy" (positive motor work), "copper" (heat in the
-            windings) or "peak" (of the motor torques), for each joint separately, or for all joints together
-            if the timing varies; or "time".
+        minimize: "torque" (rms of the motor torques), "energy" (positive motor work), "copper_loss" (heat in
+            the windings) or "peak" (of the motor torques), for each joint separately, or for all joints
+            together if the timing varies; or "time".
         vary: "stiffness", "timing" or "both"; for "time" one of the latter two.
         min_margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
         seed: seed of the random starts.
@@ -90,7 +90,7 @@ def optimize(
     """
     trajectory = fitted(robot, trajectory)
     check_min_margin(min_margin)
-    refuse_damped_transmissions(robot, trajectory, "optimisations")
+    refuse_damped_transmissions(robot, trajectory, "optimizations")
     varied = varied_joints(robot, vary)
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin)
     if minimize == TIME:
@@ -287,7 +287,7 @@ def _retimed(
 
     Samples have the rate of the path, or a multiple if a file would not describe the motion between them.
     """
-    name = as_name(f"{what.asked}-{what.minimised}")
+    name = as_name(f"{what.asked}-{what.minimized}")
     parts = 1
     while True:
         best = retimed(path, found.pace(count), found.stiffness(count), name, parts)

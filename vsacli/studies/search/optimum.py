@@ -105,7 +105,7 @@ class Optimum(Published):
     Attributes:
         robot: robot that executes the trajectory.
         asked: name of the trajectory to be improved.
-        minimised: objective: torque, energy, copper, peak or time.
+        minimized: objective: torque, energy, copper_loss, peak or time.
         words: objective in words.
         varied: varied quantity: stiffness, timing or both.
         min_margin: margin that every sample has.
@@ -121,7 +121,7 @@ class Optimum(Published):
 
     robot: Robot = field(repr=False)
     asked: str
-    minimised: str
+    minimized: str
     words: str
     varied: str
     min_margin: float
@@ -139,7 +139,7 @@ class Optimum(Published):
         "robot": "robot_name",
         "trajectory": "asked",
         "possible": "possible",
-        **named("minimised", "varied", "min_margin", "joints"),
+        **named("minimized", "varied", "min_margin", "joints"),
         "together?": "together",
         "slow_down?": "slowed_down",
         "timing?": "timing",

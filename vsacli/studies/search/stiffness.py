@@ -32,7 +32,7 @@ from vsacli.studies.search.criteria import (
     smoothed_minimum,
     trapezoidal,
 )
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
@@ -156,7 +156,7 @@ def nearest_profile(
     )
     problem = SeparableProblem([group])
     start = interior(problem, space.fitted(time, np.clip(target, *within)))
-    return None if start is None else minimise(problem, start).unknowns
+    return None if start is None else minimize(problem, start).unknowns
 
 
 INSTANTS_PER_PIECE = 8

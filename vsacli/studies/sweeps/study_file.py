@@ -163,7 +163,7 @@ def _text(node: Node, form: str) -> str:
 
 
 STIFFNESS, TIMING = "stiffness", "timing"
-MINIMIZED = ("torque", "energy", "copper", "peak", TIME)
+MINIMIZED = ("torque", "energy", "copper_loss", "peak", TIME)
 VARIED = (STIFFNESS, TIMING, "both")
 """Words of `vsacli optimize`, repeated here because importing the optimization is slow."""
 
@@ -176,7 +176,7 @@ _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
 
 
 @dataclass(frozen=True)
-class Optimised:
+class Optimized:
     """The optimization of each run, with the names and defaults of the options of `vsacli optimize`."""
 
     minimize: str = choice(
@@ -274,9 +274,9 @@ class StudyFile:
         "runs of each trajectory that are drawn; absent if the method is grid", check=_COUNT, default=None
     )
     seed: int = integer("of what is drawn", check=_SEED, default=0)
-    optimize: Optimised | None = value(
-        Record(Optimised),
-        "what is optimised in each run; all that is kept is of the optimum then",
+    optimize: Optimized | None = value(
+        Record(Optimized),
+        "what is optimized in each run; all that is kept is of the optimum then",
         default=None,
     )
     keep: tuple[str, ...] | None = value(

@@ -86,12 +86,12 @@ def test_durations_before_and_after(vsacli: Any, own_folder: Path) -> None:
         ("optimize: torque", "optimize: expected a mapping"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_optimised(vsacli: Any, own_folder: Path, text: str, message: str) -> None:
+def test_what_cannot_be_optimized(vsacli: Any, own_folder: Path, text: str, message: str) -> None:
     done = vsacli("study", str(study(own_folder, text)))
     assert (done.code, message in done.err) == (2, True), done.err
 
 
-def test_what_cannot_be_minimised_of_a_robot_is_a_row_that_says_so(vsacli: Any, own_folder: Path) -> None:
-    done = vsacli("study", str(study(own_folder, "optimize: {minimize: copper}\n")))
+def test_what_cannot_be_minimized_of_a_robot_is_a_row_that_says_so(vsacli: Any, own_folder: Path) -> None:
+    done = vsacli("study", str(study(own_folder, "optimize: {minimize: copper_loss}\n")))
     assert (done.code, column("study.h5", "verdict").tolist()) == (3, ["failed"])
     assert "torque_constant" in done.out
