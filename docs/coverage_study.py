@@ -34,7 +34,7 @@ WORDS = {
     "k": "k",
     "k_c": "k_c",
 }
-COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+COLORS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
 def joint() -> Robot:
@@ -93,12 +93,12 @@ def draw(path: Path) -> None:
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     axes = figure.subplots()
     axes.plot(bounds, 100 * erf(bounds / np.sqrt(2)), color="0.75", linewidth=6, label="normal distribution")
-    for (name, words), colour in zip(WORDS.items(), COLOURS, strict=True):
+    for (name, words), color in zip(WORDS.items(), COLORS, strict=True):
         size = np.abs([each[name] for each in found])
         share = 100 * np.mean(size[:, None] < bounds, axis=0)
         within = np.mean(size < 2)
         axes.plot(
-            bounds, share, color=colour, linewidth=1.2, label=f"{words}: {100 * within:.1f} % within two"
+            bounds, share, color=color, linewidth=1.2, label=f"{words}: {100 * within:.1f} % within two"
         )
     axes.axvline(2, color="0.6", linewidth=0.8, linestyle=":")
     axes.set(xlabel="standard errors", ylabel="numbers within, %", xlim=(0, 4), ylim=(0, 101))

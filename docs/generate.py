@@ -40,7 +40,7 @@ from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
 from vsacli.robot.plausibility import ROBOT_RULES
-from vsacli.studies.sizing import CatalogueMotor
+from vsacli.studies.sizing import CatalogMotor
 from vsacli.studies.sweeps.columns import KEPT
 from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.file import content
@@ -136,8 +136,8 @@ def study_fields() -> str:
 
 
 def motor_columns() -> str:
-    """Columns of a catalogue of motors."""
-    rows = record_sections(CatalogueMotor)
+    """Columns of a catalog of motors."""
+    rows = record_sections(CatalogMotor)
     return rows.replace("| key | value |", "| column | value |", 1)
 
 

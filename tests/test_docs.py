@@ -23,7 +23,7 @@ from samples.marks import slow
 
 import vsacli
 from vsacli.analysis.derivative_check import LADDER_BOUND, SPRING_BOUND
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
 from vsacli.cli.main import vsacli as group
 from vsacli.documents.source import MAX_DOCUMENT_BYTES
 from vsacli.documents.tree import MAX_LEVELS, MAX_NODES
@@ -35,7 +35,7 @@ PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 LONG = (
     *("cli.md", "codegen.md", "damping.md", "energy.md", "engines.md", "figures.md", "file-formats.md"),
     *("friction.md", "gallery.md", "identification.md", "index.md", "measured.md", "mending-a-motion.md"),
-    *("models.md", "optimisation.md", "pages.md", "plausibility.md", "python.md", "quickstart.md"),
+    *("models.md", "optimization.md", "pages.md", "plausibility.md", "python.md", "quickstart.md"),
     *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "suggestions.md", "urdf.md"),
 )
@@ -220,7 +220,7 @@ def test_every_attribute_and_group_of_a_result_is_documented(result: Path, forma
 
 def test_the_numbers_in_the_text_are_those_of_the_code(format_page: str) -> None:
     theory = (REPOSITORY / "docs" / "theory.md").read_text(encoding="utf-8")
-    for number in (SINGULAR_MARGIN, NEAR_SINGULAR_MARGIN, SPRING_BOUND, LADDER_BOUND):
+    for number in (SINGULAR_MARGIN, MIN_MARGIN, SPRING_BOUND, LADDER_BOUND):
         assert f"{number:g}".replace("e-0", "e-") in theory
     assert f"{MAX_DOCUMENT_BYTES // 10**6} MB, {MAX_LEVELS} levels and {MAX_NODES:,} nodes" in format_page
 

@@ -100,13 +100,13 @@ def test_what_is_installed_lists_and_copies_its_examples(wheel: zipfile.Path, tm
         assert contents(tmp_path / "mine" / folder) == contents(REPOSITORY / folder)
 
 
-def test_the_wheel_says_its_licence_and_its_authors(wheel: zipfile.Path) -> None:
+def test_the_wheel_says_its_license_and_its_authors(wheel: zipfile.Path) -> None:
     [metadata] = [folder for folder in wheel.iterdir() if folder.name.endswith(".dist-info")]
     text = (metadata / "METADATA").read_text(encoding="utf-8")
     assert "License-Expression: BSD-3-Clause\n" in text
     assert "Author: the vsacli contributors\n" in text
-    licence = (REPOSITORY / "docs" / "LICENSE").read_text(encoding="utf-8")
-    assert (metadata / "licenses" / "docs" / "LICENSE").read_text(encoding="utf-8") == licence
+    terms = (REPOSITORY / "docs" / "LICENSE").read_text(encoding="utf-8")
+    assert (metadata / "licenses" / "docs" / "LICENSE").read_text(encoding="utf-8") == terms
 
 
 def test_the_citation_is_of_this_version() -> None:

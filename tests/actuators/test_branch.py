@@ -165,7 +165,7 @@ def samples_of(springs: Springs, count: int) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize(
     "second", [Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000), Cubic(k=90, k_c=9000)], ids=str
 )
-def test_a_sample_knows_nothing_of_its_neighbours(second: Cubic):
+def test_a_sample_knows_nothing_of_its_neighbors(second: Cubic):
     pair = make_pair(Cubic(k=400, k_c=2000), second)
     tau_e, stiffness = samples_of((Cubic(k=400, k_c=2000), second), 600)
     whole = pair.solve(tau_e, stiffness)

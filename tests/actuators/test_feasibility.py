@@ -29,7 +29,7 @@ from vsacli.actuators.reach import OfJoint, margin, reach_flags
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, Flag
+from vsacli.base.flags import LIMITS, MIN_MARGIN, Flag
 from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint, Limits
 
@@ -105,14 +105,14 @@ def test_slack_is_named_below_the_corridor_only():
 
 def test_threshold_of_near_singular_steps_can_be_chosen():
     solution = corridor(900, math.inf)
-    for threshold, expected in [(NEAR_SINGULAR_MARGIN, Flag(0)), (0.11, Flag.NEAR_SINGULAR)]:
+    for threshold, expected in [(MIN_MARGIN, Flag(0)), (0.11, Flag.NEAR_SINGULAR)]:
         assert Flag(int(reach_flags(np.array([1000.0]), solution, threshold)[0])) == expected
 
 
 @pytest.mark.parametrize("threshold", [0, 1e-9, 1, math.nan, -0.1])
 def test_threshold_must_be_a_margin(threshold: float):
-    with pytest.raises(InputError, match="near-singular margin must lie between 1e-09 and 1"):
-        Run(vsa_3r(), motion(), near_singular=threshold)
+    with pytest.raises(InputError, match="minimum margin must lie between 1e-09 and 1"):
+        Run(vsa_3r(), motion(), min_margin=threshold)
 
 
 # What is NaN

@@ -75,7 +75,7 @@ def test_results_of_both_engines_and_of_integrated_deflections(vsacli: Run, tmp_
     for name, options in {
         "numpy": ("--engine", "numpy"),
         "c": ("--engine", "c"),
-        "integrated": ("--deflections", "integrate"),
+        "integrated": ("--deflection-solver", "ode"),
     }.items():
         report = ok(vsacli("invdyn", "arm.yaml", "move.yaml", "-o", f"{name}.h5", "--json", *options))
         assert report["self_check"]["passed"]
@@ -99,7 +99,7 @@ def test_results_of_both_engines_and_of_integrated_deflections(vsacli: Run, tmp_
     [
         ((), 1e-7),  # the integration errs by 1e-9 a step
         slow((*FEEDBACK, "--initial-error", "0.01", "--poles", "-40"), 1e-5),  # 3e-6 after 20/40 s
-        slow((*FEEDBACK, "--perturb", "0.02", "--tolerance", "10%"), 0.08),
+        slow((*FEEDBACK, "--perturb", "0.02", "--goal-tolerance", "10%"), 0.08),
     ],
 )
 @pytest.mark.usefixtures("device")

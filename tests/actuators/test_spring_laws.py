@@ -296,7 +296,7 @@ def test_any_torque_has_a_deflection(law: SpringLaw):
     low, high = law.domain
     assert np.all((found >= low) & (found <= high))
     carried = np.clip(torque, *law.torque_range)
-    # Neighbouring doubles at the end of a four-bar; tiny torques of a spring without stiffness at rest.
+    # Neighboring doubles at the end of a four-bar; tiny torques of a spring without stiffness at rest.
     np.testing.assert_allclose(
         law.torque(found), carried, rtol=1e-9 if high < math.inf else 1e-12, atol=1e-90
     )

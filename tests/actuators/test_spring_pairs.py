@@ -147,7 +147,7 @@ def test_every_infeasible_demand_is_flagged_and_no_other(first: Spring, second: 
         feasible = (lower <= stiffness) & (stiffness <= upper)
         np.testing.assert_array_equal(has(reach_flags(stiffness, found), Flag.INFEASIBLE), ~feasible)
         # The scan's cells are a 1e-7 of the load at last, and the stiffness is of second order there; at
-        # the end of a four-bar neighbouring doubles differ by 1e-10.
+        # the end of a four-bar neighboring doubles differ by 1e-10.
         np.testing.assert_allclose(found.lower, lower, rtol=1e-9)
         np.testing.assert_allclose(found.upper, upper, rtol=1e-9)
 
@@ -197,7 +197,7 @@ def test_demand_below_the_corridor_needs_no_bracketing(
 
 
 @every_pair
-def test_a_sample_knows_nothing_of_its_neighbours(first: Spring, second: Spring):
+def test_a_sample_knows_nothing_of_its_neighbors(first: Spring, second: Spring):
     (law_1, curve_1), (law_2, curve_2) = first, second
     pair, tau_e = make_pair(law_1, law_2), loads(np.random.default_rng(4), curve_1, curve_2)
     stiffness = np.linspace(50, 500, tau_e.size)

@@ -299,7 +299,7 @@ def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
 def test_only_antagonistic_joints_are_followed(robot: Robot, motion: Trajectory) -> None:
     deflections = integrate_deflections(robot, motion)
     assert deflections.stops == (None, None, None)
-    result = inverse_dynamics(robot, motion, deflections=deflections)
+    result = inverse_dynamics(robot, motion, deflection_solver=deflections)
     assert [drift.joint for drift in result.report.drifts] == ["elbow"]
     assert result.report.drifts[0].largest < 1e-10  # the tolerance of the integration is 1e-12 a step
     solved = inverse_dynamics(robot, motion)
@@ -311,7 +311,7 @@ def test_a_stop_is_told_of_the_joint_that_stops(
     vsacli: Callable[..., Outcome], robot: Robot, tmp_path: Path
 ) -> None:
     task(robot, tmp_path, ("end: {elbow: 1275}", "end: {elbow: 790}"))
-    outcome = vsacli("check-feasibility", ROBOT, "move.yaml", "--deflections", "integrate")
+    outcome = vsacli("check-feasibility", ROBOT, "move.yaml", "--deflection-solver", "ode")
     assert outcome.code == 3
     assert "elbow: its deflections cannot be followed beyond t = " in outcome.out
 
@@ -320,7 +320,7 @@ def test_nothing_is_followed_where_no_joint_is_antagonistic(motion: Trajectory) 
     robot = with_actuators(vsa_3r(), {0: rigid(), 1: elastic(), 2: elastic()})
     deflections = integrate_deflections(robot, motion)
     assert np.isnan(deflections.at(np.array([0.5]))).all()
-    assert inverse_dynamics(robot, motion, deflections=deflections).report.drifts == ()
+    assert inverse_dynamics(robot, motion, deflection_solver=deflections).report.drifts == ()
 
 
 def test_the_profile_of_a_fix_is_of_the_antagonistic_joint_alone(robot: Robot, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What lies between the steps, against SciPy's scalar minimiser and dense sampling."""
+"""What lies between the steps, against SciPy's scalar minimizer and dense sampling."""
 
 from __future__ import annotations
 

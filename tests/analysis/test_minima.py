@@ -55,4 +55,4 @@ def test_local_minima_of_rows() -> None:
     assert list(zip(found.function.tolist(), found.time[:, 1].tolist(), strict=True)) == [
         (0, 2.0), (0, 4.0), (2, 1.0), (2, 3.0),
     ]  # fmt: skip
-    assert not found.unknown[2], "nothing is known of its neighbours"
+    assert not found.unknown[2], "nothing is known of its neighbors"

@@ -1,8 +1,8 @@
-"""Motor torques along records with noise of many colours: right, or unreliable."""
+"""Motor torques along records with noise of many colors: right, or unreliable."""
 
 import numpy as np
 import pytest
-from samples.noisy_records import COLOURS, MOTIONS, record
+from samples.noisy_records import COLORS, MOTIONS, record
 from samples.recorded_torques import ARMS, outcomes
 
 from vsacli.control.simulation.simulate import simulate
@@ -11,41 +11,41 @@ from vsacli.trajectory.trajectory import Trajectory
 RATE = 250
 
 QUICK = "12 bits, zero-phase 20 Hz"
-"""The colour that is tried at every run of the tests."""
+"""The color that is tried at every run of the tests."""
 
 
 @pytest.mark.parametrize(
-    "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
+    "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
-def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(colour):
+def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(color):
     covered = []
     for seed in (20, 21, 22):
-        for each in outcomes("rest to rest, pauses", colour, seed, RATE):
+        for each in outcomes("rest to rest, pauses", color, seed, RATE):
             if each.arm == "softest":  # its torque is d4q, of which a record says no more than it can
                 assert each.verdict == "unreliable" or each.torque.size < 0.1, each
             else:  # of 36 records errors were up to 1.4 %; of other draws than the first some are unreliable
                 assert each.verdict == "ok" or seed > 20, each
                 assert each.torque.size < 0.02, each
             covered += [] if np.isnan(each.torque.covered) else [each.torque.covered]
-    # errors of one record go together: of single ones 0.82 to 1; of a colour 0.935 to 0.975 were seen
+    # errors of one record go together: of single ones 0.82 to 1; of a color 0.935 to 0.975 were seen
     assert not covered or 0.9 < np.mean(covered) < 0.99
 
 
 @pytest.mark.parametrize(
-    "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
+    "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
-def test_torques_of_steps_of_velocity_are_right_or_unreliable(colour):
-    for each in outcomes("velocity steps, 50 ms", colour, 20, RATE):
+def test_torques_of_steps_of_velocity_are_right_or_unreliable(color):
+    for each in outcomes("velocity steps, 50 ms", color, 20, RATE):
         assert each.verdict == "unreliable" or each.torque.size < 0.1, each
         if each.arm == "elastic":
             assert each.verdict == "unreliable"
 
 
 @pytest.mark.parametrize(
-    "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
+    "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
-def test_torques_of_minimum_jerk_are_right_or_unreliable(colour):
-    for each in outcomes("minimum jerk", colour, 20, RATE):
+def test_torques_of_minimum_jerk_are_right_or_unreliable(color):
+    for each in outcomes("minimum jerk", color, 20, RATE):
         assert each.verdict == "unreliable" or each.torque.size < 0.1, each
 
 

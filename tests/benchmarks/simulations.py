@@ -59,7 +59,7 @@ def _cases() -> dict[str, Callable[..., Simulation]]:
         "3R, feedforward": partial(simulate, *arm),
         "3R, poles of -20/s": partial(simulate, *arm, gains=gains, initial_error=InitialError(0.01)),
         "3R, poles of -200/s": partial(simulate, *arm, gains=fast, initial_error=InitialError(0.001)),
-        "3R, poles of -20/s, measured positions": partial(simulate, *arm, gains=gains, measured="positions"),
+        "3R, poles of -20/s, measured positions": partial(simulate, *arm, gains=gains, feedback="positions"),
         "7R, feedforward": partial(simulate, *seven),
         "7R, poles of -20/s": partial(simulate, *seven, gains=gains, initial_error=InitialError(0.01)),
     }

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # the samples of the tests
 
-from samples.noisy_records import COLOURS, MOTIONS
+from samples.noisy_records import COLORS, MOTIONS
 from samples.recorded_torques import ARMS, Error, Outcome, outcomes
 
 FIRST_SEED = 70
@@ -39,7 +39,7 @@ class Of(NamedTuple):
     seed: int
     rate: int
     motion: str
-    colour: str
+    color: str
 
 
 Found = list[tuple[Of, Outcome]]
@@ -57,9 +57,9 @@ def run(path: Path, records: int) -> None:
     """Add what is not there yet."""
     done = {of for of, _ in read(path)}
     seeds = range(FIRST_SEED, FIRST_SEED + records)
-    for of in (Of(*each) for each in product(seeds, RATES, MOTIONS, COLOURS)):
+    for of in (Of(*each) for each in product(seeds, RATES, MOTIONS, COLORS)):
         if of not in done:
-            found = outcomes(of.motion, of.colour, of.seed, of.rate)
+            found = outcomes(of.motion, of.color, of.seed, of.rate)
             json_lines.add(path, [(of, each._asdict()) for each in found])
 
 
@@ -96,10 +96,10 @@ def of_derivatives(found: Found) -> Iterator[str]:
     """Cells by noise and motion."""
     yield f"| noise | {' | '.join(MOTIONS)} |"
     yield "| --- " * (len(MOTIONS) + 1) + "|"
-    for colour in COLOURS:
-        of_colour = [each for each in found[:: len(ARMS)] if each[0].colour == colour]
-        runs = [[each for of, each in of_colour if of.motion == motion] for motion in MOTIONS]
-        yield f"| {colour} | {' | '.join(cell(each) if each else '' for each in runs)} |"
+    for color in COLORS:
+        of_color = [each for each in found[:: len(ARMS)] if each[0].color == color]
+        runs = [[each for of, each in of_color if of.motion == motion] for motion in MOTIONS]
+        yield f"| {color} | {' | '.join(cell(each) if each else '' for each in runs)} |"
 
 
 def of_motions(found: Found) -> Iterator[str]:
@@ -119,12 +119,12 @@ def of_motions(found: Found) -> Iterator[str]:
             yield f"| {motion} | d4q | {judged(errors, warned)} |"
 
 
-def of_colours(found: Found) -> Iterator[str]:
+def of_colors(found: Found) -> Iterator[str]:
     """How right deviations and verdicts are, by noise."""
     yield f"| noise | d4q | {' | '.join(ARMS)} | wrong, no doubt | right, no doubt |"
     yield "| --- " * (len(ARMS) + 4) + "|"
-    by_colour = sorted(found, key=lambda each: list(COLOURS).index(each[0].colour))
-    for colour, group in groupby(by_colour, key=lambda each: each[0].colour):
+    by_color = sorted(found, key=lambda each: list(COLORS).index(each[0].color))
+    for color, group in groupby(by_color, key=lambda each: each[0].color):
         rows = list(group)
         runs = [each for _, each in rows]
         errors = [[each.fourth for each in runs[:: len(ARMS)]]]
@@ -132,7 +132,7 @@ def of_colours(found: Found) -> Iterator[str]:
         smooth = [each for of, each in rows if of.motion in SMOOTH]
         right = [each.verdict != "unreliable" for each in smooth if each.torque.size < FALSE]
         wrong = sum(each.verdict != "unreliable" and each.torque.size > ALLOWED for each in runs)
-        yield f"| {colour} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
+        yield f"| {color} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
 
 
 def main() -> None:
@@ -143,7 +143,7 @@ def main() -> None:
     given = parser.parse_args()
     run(given.results, given.records)
     found = read(given.results)
-    for table in (of_derivatives, of_motions, of_colours):
+    for table in (of_derivatives, of_motions, of_colors):
         sys.stdout.write("\n".join(table(found)) + "\n\n")
 
 

@@ -15,14 +15,14 @@ COMMANDS = pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
 @COMMANDS
 def test_the_default_is_the_root(vsacli, motion, command):
     default = vsacli(command, ROBOT, motion, "--overwrite")
-    root = vsacli(command, ROBOT, motion, "--overwrite", "--deflections", "root")
+    root = vsacli(command, ROBOT, motion, "--overwrite", "--deflection-solver", "root")
     assert (default.code, default.out) == (root.code, root.out)
     assert "drift" not in default.out
 
 
 @pytest.mark.parametrize("command", [slow("invdyn"), "check-feasibility"])
 def test_drift_is_reported(vsacli, motion, command):
-    done = vsacli(command, ROBOT, motion, "--deflections", "integrate")
+    done = vsacli(command, ROBOT, motion, "--deflection-solver", "ode")
     assert done.code == 0
     (line,) = [line for line in done.out.splitlines() if line.startswith("drift of the integration: base ")]
     assert line.count(" rad at ") == 3
@@ -30,16 +30,16 @@ def test_drift_is_reported(vsacli, motion, command):
 
 @pytest.mark.slow
 def test_end_of_the_way_is_reported(vsacli, too_soft):
-    done = vsacli("invdyn", ROBOT, too_soft, "--deflections", "integrate")
+    done = vsacli("invdyn", ROBOT, too_soft, "--deflection-solver", "ode")
     assert done.code == 3
     for joint in ("base", "shoulder", "elbow"):
         assert f"\n{joint}: its deflections cannot be followed beyond t = " in done.out
 
 
 def test_result_file_and_json_hold_the_drift(vsacli, motion, tmp_path):
-    done = vsacli("invdyn", ROBOT, motion, "--deflections", "integrate", "--json", "-o", "out.h5")
+    done = vsacli("invdyn", ROBOT, motion, "--deflection-solver", "ode", "--json", "-o", "out.h5")
     deflections = json.loads(done.out)["deflections"]
-    assert deflections["method"] == "integrate"
+    assert deflections["method"] == "ode"
     # Each of about 40 steps may err by 1e-12 of deflections of about 0.1 rad.
     assert all(0 < joint["drift"] < 1e-11 for joint in deflections["joints"])
     with h5py.File(tmp_path / "out.h5") as file:
@@ -52,7 +52,7 @@ def test_existing_file_is_refused_before_the_integration(vsacli, motion, tmp_pat
         lambda *_: pytest.fail("has begun to integrate"),
     )
     (tmp_path / "out.h5").write_text("mine")
-    done = vsacli("invdyn", ROBOT, motion, "--deflections", "integrate", "-o", "out.h5")
+    done = vsacli("invdyn", ROBOT, motion, "--deflection-solver", "ode", "-o", "out.h5")
     assert done.code == 4
     assert "out.h5: exists already" in done.err
 
@@ -62,14 +62,14 @@ def test_bad_threshold_is_refused_before_the_integration(vsacli, motion, monkeyp
         "vsacli.dynamics.integrated_deflections.integrate_deflections",
         lambda *_: pytest.fail("has begun to integrate"),
     )
-    done = vsacli("check-feasibility", ROBOT, motion, "--deflections", "integrate", "--near-singular", "2")
+    done = vsacli("check-feasibility", ROBOT, motion, "--deflection-solver", "ode", "--min-margin", "2")
     assert done.code == 2
-    assert "near-singular margin must lie between" in done.err
+    assert "minimum margin must lie between" in done.err
 
 
 @COMMANDS
 def test_unknown_way_is_a_usage_error(vsacli, motion, tmp_path, command):
-    done = vsacli(command, ROBOT, motion, "--deflections", "guess")
+    done = vsacli(command, ROBOT, motion, "--deflection-solver", "guess")
     assert done.code == 2
-    assert "'guess' is not one of 'root', 'integrate'" in done.err
+    assert "'guess' is not one of 'root', 'ode'" in done.err
     assert contents(tmp_path).keys() == {"move.yaml"}

@@ -86,7 +86,7 @@ def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
         )
 
     monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integrate_deflections", short)
-    vsacli("check-feasibility", ROBOT, motion, "--plot", "figures", "--deflections", "integrate")
+    vsacli("check-feasibility", ROBOT, motion, "--plot", "figures", "--deflection-solver", "ode")
     assert [shaded(axes) for axes in figures[0].axes] == [[], [(pytest.approx(0.995), 4.0)], []]
 
 

@@ -1,4 +1,4 @@
-"""`vsacli check-feasibility` with --fixes, --write-fix and --near-singular."""
+"""`vsacli check-feasibility` with --fixes, --write-fix and --min-margin."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import pytest
 from samples.command_line import ROBOT, contents, edited
 
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.cli.check_feasibility import check_feasibility
 
 WRITE = ("--write-fix", 1, "-o", "fixed.yaml")
@@ -37,7 +37,7 @@ def test_json_has_them_under_one_key(vsacli, too_soft):
     report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--fixes").out)
     found = report.pop("fixes")
     assert report == plain
-    assert found["near_singular"] == NEAR_SINGULAR_MARGIN
+    assert found["near_singular"] == MIN_MARGIN
     assert found["slow_down"]["possible"] is False
     offsets = found["stiffness_offset"]["offsets"]
     assert offsets.keys() == {"base", "shoulder", "elbow"}
@@ -88,7 +88,7 @@ def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
     assert run.code == 0
-    assert "near_singular" not in run.out
+    assert "near-singular" not in run.out
 
 
 def test_recorded_trajectory_is_fixed(vsacli, too_soft):
@@ -172,12 +172,9 @@ def test_inputs_are_never_overwritten(vsacli, too_soft):
 
 @pytest.mark.parametrize("margin", ["0", "-0.1", "1e-9", "1", "2", "nan"])
 def test_margins_out_of_range_are_refused(vsacli, motion, margin):
-    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", margin)
+    done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", margin)
     assert (done.code, done.out) == (2, "")
-    assert (
-        done.err
-        == f"the near-singular margin must lie between 1e-09 and 1, as 0.01 does, not {float(margin):g}\n"
-    )
+    assert done.err == f"the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {float(margin):g}\n"
 
 
 def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
@@ -185,16 +182,16 @@ def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
         report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", *options).out)
         return sum(joint["samples"]["near_singular"] for joint in report["joints"]), report["verdict"]
 
-    assert near_singular() == near_singular("--near-singular", "0.01") == (0, "ok")
-    steps, verdict = near_singular("--near-singular", "0.1")
+    assert near_singular() == near_singular("--min-margin", "0.01") == (0, "ok")
+    steps, verdict = near_singular("--min-margin", "0.1")
     assert steps > 0
     assert verdict == "ok"
 
 
 def test_fixes_keep_the_margin_that_is_asked_for(vsacli, motion):
-    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", "0.1", *WRITE)
+    done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", "0.1", *WRITE)
     assert "a margin of at least 10 %" in done.out
-    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--fixes")
+    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--min-margin", "0.1", "--fixes")
     assert (again.code, again.out.splitlines()[-1]) == (
         0,
         "nothing to change: every step has a margin of at least 10 % and keeps every limit",
@@ -202,5 +199,5 @@ def test_fixes_keep_the_margin_that_is_asked_for(vsacli, motion):
 
 
 def test_help_names_the_default_margin():
-    (option,) = [each for each in check_feasibility.params if each.name == "near_singular"]
-    assert option.help.endswith(f"by default {NEAR_SINGULAR_MARGIN}.")
+    (option,) = [each for each in check_feasibility.params if each.name == "min_margin"]
+    assert option.help.endswith(f"by default {100 * MIN_MARGIN:g}%.")

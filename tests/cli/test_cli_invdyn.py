@@ -24,7 +24,7 @@ def root_attributes(path):
 
 
 def static_shoulder_torque():
-    """Of the 3R arm at (90, 45, -60) deg, by hand: two links of 0.3 m, centres of mass half-way."""
+    """Of the 3R arm at (90, 45, -60) deg, by hand: two links of 0.3 m, centers of mass half-way."""
     upper, fore = 0.3 * np.cos(np.pi / 4), 0.3 * np.cos(np.pi / 12)
     return GRAVITY * (6.7858 * upper / 2 + 5.0894 * (upper + fore / 2))
 

@@ -132,7 +132,7 @@ def test_measured_positions_are_reported(vsacli, quick):
     fine = edited(
         quick, quick.with_name("fine.yaml"), ("rate: 25 ", "rate: 250 "), ("duration: 1.0", "duration: 0.8")
     )
-    done = vsacli("simulate", ROBOT, fine, *FEEDBACK, "--measure", "positions", "--initial-error", "0.01")
+    done = vsacli("simulate", ROBOT, fine, *FEEDBACK, "--feedback", "positions", "--initial-error", "0.01")
     assert done.code == Exit.VERDICT  # at 250 Hz these poles miss the end by 0.1 rad
     assert "base: with the full state the q error is 0.01 rad at its peak" in done.out
 
@@ -147,10 +147,10 @@ def test_measured_positions_are_reported(vsacli, quick):
         ((*FEEDBACK, "--poles", "fast"), "expected poles such as -20,-21"),
         ((*FEEDBACK, "--poles", "none.yaml"), "none.yaml: no such file"),
         (("--poles", "-20"), "poles and integral action need --controller feedback-linearization"),
-        (("--measure", "positions"), "measured positions need the controller feedback-linearization"),
+        (("--feedback", "positions"), "measured positions need the controller feedback-linearization"),
         (("--initial-error", "0.1,0.2"), "one for each of the 3 joints"),
         (("--initial-error", "much"), "expected a number, or one for each joint"),
-        (("--tolerance", "tight"), "--tolerance: expected a number in rad (m) such as 0.01, or a share"),
+        (("--goal-tolerance", "tight"), "--goal-tolerance: expected a number in rad (m) such as 0.01, or"),
         (("--rtol", "0"), "the tolerances of the integration must be positive and at most 0.001"),
         (("--atol", "0.1"), "not 1e-09 (relative) and 0.1 (absolute)"),
         (("--budget", "0"), "the budget must be at least 1 evaluation, not 0"),

@@ -248,7 +248,7 @@ def test_info_ends_with_what_simulate_printed(vsacli: Callable[..., Any], simula
 
 
 def test_info_of_measured_positions_shows_what_they_cost(vsacli: Callable[..., Any], tmp_path: Path) -> None:
-    feedback = ("--controller", "feedback-linearization", "--measure", "positions")
+    feedback = ("--controller", "feedback-linearization", "--feedback", "positions")
     motion = edited(
         REST_TO_REST,
         tmp_path / "fine.yaml",

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from samples.catalogues import GENERIC
+from samples.catalogs import GENERIC
 from samples.command_line import REPOSITORY, ROBOT, edited
 
 ARM = REPOSITORY / "robots" / "hardening_1r.yaml"
@@ -18,9 +18,7 @@ def motors(tmp_path):
 
 
 def test_a_motor_is_chosen_drawn_and_put_into_the_robot_file(vsacli, motors):
-    done = vsacli(
-        "size", ARM, SWING, "--catalogue", motors, "--gear", "60..160", "-o", "s.yaml", "--plot", "f"
-    )
+    done = vsacli("size", ARM, SWING, "--catalog", motors, "--gear", "60..160", "-o", "s.yaml", "--plot", "f")
     assert done.code == 0, done.err
     assert "motors.csv (6 motors) has one for the motor, chosen by least copper loss" in done.out
     assert done.err == "wrote s.yaml\nwrote f/hardening_1r-hardening_1r-torque-speed.png\n"
@@ -31,7 +29,7 @@ def test_a_motor_is_chosen_drawn_and_put_into_the_robot_file(vsacli, motors):
 def test_a_list_of_gears_and_several_motions_as_json(vsacli, motors, motion):
     soft = REPOSITORY / "trajectories" / "rest_to_rest_soft.yaml"
     done = vsacli(
-        "size", ROBOT, motion, soft, "--catalogue", motors, "--gear", "50,80", "--gear", "base=120", "--json"
+        "size", ROBOT, motion, soft, "--catalog", motors, "--gear", "50,80", "--gear", "base=120", "--json"
     )
     assert done.code == 0, done.err
     report = json.loads(done.out)
@@ -47,7 +45,7 @@ def test_nothing_that_does_is_told_with_what_is_nearest(vsacli, motors, tmp_path
         motors, tmp_path / "weak.csv", ("\nflat-90", "\n# "), ("\nframe", "\n# "), ("\nflat-60", "\n# ")
     )
     weak.write_text(weak.read_text().replace("frame-85", "# ", 1))
-    done = vsacli("size", ARM, SWING, "--catalogue", weak, "--gear", "5", "-o", "s.yaml")
+    done = vsacli("size", ARM, SWING, "--catalog", weak, "--gear", "5", "-o", "s.yaml")
     assert done.code == 3
     assert "has none that does" in done.out
     assert "no motor does; nearest is flat-45 with the gear 5, which would use" in done.out
@@ -66,7 +64,7 @@ def test_steps_that_cannot_be_done_are_left_out_and_told(vsacli, too_soft):
 def test_where_no_step_can_be_done_nothing_is_drawn_and_nothing_is_made_up(vsacli, motors, tmp_path):
     source = REPOSITORY / "trajectories" / "rest_to_rest_soft.yaml"
     soft = edited(source, tmp_path / "soft.yaml", ("value: 850", "value: 700"), ("rate: 1000", "rate: 50"))
-    done = vsacli("size", ROBOT, soft, "--catalogue", motors, "--plot", "figures", "-o", "s.yaml")
+    done = vsacli("size", ROBOT, soft, "--catalog", motors, "--plot", "figures", "-o", "s.yaml")
     assert done.code == 3
     assert "base 1: no step can be done, so that nothing is known of it" in done.out
     assert "nothing is drawn: no step can be done" in done.err
@@ -78,9 +76,9 @@ def test_where_no_step_can_be_done_nothing_is_drawn_and_nothing_is_made_up(vsacl
 def test_rotors_that_cannot_be_coupled_so_much_are_refused_written_or_not(vsacli, tmp_path, written):
     arm, swing = (REPOSITORY / name / "awas_1r.yaml" for name in ("robots", "trajectories"))
     (tmp_path / "m.csv").write_text("name,inertia,max_torque\nm,1e-7,10\n")
-    done = vsacli("size", arm, swing, "--catalogue", "m.csv", "--gear", "10", *written)
+    done = vsacli("size", arm, swing, "--catalog", "m.csv", "--gear", "10", *written)
     assert (done.code, done.out) == (2, "")
-    assert "coupled_inertia is 0.001 on the joint's side, that of rotors of the catalogue" in done.err
+    assert "coupled_inertia is 0.001 on the joint's side, that of rotors of the catalog" in done.err
     assert "must be below 1e-05" in done.err
     assert not (tmp_path / "s.yaml").exists()
 
@@ -98,19 +96,19 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--gear", "50"], "gears and a criterion are for motors of a catalogue; give one"),
-        (["--minimize", "mass"], "gears and a criterion are for motors of a catalogue; give one"),
-        (["-o", "s.yaml"], "--output is for the motors chosen from a catalogue"),
-        (["--catalogue", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100, or a range"),
-        (["--catalogue", "motors.csv", "--gear", "160..50"], "is empty; the smaller one comes first"),
-        (["--catalogue", "motors.csv", "--gear", "0"], "must be positive and finite"),
-        (["--catalogue", "motors.csv", "--gear", "hip=5"], "there is no joint 'hip'; valid: elbow"),
+        (["--gear", "50"], "gears and a criterion are for motors of a catalog; give one"),
+        (["--minimize", "mass"], "gears and a criterion are for motors of a catalog; give one"),
+        (["-o", "s.yaml"], "--output is for the motors chosen from a catalog"),
+        (["--catalog", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100, or a range"),
+        (["--catalog", "motors.csv", "--gear", "160..50"], "is empty; the smaller one comes first"),
+        (["--catalog", "motors.csv", "--gear", "0"], "must be positive and finite"),
+        (["--catalog", "motors.csv", "--gear", "hip=5"], "there is no joint 'hip'; valid: elbow"),
         (
-            ["--catalogue", "motors.csv", "--gear", "5", "--gear", "6"],
+            ["--catalog", "motors.csv", "--gear", "5", "--gear", "6"],
             "the gears of all joints were given already",
         ),
-        (["--catalogue", "absent.csv"], "absent.csv: no such file"),
-        (["--catalogue", str(ARM)], "expected commas, semicolons or tabs between the columns"),
+        (["--catalog", "absent.csv"], "absent.csv: no such file"),
+        (["--catalog", str(ARM)], "expected commas, semicolons or tabs between the columns"),
     ],
 )
 @pytest.mark.usefixtures("motors")
@@ -134,7 +132,7 @@ def test_what_is_wrong_with_a_motor(vsacli, tmp_path, row, message):
     header = "name,inertia,continuous_torque,max_torque,max_velocity,torque_constant"
     header += ",resistance,max_current,max_voltage"
     (tmp_path / "m.csv").write_text(f"{header}\n{row}\n")
-    done = vsacli("size", ARM, SWING, "--catalogue", "m.csv")
+    done = vsacli("size", ARM, SWING, "--catalog", "m.csv")
     assert done.code == 2
     assert done.err.startswith("m.csv:2: ")
     assert message in done.err
@@ -142,6 +140,6 @@ def test_what_is_wrong_with_a_motor(vsacli, tmp_path, row, message):
 
 def test_a_file_that_exists_is_refused_before_anything_is_computed(vsacli, motors, tmp_path):
     (tmp_path / "s.yaml").write_text("mine")
-    done = vsacli("size", ARM, SWING, "--catalogue", motors, "-o", "s.yaml")
+    done = vsacli("size", ARM, SWING, "--catalog", motors, "-o", "s.yaml")
     assert done.code == 4
     assert (tmp_path / "s.yaml").read_text() == "mine"

@@ -73,7 +73,7 @@ def test_results_hold_what_the_springs_are(joint, tmp_path):
         name = joints[f"actuator_{path}"][0].decode()
         assert name == {"tendon": "exponential", "coupled": "sinh"}[kind]
         assert np.isfinite(result["stiffness"]).all()
-    integrated = vsacli("invdyn", "elbow.yaml", "move.yaml", "--deflections", "integrate", "-o", "i.h5")
+    integrated = vsacli("invdyn", "elbow.yaml", "move.yaml", "--deflection-solver", "ode", "-o", "i.h5")
     assert "self-check passed" in ok(integrated)
 
 
@@ -90,7 +90,7 @@ def test_results_are_drawn_and_computed_again(joint):
     [
         (("feedforward",), 1e-8),  # the tolerance of the integration, 1e-9 a step
         slow(("feedback-linearization", "--initial-error", 0.02), 1e-8),  # 0.02 (30^3/6) exp(-30)
-        slow(("feedback-linearization", "--perturb", 0.01, "--tolerance", 1), 0.1),
+        slow(("feedback-linearization", "--perturb", 0.01, "--goal-tolerance", 1), 0.1),
     ],
 )
 def test_simulations_follow(joint, options, final):

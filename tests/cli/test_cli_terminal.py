@@ -1,4 +1,4 @@
-"""Reports on a terminal: as wide as that is, the verdict in colour; in a pipe neither."""
+"""Reports on a terminal: as wide as that is, the verdict in color; in a pipe neither."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_report_is_as_wide_as_its_terminal(columns: int) -> None:
 
 
 @pytest.mark.slow
-def test_colour_is_for_those_who_want_it() -> None:
+def test_color_is_for_those_who_want_it() -> None:
     assert f" {GREEN}OK{PLAIN}\n" in on_terminal(80, *CHECK)
     assert "\x1b" not in on_terminal(80, *CHECK, NO_COLOR="1")
     assert "\x1b" not in on_terminal(80, *CHECK, TERM="dumb")
@@ -84,7 +84,7 @@ def test_descriptions_are_fitted_too() -> None:
 
 @pytest.mark.slow
 def test_names_do_not_act_on_a_terminal(tmp_path: Path) -> None:
-    """An escape in a name is refused, or shown as one, whatever colours the verdict has."""
+    """An escape in a name is refused, or shown as one, whatever colors the verdict has."""
     wicked = tmp_path / "OK\x1b[32m.yaml"
     wicked.write_bytes(Path(TRAJECTORY).read_bytes())
     shown = on_terminal(80, *CHECK[:2], str(wicked), "--set", "rate=20")

@@ -17,7 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from samples.catalogues import GENERIC
+from samples.catalogs import GENERIC
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, installed
 from samples.disturbed import PATIENCE, Disturbance, Disturber
 from samples.excited import Excitation, excited
@@ -72,9 +72,7 @@ TASKS = {
     ),
     "optimize": Task(("optimize", ROBOT, "move.yaml", "-o", "best.yaml")),
     "identify": Task(("identify", ROBOT, "record.csv", "-o", "fitted.yaml", "--plot", "figures")),
-    "size": Task(
-        ("size", ROBOT, "move.yaml", "--catalogue", "motors.csv", "-o", "s.yaml", "--plot", "drives")
-    ),
+    "size": Task(("size", ROBOT, "move.yaml", "--catalog", "motors.csv", "-o", "s.yaml", "--plot", "drives")),
     "export": Task(("export", "given.h5", "-o", "torques.csv")),
     "new robot": Task(("new", "robot", "--joints", "RR", "-o", "arm.yaml")),
     "new trajectory": Task(("new", "trajectory", "--robot", ROBOT, "-o", "rise.yaml")),

@@ -150,7 +150,7 @@ def library(kernel: Kernel, folder: Path, *, calling: bool) -> Library:
 
 
 def on_a_large_stack(function: Callable[[], FloatArray]) -> FloatArray:
-    """Each value that is written out in one piece has a place there if nothing is optimised."""
+    """Each value that is written out in one piece has a place there if nothing is optimized."""
     usual = threading.stack_size(2**29)
     try:
         with ThreadPoolExecutor(1) as pool:

@@ -45,7 +45,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compile without optimisation, for code that is run on a few samples only."""
+    """Compile without optimization, for code that is run on a few samples only."""
     flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
     monkeypatch.setattr(compiler, "FLAGS", flags)
     compiler._examined.cache_clear()
@@ -71,7 +71,7 @@ def test_example_robots_agree(name: str):
 
 @pytest.mark.slow
 def test_seven_joints_agree():
-    """With the flags of a real run: contracted and vectorised."""
+    """With the flags of a real run: contracted and vectorized."""
     robot = load_robot(ROBOTS / "lwr_7r_vsa.yaml")
     motion = demands(robot, 5000)
     expected = compute_block(robot, motion)

@@ -80,7 +80,7 @@ def test_it_compiles_without_a_warning_and_passes_its_own_test(
 
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but({"one joint"}, SANITIZED))
-def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
+def test_no_undefined_behavior(name: str, tmp_path: Path) -> None:
     flags = ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
 

@@ -35,7 +35,7 @@ WARNINGS = (*STRICT, "-Wconversion", "-Wdouble-promotion")
 
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize(
-    ("name", "patterns", "optimisation"),
+    ("name", "patterns", "optimization"),
     [
         ("3R", (), "-O2"),
         ("3R", ("joints.*.link.mass", "joints.*.spring.k"), "-Os"),
@@ -44,12 +44,12 @@ WARNINGS = (*STRICT, "-Wconversion", "-Wdouble-promotion")
     ],
 )
 def test_it_compiles_without_a_warning_and_passes_its_own_test(
-    name: str, patterns: Sequence[str], optimisation: str, precision: str, tmp_path: Path
+    name: str, patterns: Sequence[str], optimization: str, precision: str, tmp_path: Path
 ) -> None:
     robot = ROBOTS[name]
     prefix = prefix_of(robot)
     write_files(generate(robot, precision, patterns=patterns), tmp_path)
-    flags = (*PROCESSOR, *WARNINGS, optimisation)
+    flags = (*PROCESSOR, *WARNINGS, optimization)
     compile_c(tmp_path, *flags, "-c", f"{prefix}.c", compiler=COMPILER)
     compile_c(tmp_path, *PROCESSOR, *STRICT, "-c", f"{prefix}_test.c", compiler=COMPILER)
     done = run(link(tmp_path, f"{prefix}.o", f"{prefix}_test.o"))

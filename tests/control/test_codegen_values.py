@@ -200,7 +200,7 @@ def test_feedback_linearization(name: str, tmp_path: Path) -> None:
     assert there.any(axis=(0, 2)).all()
     peak = np.abs(expected[there]).max()
     error = np.abs(found["tau_motor"] - expected)[there].max() / peak
-    assert error < 1e-11  # another factorisation of M, whose condition number is some 1e2
+    assert error < 1e-11  # another factorization of M, whose condition number is some 1e2
     np.testing.assert_array_equal(returned, np.bitwise_or.reduce(found["flags"], axis=1))
     of_torque = np.bitwise_or.reduce(found["flags"], axis=None) & Flag.MOTOR_TORQUE_LIMIT
     assert bool(of_torque) == (name == "sinh")

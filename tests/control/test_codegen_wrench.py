@@ -91,7 +91,7 @@ def test_feedback_linearization_under_a_wrench(tmp_path: Path) -> None:
     law = FeedbackLinearization(robot, gains, "end_effector")
     motion = motion_of(command)
     expected = law(state, Motion.of(motion.time, motion.of_joints, wrench), integral)
-    assert_close(found["tau_motor"], expected, share=1e-11)  # another factorisation of M
+    assert_close(found["tau_motor"], expected, share=1e-11)  # another factorization of M
 
 
 def test_a_project_under_a_wrench_says_so() -> None:

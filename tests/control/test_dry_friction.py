@@ -199,7 +199,7 @@ def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():
 def test_held_torques_break_a_block_loose():
     """The controller acts at samples: what it asks for then may at once be more than friction can hold."""
     trajectory, gains = step_of(0.15, duration=0.5, rate=100), Gains.from_poles([-10.0] * 2)
-    past = simulate(block(), trajectory, gains=gains, measured="positions").history
+    past = simulate(block(), trajectory, gains=gains, feedback="positions").history
     assert (past.dq_actual[:5] == 0).all()  # 100 1/s^2 times the error are less than 2 N
     assert past.q_actual[-1, 0] > 0.3  # of 0.35
 
@@ -212,7 +212,7 @@ def test_measured_positions_and_another_model_run():
     before, after = (each.joints[0].actuator.motor[0].friction for each in (robot, model))
     assert after.coulomb != before.coulomb
     assert after.coulomb[0] / before.coulomb[0] == pytest.approx(after.coulomb[1] / before.coulomb[1])
-    report = simulate(robot, trajectory, gains=GAINS, model=model, measured="positions").report
+    report = simulate(robot, trajectory, gains=GAINS, model=model, feedback="positions").report
     assert report.complete
 
 

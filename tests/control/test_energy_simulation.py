@@ -49,16 +49,16 @@ def balance(robot: Robot, past: History) -> FloatArray:
     ],
     ids=["3R", "RP", "elastic shoulder", "rigid"],
 )
-@pytest.mark.parametrize("measured", ["state", slow("positions")])
-def test_the_motors_work_is_what_moves_lifts_deflects_and_is_lost(robot, gains, measured):
+@pytest.mark.parametrize("feedback", ["state", slow("positions")])
+def test_the_motors_work_is_what_moves_lifts_deflects_and_is_lost(robot, gains, feedback):
     trajectory = short_motion(len(robot.joints), rate=1000, duration=0.3, stiffness=(1900, 2100))
     error = InitialError(0.02)
-    past = simulate(robot, trajectory, gains=gains, initial_error=error, measured=measured).history
+    past = simulate(robot, trajectory, gains=gains, initial_error=error, feedback=feedback).history
     work = np.nansum(past.motor_energy_actual, axis=(1, 2))
     scale = np.nanmax(np.abs(past.motor_energy_actual))
     # torques linear over 1 ms: (20 1/s * 1e-3 s)^2/12 = 3e-5 of what passes, twice; held ones are exact, and
     # what remains is the spline through losses whose slope jumps with the torques
-    tolerance = 1e-4 if measured == "state" else 2e-6
+    tolerance = 1e-4 if feedback == "state" else 2e-6
     np.testing.assert_allclose(work, balance(robot, past), rtol=0, atol=tolerance * scale)
 
 

@@ -153,7 +153,7 @@ def _run_text(**conditions):
 
 @needs_compiler
 def test_controllers_that_hold_their_torques_are_recorded_too():
-    conditions = {"gains": GAINS, "measured": "positions"}
+    conditions = {"gains": GAINS, "feedback": "positions"}
     trajectory = short_motion(3, rate=100, duration=0.2)
     runs = [simulate(vsa_3r(), trajectory, engine=engine, **conditions) for engine in ("c", "numpy")]
     assert runs[0].provenance["engine"] == "c"

@@ -95,7 +95,7 @@ def test_joints_without_springs_have_an_encoder_at_the_motor_too():
 
 
 def test_perfect_sensors_change_nothing():
-    conditions = {"gains": GAINS, "measured": "positions"}
+    conditions = {"gains": GAINS, "feedback": "positions"}
     plain = simulate(vsa_3r(), short_motion(3), **conditions).history
     read = simulate(vsa_3r(), short_motion(3), **conditions, sensors=Sensors()).history
     assert np.array_equal(plain.tau_motor, read.tau_motor)
@@ -107,7 +107,7 @@ def test_a_controller_that_measures_positions_knows_what_is_recorded():
     """Its torques follow from the recorded positions alone, by the filter and the law."""
     sensors = Sensors(1e-4, encoder_bits=16, seed=2)
     motion = short_motion(3)
-    past = simulate(vsa_3r(), motion, gains=GAINS, measured="positions", sensors=sensors).history
+    past = simulate(vsa_3r(), motion, gains=GAINS, feedback="positions", sensors=sensors).history
     control = FeedbackLinearization(vsa_3r(), GAINS)
     q, theta = past.q_measured, past.theta_measured
     dq, dtheta = past.dq_actual[0], past.dtheta_actual[0]  # known at the start: the robot rests

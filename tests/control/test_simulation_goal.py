@@ -53,7 +53,7 @@ def test_the_headline_has_the_largest_error_on_the_way():
     assert largest == {"joint": "axis", "value": pytest.approx(0.05, rel=1e-12), "unit": "rad", "time": 0.0}
 
 
-def test_a_prismatic_joint_strays_in_metres():
+def test_a_prismatic_joint_strays_in_meters():
     report = drifted(0.3, 0.05, "prismatic").report
     assert report.verdict == "off_target"
     assert "axis: at the end q is 0.015 m off the command, more than the tolerance of 0.004 m" in str(report)
@@ -117,9 +117,9 @@ def test_a_tolerance_as_typed(written, share, absolute):
 @pytest.mark.parametrize(
     ("written", "message"),
     [
-        ("wide", "--tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
-        ("%", "--tolerance: expected a number"),
-        ("1 deg", "--tolerance: expected a number"),
+        ("wide", "--goal-tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
+        ("%", "--goal-tolerance: expected a number"),
+        ("1 deg", "--goal-tolerance: expected a number"),
         ("0", "the tolerance must be positive and finite"),
         ("-1", "the tolerance must be positive and finite"),
         ("-1%", "the tolerance must be positive and finite"),

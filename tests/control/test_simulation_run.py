@@ -143,7 +143,7 @@ def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
     losses = {}
     for rate in (250, 1000):
         trajectory = short_motion(3, rate=rate, duration=0.3)
-        simulation = simulate(vsa_3r(), trajectory, measured="positions", **conditions)
+        simulation = simulate(vsa_3r(), trajectory, feedback="positions", **conditions)
         ideal = simulate(vsa_3r(), trajectory, **conditions)
         assert simulation.report.complete
         assert simulation.report.with_full_state == tuple(joint.q for joint in ideal.report.joints)
@@ -201,9 +201,9 @@ def test_starts_that_cannot_be_had_are_refused(error, message):
 
 def test_conditions_that_contradict_themselves_are_refused():
     with pytest.raises(InputError, match="measured positions need the controller feedback-linearization"):
-        simulate(vsa_3r(), short_motion(3), measured="positions")
-    with pytest.raises(InputError, match="unknown measurement 'position'; did you mean 'positions'"):
-        simulate(vsa_3r(), short_motion(3), gains=GAINS, measured="position")
+        simulate(vsa_3r(), short_motion(3), feedback="positions")
+    with pytest.raises(InputError, match="unknown feedback 'position'; did you mean 'positions'"):
+        simulate(vsa_3r(), short_motion(3), gains=GAINS, feedback="position")
     with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
         Tolerances(rtol=1e-15)
     with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):

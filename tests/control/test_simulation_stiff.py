@@ -43,7 +43,7 @@ def go_on_implicitly(monkeypatch, after):
 
 @pytest.mark.parametrize("stiffness", [slow(1e9), 1e12])
 def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(stiffness):
-    """The centre s = (M q + B theta)/(M + B) obeys (M + B) s'' = tau, and the spring stands still.
+    """The center s = (M q + B theta)/(M + B) obeys (M + B) s'' = tau, and the spring stands still.
 
     Its deflection M tau/(K (M + B)) is 1e-9 rad; what it oscillates about that is smaller by 1/K again.
     """
@@ -56,10 +56,10 @@ def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(st
     command = trajectory.at(simulation.history.time)
     q, ddq, d4q = (getattr(command, name)[:, 0] for name in ("q", "ddq", "d4q"))
     bent = LINK_INERTIA * assumed / stiffness
-    centre = 0.2 + ((LINK_INERTIA + assumed) * (q - 0.2) + bent * ddq) / whole
+    center = 0.2 + ((LINK_INERTIA + assumed) * (q - 0.2) + bent * ddq) / whole
     torque = (LINK_INERTIA + assumed) * ddq + bent * d4q
     deflection = LINK_INERTIA * torque / (stiffness * whole)
-    exact = centre - MOTOR_INERTIA * deflection / whole
+    exact = center - MOTOR_INERTIA * deflection / whole
     # two hundred steps with local errors of 1e-9
     assert simulation.history.q_actual[:, 0] == pytest.approx(exact, abs=1e-8)
     assert simulation.report.verdict == "off_target"
@@ -92,7 +92,7 @@ def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
 
 
 def test_controllers_with_encoders_can_be_stiff(monkeypatch):
-    conditions = {"gains": GAINS, "measured": "positions"}
+    conditions = {"gains": GAINS, "feedback": "positions"}
     trajectory = short_motion(3, rate=100, duration=0.2)
     explicit = simulate(vsa_3r(), trajectory, **conditions)
     go_on_implicitly(monkeypatch, 0.1)
@@ -191,6 +191,6 @@ def test_the_time_from_which_a_method_was_used_is_a_stamp(monkeypatch):
 
 def test_a_run_with_the_full_state_that_ends_early_is_told():
     trajectory = short_motion(3, rate=100, duration=0.3)
-    report = simulate(vsa_3r(), trajectory, gains=GAINS, measured="positions", budget=300).report
+    report = simulate(vsa_3r(), trajectory, gains=GAINS, feedback="positions", budget=300).report
     assert report.verdict == "incomplete"
     assert report.warnings[-1].startswith("the same run with the full state: the budget of 300 evaluations")

@@ -27,12 +27,12 @@ def only_problem(path):
     return line
 
 
-def test_a_missing_file_with_its_neighbour():
+def test_a_missing_file_with_its_neighbor():
     Path("vsa_3r.yaml").touch()
     assert only_problem("vsa-3r.yaml") == "vsa-3r.yaml: no such file; did you mean 'vsa_3r.yaml'?"
 
 
-def test_a_missing_file_without_a_neighbour():
+def test_a_missing_file_without_a_neighbor():
     assert only_problem("robot.yaml") == "robot.yaml: no such file"
 
 

@@ -62,7 +62,7 @@ class Ski:
 @dataclass(frozen=True)
 class Sledge:
     run: Wheel = value(Record(Wheel), "what it runs on")
-    colour: str = choice(("red", "blue"), "colour", not_yet=("green",))
+    color: str = choice(("red", "blue"), "color", not_yet=("green",))
     part: Wheel | Ski = value(OneOf({"wheel": Wheel, "ski": Ski}, not_yet=("rope",)), "part")
 
 
@@ -188,7 +188,7 @@ def test_words(of_docs: Any, kind: Kind, words: str) -> None:
 
 
 def test_what_is_not_supported_yet(of_docs: Any) -> None:
-    assert list(of_docs.refused_in(Sledge)) == ["run.tyre", "colour: green", "part: {type: rope}"]
+    assert list(of_docs.refused_in(Sledge)) == ["run.tyre", "color: green", "part: {type: rope}"]
     assert list(of_docs.refused_in(Train)) == ["sledges.run.tyre", "wheels.tyre"]
 
 

@@ -37,7 +37,7 @@ def read(tmp_path):
         "\ufeffname;mass;speed\r\napple;0.1;2\r\npear;1/5;\r\n",
         "# fruits\n\nspeed\tmass [g]\tname\n2\t100\tapple # red\n\t200\tpear\n\n",
         '"name","mass","speed[rad/ms]"\n"apple",0.1,"0.002"\n"pear", 0.2 ,""',
-        "name,colour,mass,speed\napple,red,0.1,2\npear,,0.2,",
+        "name,color,mass,speed\napple,red,0.1,2\npear,,0.2,",
     ],
 )
 def test_tables_that_are_accepted(read, content):
@@ -45,7 +45,7 @@ def test_tables_that_are_accepted(read, content):
     assert [each.name for each in found.records] == ["apple", "pear"]
     assert [each.mass for each in found.records] == pytest.approx([0.1, 0.2])
     assert [each.speed for each in found.records] == [2, None]
-    assert found.others == (("colour",) if "colour" in content else ())
+    assert found.others == (("color",) if "color" in content else ())
 
 
 def test_names_may_hold_separators_and_look_like_anything(read):

@@ -132,7 +132,7 @@ def test_no_rows(csv, content):
     assert problems(csv(content)) == [(0, "there are no rows below the header")]
 
 
-def test_header_in_a_comment_is_recognised(csv):
+def test_header_in_a_comment_is_recognized(csv):
     assert problems(csv("# written today\n# a,b\n1,2\n")) == [
         (
             3,

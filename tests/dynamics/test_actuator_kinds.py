@@ -176,7 +176,7 @@ def test_what_a_joint_does_not_have_is_nan_and_nothing_else() -> None:
     np.testing.assert_array_equal(block.ddstiffness[:, 1], 0)
 
 
-def test_an_infeasible_joint_leaves_its_neighbours_alone() -> None:
+def test_an_infeasible_joint_leaves_its_neighbors_alone() -> None:
     robot = with_actuators(robot_of_ones("RRR"), MIXED)
     motion = gentle(robot, 5, seed=8)
     block, soft = computed(robot, motion, 2000.0), computed(robot, motion, 1.0)

@@ -184,9 +184,9 @@ def test_energy_closes(name: str) -> None:
     actuator, drive, _ = CASES[name]
     robot = robot_of(LINK, [actuator], [PARALLEL])
     result = inverse_dynamics(robot, swing(name))
-    turning = LINK.masses[0] * LINK.centres[0] ** 2 + LINK.inertias[0]
+    turning = LINK.masses[0] * LINK.centers[0] ** 2 + LINK.inertias[0]
     kinetic = turning * result.dq[:, 0] ** 2 / 2
-    height = LINK.centres[0] * np.sin(result.q[:, 0])
+    height = LINK.centers[0] * np.sin(result.q[:, 0])
     motors = np.atleast_2d(drive.inertia)
     dtheta = result.dtheta[:, 0, : len(motors)]
     rotors = np.einsum("si,ij,sj->s", dtheta, motors, dtheta) / 2

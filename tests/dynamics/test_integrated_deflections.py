@@ -79,7 +79,7 @@ def test_integration_stays_at_the_root(case: str):
 
 
 def test_corridor_is_that_of_the_root():
-    crossing = inverse_dynamics(ARM, softening(), deflections=softened())
+    crossing = inverse_dynamics(ARM, softening(), deflection_solver=softened())
     root = inverse_dynamics(ARM, softening())
     for name in ("stiffness_lower", "stiffness_upper", "tau_e"):
         np.testing.assert_array_equal(getattr(crossing, name), getattr(root, name))
@@ -95,7 +95,7 @@ def test_result_does_not_depend_on_the_blocks():
     trajectory = softening()
     deflections = softened()
     at_once, by_seven = (
-        Run(ARM, trajectory, deflections=deflections, block_samples=samples) for samples in (201, 7)
+        Run(ARM, trajectory, deflection_solver=deflections, block_samples=samples) for samples in (201, 7)
     )
     (whole,), pieces = list(at_once), list(by_seven)
     assert at_once.report().as_json() == by_seven.report().as_json()
@@ -156,5 +156,5 @@ def test_only_antagonistic_joints_are_followed():
 
 
 def test_unknown_deflections_are_refused():
-    with pytest.raises(InputError, match=r"^unknown deflections 'integral'; did you mean 'integrate'\?$"):
-        inverse_dynamics(ARM, motion(), deflections="integral")
+    with pytest.raises(InputError, match=r"^unknown deflection solver 'integral'; valid: root, ode$"):
+        inverse_dynamics(ARM, motion(), deflection_solver="integral")

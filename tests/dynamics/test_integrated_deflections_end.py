@@ -88,7 +88,7 @@ def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Resu
 
 
 def test_crossing_the_fold_ends_where_the_corridor_does():
-    crossing = inverse_dynamics(ARM, softening(), deflections=softened())
+    crossing = inverse_dynamics(ARM, softening(), deflection_solver=softened())
     unreachable = has(inverse_dynamics(ARM, softening()).flags[:, 1], Flag.INFEASIBLE)
     first = int(unreachable.argmax())
     stop = crossing.report.drifts[1].stop
@@ -151,7 +151,10 @@ def test_robot_that_nobody_can_follow_ends_at_once():
 def test_run_that_stops_at_infeasible_steps_stops_at_the_end_of_the_way():
     trajectory = dipping(800.0)
     result = inverse_dynamics(
-        ARM, trajectory, deflections=integrate_deflections(ARM, trajectory, COARSE), stop_on_infeasible=True
+        ARM,
+        trajectory,
+        deflection_solver=integrate_deflections(ARM, trajectory, COARSE),
+        stop_on_infeasible=True,
     )
     assert result.time[-1] == 1.3
     assert not result.report.complete

@@ -40,14 +40,14 @@ def test_drift_beyond_its_bound_fails_the_self_check():
 def test_report_as_json():
     report = integrated(ARM, motion(), COARSE).report
     entry = report.as_json()["deflections"]
-    assert entry["method"] == "integrate"
+    assert entry["method"] == "ode"
     assert [joint["joint"] for joint in entry["joints"]] == ["base", "shoulder"]
     for joint, drift in zip(entry["joints"], report.drifts, strict=True):
         assert (joint["drift"], joint["time"]) == (drift.largest, drift.time)
         assert (joint["unit"], joint["stopped"]) == ("rad", None)
 
 
-def test_drift_of_a_sliding_joint_is_in_metres():
+def test_drift_of_a_sliding_joint_is_in_meters():
     robot, trajectory = shipped_run("rp_2", "rp_2")
     assert [drift.unit for drift in integrated(robot, trajectory, COARSE).report.drifts] == ["rad", "m"]
 

@@ -83,7 +83,7 @@ def recursion_torques(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def test_static_load_of_the_published_arm_is_that_of_the_stretched_one() -> None:
-    # Table I: links 2 and 3 of 6.7858 and 5.0894 kg, 0.3 m long, centres in the middle
+    # Table I: links 2 and 3 of 6.7858 and 5.0894 kg, 0.3 m long, centers in the middle
     elbow = 5.0894 * G * 0.15
     shoulder = 6.7858 * G * 0.15 + 5.0894 * G * 0.45
     np.testing.assert_allclose(static_load(ARM).values, [0, shoulder, elbow], rtol=1e-9, atol=1e-12)
@@ -237,7 +237,7 @@ def test_result_on_the_command_line(vsacli: Any, feasible_result: Path) -> None:
 
 
 @pytest.mark.parametrize("end_stiffness", [1275, 790], ids=["feasible", "infeasible"])
-@pytest.mark.parametrize("options", ["", slow("--deflections integrate"), "--stop-on-infeasible"])
+@pytest.mark.parametrize("options", ["", slow("--deflection-solver ode"), "--stop-on-infeasible"])
 def test_a_result_ends_with_what_invdyn_printed(
     vsacli: Any, tmp_path: Path, end_stiffness: float, options: str
 ) -> None:

@@ -287,7 +287,7 @@ def test_the_rate_in_a_file_of_columns(vsacli: Command, tmp_path: Path) -> None:
     )
     assert vsacli("invdyn", ROBOT, "recorded.yaml", "-o", "r.h5", "-q").code in (0, 3)
     log(tmp_path, shoulder=POSITION, elbow=POSITION / 2)
-    found = vsacli("compare", "r.h5", "log.csv", "--columns", "columns.yaml", "--begins-at", "0", "--json")
+    found = vsacli("compare", "r.h5", "log.csv", "--columns", "columns.yaml", "--time-offset", "0", "--json")
     assert found.code in (0, 3), found.err
     assert json.loads(found.out)
 

@@ -18,7 +18,7 @@ from vsacli.results.store.reader import StoredResult
 
 RUNS = {
     "plain": (ROBOT, REST_TO_REST),
-    "integrated": (ROBOT, REST_TO_REST, "--deflections", "integrate"),
+    "integrated": (ROBOT, REST_TO_REST, "--deflection-solver", "ode"),
     "compiled": (ROBOT, REST_TO_REST, "--engine", "c"),
     "some variables": (ROBOT, REST_TO_REST, "--variables", "tau_motor,flags"),
     "a table": tuple(REPOSITORY / folder / "measured_1r.yaml" for folder in ("robots", "trajectories")),
@@ -97,8 +97,8 @@ def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert (provenance["engine"], provenance["compiler"]) == ("numpy", "")
     assert provenance["options"] == {
         "stop_on_infeasible": False,
-        "near_singular": 0.01,
-        "deflections": "root",
+        "min_margin": 0.01,
+        "deflection_solver": "root",
     }
     assert provenance["versions"]["scipy"] == scipy.__version__
     assert "engine: numpy" in vsacli("info", "r.h5").out.splitlines()

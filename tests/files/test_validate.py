@@ -14,7 +14,7 @@ import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
 
 from vsacli.base.errors import InputError
-from vsacli.files.file_kinds import FileKind, recognise
+from vsacli.files.file_kinds import FileKind, recognize
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.trajectory.file import load_trajectory
 
@@ -56,7 +56,7 @@ def test_each_kind_by_its_content(vsacli: Any, tmp_path: Path, feasible_result: 
     (tmp_path / "tree").write_text("\ufeff\n<robot name='r'><link name='a'/></robot>", encoding="utf-8")
     motion.write_text(motion.read_text().replace("duration: 4.0", "duration: 0.5"))
     assert vsacli("simulate", ROBOT, motion, "-q", "-o", "simulated").code in (0, 3)
-    found = {name: recognise(name) for name in ("arm", "result", "poles", "tree", "simulated", "move.yaml")}
+    found = {name: recognize(name) for name in ("arm", "result", "poles", "tree", "simulated", "move.yaml")}
     assert found == {
         "arm": FileKind.ROBOT,
         "result": FileKind.RESULT,

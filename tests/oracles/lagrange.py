@@ -29,7 +29,7 @@ Derivatives = list[Array]
 
 @dataclass(frozen=True)
 class Link:
-    """A joint and its link; `inertia` is the 3x3 tensor about the centre of mass `com`."""
+    """A joint and its link; `inertia` is the 3x3 tensor about the center of mass `com`."""
 
     revolute: bool
     a: Scalar

@@ -11,7 +11,7 @@ from vsacli.base.arrays import FloatArray
 
 
 class ModifiedJoint(NamedTuple):
-    """A row, and the link it moves: its centre of mass and inertia about it in the frame the row leads to."""
+    """A row, and the link it moves: its center of mass and inertia about it in the frame the row leads to."""
 
     revolute: bool
     a: float

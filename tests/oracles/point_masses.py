@@ -25,7 +25,7 @@ class Cloud:
 
     @property
     def com(self) -> FloatArray:
-        """Centre of mass."""
+        """Center of mass."""
         return self.masses @ self.points / self.mass
 
     @property

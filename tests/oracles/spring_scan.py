@@ -187,7 +187,7 @@ def _nodes(tau_e: float, least: float, largest: float) -> FloatArray:
     """Torques of side 1 from the largest to the least, dense where a side is relaxed."""
     size = max(abs(tau_e), 1.0)
     near = size * np.geomspace(1e-13, 4, 700)
-    nodes = np.concatenate([centre + sign * near for centre in (0.0, tau_e) for sign in (-1, 1)])
+    nodes = np.concatenate([center + sign * near for center in (0.0, tau_e) for sign in (-1, 1)])
     inwards = [(least, 1), (largest, -1)]
     ends = [end + sign * abs(end) * CLOSE for end, sign in inwards if math.isfinite(end)]
     nodes = np.concatenate((nodes, np.linspace(-abs(tau_e), 2 * abs(tau_e), 1500), [0.0, tau_e], *ends))

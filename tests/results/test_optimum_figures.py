@@ -1,4 +1,4 @@
-"""Figures of what an optimisation changes."""
+"""Figures of what an optimization changes."""
 
 from __future__ import annotations
 

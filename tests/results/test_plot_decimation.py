@@ -105,7 +105,7 @@ def test_long_runs_are_read_in_blocks_and_reduced() -> None:
     assert gap.any()
 
 
-def test_a_marked_step_reaches_half_way_to_its_neighbours() -> None:
+def test_a_marked_step_reaches_half_way_to_its_neighbors() -> None:
     time = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
     marked = np.array([True, False, False, True, False])
     np.testing.assert_array_equal(marked_spans(time, marked), [[0.0, 0.5], [3.0, 4.5]])

@@ -46,7 +46,7 @@ def legend_labels(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_infeasible_steps_get_grey_bands_in_the_panels_that_show_the_joint() -> None:
+def test_infeasible_steps_get_gray_bands_in_the_panels_that_show_the_joint() -> None:
     result = rest_to_rest(401)
     result.read("flags")[100:151, 1] = 1
     result.read("flags")[200, 2] = 3  # infeasible and singular
@@ -98,7 +98,7 @@ def test_the_first_three_joints_look_as_in_the_paper() -> None:
     assert np.argmax(blue) == 2
 
 
-def test_styles_stay_distinct_in_colour_and_stroke() -> None:
+def test_styles_stay_distinct_in_color_and_stroke() -> None:
     assert len({line_style(joint) for joint in range(72)}) == 72
     first = [line_style(joint) for joint in range(8)]
     assert len({style.color for style in first}) == 8

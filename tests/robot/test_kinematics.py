@@ -75,7 +75,7 @@ def test_the_jacobian_is_the_derivative_of_the_pose(robot: Robot) -> None:
         spin = rate[:, :3, :3] @ np.swapaxes(forward_kinematics(robot, q)[:, -1, :3, :3], 1, 2)
         expected[:, :3, joint] = rate[:, :3, 3]
         expected[:, 3:, joint] = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-    # Central differences: step^2 times third derivatives, and eps / step times lengths of some metres.
+    # Central differences: step^2 times third derivatives, and eps / step times lengths of some meters.
     np.testing.assert_allclose(jacobian(robot, q, "base"), expected, rtol=0, atol=1e-8)
 
 

@@ -1,4 +1,4 @@
-"""`convention: modified` in a robot file: frames are moved, rows are not relabelled."""
+"""`convention: modified` in a robot file: frames are moved, rows are not relabeled."""
 
 from __future__ import annotations
 
@@ -108,14 +108,14 @@ def test_kinematics_and_torques_are_those_of_the_modified_rows(load, types, seed
     rng = np.random.default_rng(seed)
     q, dq, ddq = rng.uniform(-3, 3, (3, 20, len(types)))
     for position in q:
-        # Products of 4x4 matrices with entries of a few metres.
+        # Products of 4x4 matrices with entries of a few meters.
         np.testing.assert_allclose(tool_pose(robot, position).real, oracle.tool_pose(position), atol=1e-13)
     found = link_torques(robot, q, dq, ddq, 0 * q, 0 * q)[0]
     expected = oracle.torques(q, dq, ddq)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())  # rounding
 
 
-def test_relabelled_rows_would_be_another_robot(load):
+def test_relabeled_rows_would_be_another_robot(load):
     written = random_robot("RRP", 1)
     q = np.array([0.3, -0.4, 0.5])
     modified, standard = load(text_of(written)), load(text_of(written, "standard"))

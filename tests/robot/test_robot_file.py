@@ -230,7 +230,7 @@ def test_an_unknown_type_makes_no_problems_of_units(load):
 
 
 def test_all_problems_come_at_once_in_the_order_of_lines(load):
-    text = TEXT + "colour: red\n"
+    text = TEXT + "color: red\n"
     for old, new in [("-9.81]", "]"), ("mass: 2", "mass: -2"), ("k: 400", "k: hard"), ("slide", "swing")]:
         text = text.replace(old, new)
     with pytest.raises(InputError) as caught:

@@ -103,7 +103,7 @@ def test_what_the_file_rounded_is_no_tilt(path):
     conversion = import_urdf(path(text))
     assert conversion.snaps == ()
     assert [each.dh.alpha for each in conversion.robot.joints] == [math.pi / 2, -math.pi / 2, 0]
-    assert 0 < strays(conversion)[0] < 1e-11  # 5e-12 rad, over less than a metre
+    assert 0 < strays(conversion)[0] < 1e-11  # 5e-12 rad, over less than a meter
 
 
 def test_a_slide_almost_parallel_to_the_next_axis_needs_no_snapping(path):

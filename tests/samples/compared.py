@@ -69,7 +69,7 @@ class Planted:
 
     path: Path
     motion: Motion
-    begins_at: float
+    time_offset: float
     gains: dict[str, float] = field(default_factory=dict)
     offsets: dict[str, float] = field(default_factory=dict)
     noises: dict[str, float] = field(default_factory=dict)
@@ -126,13 +126,13 @@ def computed_motion(name: str, folder: Path) -> Motion:
 def random_recording(motion: Motion, path: Path, seed: int) -> Planted:
     """Write a recording of a motion with faults in less than a third of the columns that move."""
     draw = np.random.default_rng(seed)
-    time, begins_at = _times(draw, motion.duration)
+    time, time_offset = _times(draw, motion.duration)
     columns = _chosen(draw, motion)
-    planted = Planted(path, motion, begins_at)
-    inside = np.clip(time - begins_at, 0, motion.duration)
+    planted = Planted(path, motion, time_offset)
+    inside = np.clip(time - time_offset, 0, motion.duration)
     held = {column: motion.signals[column](inside) for column in columns}
     if draw.random() < 0.2:
-        _approach(draw, held, time, begins_at)
+        _approach(draw, held, time, time_offset)
     faults = _faults(draw, motion, columns)
     recorded, units = {}, {}
     for column in columns:
@@ -146,7 +146,7 @@ def random_recording(motion: Motion, path: Path, seed: int) -> Planted:
             np.abs(values - np.median(values)) > 10 * planted.motion.ranges[column]
         )  # wild ones stay
     for column in columns:
-        there = kept[column] & (time >= begins_at) & (time <= begins_at + motion.duration)
+        there = kept[column] & (time >= time_offset) & (time <= time_offset + motion.duration)
         planted.samples[column] = int(np.count_nonzero(there))
     _write(path, time, recorded, units, kept)
     return planted
@@ -155,16 +155,16 @@ def random_recording(motion: Motion, path: Path, seed: int) -> Planted:
 def _times(draw: np.random.Generator, duration: float) -> tuple[np.ndarray, float]:
     """Stamps from 0 on, and when the motion begins: within the recording, or before it."""
     rate = draw.choice([100.0, 125.0, 200.0, 333.3, 500.0, 1000.0])
-    begins_at = draw.uniform(-0.25 * duration, 1.0)
+    time_offset = draw.uniform(-0.25 * duration, 1.0)
     end = (
-        begins_at + duration * draw.uniform(0.75, 1.0)
+        time_offset + duration * draw.uniform(0.75, 1.0)
         if draw.random() < 0.3
-        else begins_at + duration + draw.uniform(0, 1)
+        else time_offset + duration + draw.uniform(0, 1)
     )
     time = np.arange(0, end, 1 / rate)
     if draw.random() < 0.3:
         time[1:] += draw.uniform(-0.3, 0.3, len(time) - 1) / rate
-    return time, float(begins_at)
+    return time, float(time_offset)
 
 
 def _chosen(draw: np.random.Generator, motion: Motion) -> list[str]:
@@ -176,10 +176,10 @@ def _chosen(draw: np.random.Generator, motion: Motion) -> list[str]:
 
 
 def _approach(
-    draw: np.random.Generator, held: dict[str, np.ndarray], time: np.ndarray, begins_at: float
+    draw: np.random.Generator, held: dict[str, np.ndarray], time: np.ndarray, time_offset: float
 ) -> None:
     """Another motion before this one, as of a robot that is driven to its start."""
-    before = begins_at - 0.2
+    before = time_offset - 0.2
     if before < 0.3:
         return
     shape = np.where(time < before, np.sin(np.pi * np.clip(time / before, 0, 1)) ** 2, 0.0)

@@ -42,7 +42,7 @@ def motion(
 
 def integrated(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
     return inverse_dynamics(
-        robot, trajectory, deflections=integrate_deflections(robot, trajectory, tolerance)
+        robot, trajectory, deflection_solver=integrate_deflections(robot, trajectory, tolerance)
     )
 
 

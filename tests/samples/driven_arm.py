@@ -18,13 +18,13 @@ from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-LINK = PlanarArm(lengths=[0.4], masses=[1.5], centres=[0.25], inertias=[0.03], damping=[0.2])
+LINK = PlanarArm(lengths=[0.4], masses=[1.5], centers=[0.25], inertias=[0.03], damping=[0.2])
 """A pendulum."""
 
 ARM = PlanarArm(
     lengths=[0.4, 0.3, 0.2],
     masses=[1.5, 1.0, 0.6],
-    centres=[0.25, 0.12, 0.1],
+    centers=[0.25, 0.12, 0.1],
     inertias=[0.03, 0.02, 0.004],
     damping=[0.2, 0.1, 0.05],
 )
@@ -40,7 +40,7 @@ DURATION, RATE = 0.5, 2000
 def robot_of(arm: PlanarArm, actuators: list[Actuator], dampers: Sequence[Damper | None] = ()) -> Robot:
     """The arm as a robot."""
     devices = zip(actuators, dampers or [None] * len(actuators), strict=True)
-    links = zip(arm.lengths, arm.masses, arm.centres, arm.inertias, arm.damping, devices, strict=True)
+    links = zip(arm.lengths, arm.masses, arm.centers, arm.inertias, arm.damping, devices, strict=True)
     joints = tuple(
         Joint(
             name=f"joint_{number}",
@@ -48,14 +48,14 @@ def robot_of(arm: PlanarArm, actuators: list[Actuator], dampers: Sequence[Damper
             dh=DenavitHartenberg(a=length, alpha=0),
             link=Link(
                 mass=mass,
-                com=(centre - length, 0, 0),
+                com=(center - length, 0, 0),
                 inertia=Inertia(**dict.fromkeys(("xx", "yy", "zz"), inertia)),
             ),
             damping=damping,
             actuator=actuator,
             damper=damper,
         )
-        for number, (length, mass, centre, inertia, damping, (actuator, damper)) in enumerate(links, 1)
+        for number, (length, mass, center, inertia, damping, (actuator, damper)) in enumerate(links, 1)
     )
     return Robot(name="arm", gravity=(0, -arm.gravity, 0), joints=joints)
 

@@ -105,14 +105,14 @@ def smallest_margin(robot: Robot, trajectory: Trajectory) -> float:
     )
 
 
-def accepted(robot: Robot, trajectory: Trajectory, near_singular: float = 0.01) -> bool:
+def accepted(robot: Robot, trajectory: Trajectory, min_margin: float = 0.01) -> bool:
     """The rule, read off the corridor and the flags of a run."""
-    return all(_accepted(block, near_singular) for block in Run(robot, trajectory))
+    return all(_accepted(block, min_margin) for block in Run(robot, trajectory))
 
 
-def _accepted(block: Block, near_singular: float) -> bool:
+def _accepted(block: Block, min_margin: float) -> bool:
     room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
-    narrow = np.any(room / block.stiffness < near_singular)  # NaN where a joint has no corridor
+    narrow = np.any(room / block.stiffness < min_margin)  # NaN where a joint has no corridor
     return not narrow and not np.any(block.flags & ~np.uint32(Flag.NEAR_SINGULAR))
 
 

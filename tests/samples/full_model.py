@@ -99,8 +99,8 @@ class PlanarArm:
     Attributes:
         lengths: from joint to joint, m.
         masses: kg.
-        centres: of mass, from the link's own joint, m.
-        inertias: about the centres, kg m^2.
+        centers: of mass, from the link's own joint, m.
+        inertias: about the centers, kg m^2.
         damping: between the links, N m s/rad.
         friction: f of each joint, none if empty.
         gravity: m/s^2, along -y.
@@ -108,7 +108,7 @@ class PlanarArm:
 
     lengths: Sequence[float]
     masses: Sequence[float]
-    centres: Sequence[float]
+    centers: Sequence[float]
     inertias: Sequence[float]
     damping: Sequence[float]
     friction: Sequence[OfVelocity] = ()
@@ -123,10 +123,10 @@ class PlanarArm:
         for i in range(joints):
             angle, turn = angle + q[i], turn + dq[i]
             along = sympy.Matrix([sympy.cos(angle), sympy.sin(angle)])
-            centre = foot + self.centres[i] * along
-            velocity = centre.jacobian(q) * sympy.Matrix(dq)
+            center = foot + self.centers[i] * along
+            velocity = center.jacobian(q) * sympy.Matrix(dq)
             energy += self.masses[i] * velocity.dot(velocity) / 2 + self.inertias[i] * turn**2 / 2
-            weight += self.masses[i] * self.gravity * centre[1]
+            weight += self.masses[i] * self.gravity * center[1]
             foot += self.lengths[i] * along
         mass = sympy.hessian(energy, dq)
         momentum = sympy.Matrix([energy]).jacobian(dq)

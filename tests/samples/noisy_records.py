@@ -1,4 +1,4 @@
-"""Motions whose derivatives are known, recorded with noise of many colours."""
+"""Motions whose derivatives are known, recorded with noise of many colors."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def twice_filtered(values, cutoff, rate):
     return filtfilt(*butter(2, 2 * cutoff / rate), values)
 
 
-COLOURS = {
+COLORS = {
     "white, 1e-4 rad": lambda q, e, _rate: q + e,
     "white, 1e-5 rad": lambda q, e, _rate: q + 0.1 * e,
     "12-bit encoder": lambda q, _e, _rate: rounded(q, 12),
@@ -170,13 +170,13 @@ COLOURS = {
 
 WHITE = ("white, 1e-4 rad", "white, 1e-5 rad", "12-bit encoder", "17-bit encoder")
 
-FILTERED = tuple(name for name in COLOURS if "low-pass" in name or "zero-phase" in name)
-"""Colours that neighbouring samples hardly show."""
+FILTERED = tuple(name for name in COLORS if "low-pass" in name or "zero-phase" in name)
+"""Colors that neighboring samples hardly show."""
 
 
-def record(motion, colour, seed, rate=1000):
+def record(motion, color, seed, rate=1000):
     """A record of a motion, with noise."""
     time = np.arange(round(DURATION * rate) + 1) / rate
     truth = motion(time, seed)
     white = DEVIATION * np.random.default_rng(100 + seed).standard_normal(len(time))
-    return Record(time, COLOURS[colour](truth[0], white, rate), truth)
+    return Record(time, COLORS[color](truth[0], white, rate), truth)

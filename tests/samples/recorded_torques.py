@@ -126,9 +126,9 @@ def judge(recording: Recording) -> Verdict:
     return Verdict(run.report().verdict, _error(torque, deviation, true[inside]))
 
 
-def outcomes(motion: str, colour: str, seed: int, rate: int) -> Iterator[Outcome]:
+def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]:
     """Of each arm along a record."""
-    of = record(MOTIONS[motion], colour, seed, rate)
+    of = record(MOTIONS[motion], color, seed, rate)
     recorded = Trajectory.from_samples(of.time, of.values[:, None])
     firm = Constant(signal=STIFFNESS, span=(0.0, recorded.duration), value=(STIFFNESS_ASKED,))
     exact = _exact_motion(of, motion, seed)

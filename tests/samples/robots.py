@@ -40,7 +40,7 @@ def random_inertia(rng: np.random.Generator) -> Inertia:
 
 
 def random_link(rng: np.random.Generator) -> Link:
-    """A link with its centre of mass off every axis and products of inertia."""
+    """A link with its center of mass off every axis and products of inertia."""
     x, y, z = rng.uniform(-0.3, 0.3, 3).tolist()
     return Link(mass=rng.uniform(0.5, 8), com=(x, y, z), inertia=random_inertia(rng))
 

@@ -75,7 +75,7 @@ def missed(planted: Planted, comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def check(planted: Planted, comparison: Comparison) -> None:
-    assert abs(comparison.begins_at - planted.begins_at) <= 3 * comparison.begins_at_error
+    assert abs(comparison.time_offset - planted.time_offset) <= 3 * comparison.time_offset_error
     assert max(map(abs, deviations(planted, comparison)), default=0.0) <= FARTHEST
     assert missed(planted, comparison) == []
     assert unexplained(planted, comparison) == []

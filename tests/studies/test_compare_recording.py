@@ -62,7 +62,7 @@ def test_figures_of_known_errors_come_out(computed, tmp_path):
     found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
     signals = {signal.column: signal for signal in found.signals}
     # The grid has 2 ms; between its points straight lines stand for curves, which moves nothing by 0.1 ms.
-    assert found.begins_at == pytest.approx(BEGIN, abs=1e-4)
+    assert found.time_offset == pytest.approx(BEGIN, abs=1e-4)
     assert found.compared == pytest.approx(3.0)
     assert signals["base.q"].rms == pytest.approx(1e-3, rel=0.05)  # of 1500 draws: 2 % is one deviation
     assert signals["shoulder.q"].rms < 1e-4  # 0.1 ms of 0.4 rad/s
@@ -86,7 +86,7 @@ def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
     piece = {name: values[kept] for name, values in columns.items()}
     found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", piece))
     # A millionth of the motion's range are 0.1 ms near its ends, where it is slowest.
-    assert found.begins_at == pytest.approx(BEGIN - columns["time"][kept][0], abs=2e-4)
+    assert found.time_offset == pytest.approx(BEGIN - columns["time"][kept][0], abs=2e-4)
 
 
 SLIPS = {
@@ -134,9 +134,9 @@ def test_a_wrong_column_moves_neither_the_alignment_nor_the_others(computed, tmp
     changed = WRONG[wrong](columns)
     columns.update(changed)
     found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
-    assert abs(found.begins_at - BEGIN) <= 3 * found.begins_at_error
+    assert abs(found.time_offset - BEGIN) <= 3 * found.time_offset_error
     assert (
-        found.begins_at_error < 1e-5
+        found.time_offset_error < 1e-5
     )  # 1e-4 of the range, at its speed, over the root of 1500 samples: 4e-6 s
     for signal in found.signals:
         if signal.column not in changed:
@@ -203,8 +203,8 @@ def test_a_robot_that_stands_still_is_not_aligned(vsacli, tmp_path, moves):
     written(tmp_path / "m.csv", columns)
     done = vsacli("compare", "r.h5", "m.csv")
     assert done.code == 2
-    assert "does it move beyond its noise? --begins-at says when" in done.err
-    given = vsacli("compare", "r.h5", "m.csv", "--begins-at", "0")
+    assert "does it move beyond its noise? --time-offset says when" in done.err
+    given = vsacli("compare", "r.h5", "m.csv", "--time-offset", "0")
     assert given.code == 0
     assert ("base.q does not move, though q was computed to" in given.out) == moves
     assert (" hold still as computed" in given.out) != moves
@@ -221,8 +221,8 @@ def test_other_times_of_a_periodic_motion_are_listed(vsacli, tmp_path):
     written(tmp_path / "m.csv", dict(zip(header, np.array(kept, dtype=float).T, strict=True)))
     found = compare(tmp_path / "r.h5", tmp_path / "m.csv")
     (note,) = found.notes
-    assert "it would agree as well, as periodic motions do; --begins-at chooses" in note
-    assert found.begins_at % 1 == pytest.approx(0, abs=1e-3) or found.begins_at % 1 == pytest.approx(
+    assert "it would agree as well, as periodic motions do; --time-offset chooses" in note
+    assert found.time_offset % 1 == pytest.approx(0, abs=1e-3) or found.time_offset % 1 == pytest.approx(
         1, abs=1e-3
     )
 
@@ -271,9 +271,9 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     assert len(page.charts) == 2 * 15
     assert began in page.text
     assert hashlib.sha256((tmp_path / "m.csv").read_bytes()).hexdigest() in page.text
-    report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--begins-at", str(BEGIN)).out)
+    report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--time-offset", str(BEGIN)).out)
     assert report["format"] == "vsacli-comparison/2"
-    assert (report["begins_at"], report["found"], len(report["signals"])) == (BEGIN, False, 15)
+    assert (report["time_offset"], report["found"], len(report["signals"])) == (BEGIN, False, 15)
 
 
 BAD = {
@@ -288,10 +288,10 @@ BAD = {
         "time,base.q\n" + "".join(f"{1000 * t},{t}\n" for t in range(5)),
         [],
     ),
-    "2 of its rows are within, 4 are needed": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "1"]),
-    "must be a finite number of seconds": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "nan"]),
+    "2 of its rows are within, 4 are needed": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "1"]),
+    "must be a finite number of seconds": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "nan"]),
     "at no shift in time": ("time,base.q\n" + "".join(f"{t},{t % 3}e200\n" for t in range(9)), []),
-    "change --begins-at": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "50"]),
+    "change --time-offset": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "50"]),
 }
 
 

@@ -25,7 +25,7 @@ def simulated(vsacli, tmp_path):
 
 
 def compared(run, result, recording):
-    report = json.loads(run("compare", result, recording, "--begins-at", "0", "--json").out)
+    report = json.loads(run("compare", result, recording, "--time-offset", "0", "--json").out)
     return {signal["column"]: signal for signal in report["signals"]}, report["notes"]
 
 

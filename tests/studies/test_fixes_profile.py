@@ -77,9 +77,9 @@ def test_spline_through_one_point_is_the_green_function():
 
 
 def test_no_other_function_between_the_bounds_is_smaller():
-    smoothing, centre = 0.15, 1.5
+    smoothing, center = 0.15, 1.5
     time = np.linspace(0, 4, 1601)
-    bounds = Bounds(time, bump(time, 30.0, centre, 0.4), np.full_like(time, np.inf))
+    bounds = Bounds(time, bump(time, 30.0, center, 0.4), np.full_like(time, np.inf))
 
     def size(values, bend):
         return trapezoid(values**2 + smoothing**4 * bend**2, time)
@@ -88,7 +88,7 @@ def test_no_other_function_between_the_bounds_is_smaller():
     least = size(spline(time), spline(time, nu=2))
     others = []
     for height, width in product(np.linspace(30, 40, 11), np.linspace(0.2, 0.6, 41)):
-        u = (time - centre) / width
+        u = (time - center) / width
         bell = height * np.exp(-u * u)
         if bounds.missed_by(bell).max() <= 0:
             others.append(size(bell, bell * (4 * u * u - 2) / width**2))

@@ -34,20 +34,20 @@ def step_of(trajectory):
     return 1 / Factors.of(trajectory).denominator
 
 
-def slow_down(robot, trajectory, near_singular=0.01):
-    return smallest_slow_down(Acceptance(robot, near_singular), trajectory)
+def slow_down(robot, trajectory, min_margin=0.01):
+    return smallest_slow_down(Acceptance(robot, min_margin), trajectory)
 
 
-def check_smallest(robot, trajectory, factor, near_singular=0.01):
+def check_smallest(robot, trajectory, factor, min_margin=0.01):
     """Accepted on all steps, and the next smaller factor is not."""
-    assert accepted(robot, trajectory.stretched(factor), near_singular)
-    assert not accepted(robot, trajectory.stretched(factor - step_of(trajectory)), near_singular)
+    assert accepted(robot, trajectory.stretched(factor), min_margin)
+    assert not accepted(robot, trajectory.stretched(factor - step_of(trajectory)), min_margin)
 
 
 def test_fast_motion_of_the_paper_ends_at_its_threshold_duration():
     # The closed bound gives 0.53557 s, to five digits; a margin of 1e-6 moves it by less than that. The next
     # whole millisecond is 0.536 s.
-    factor = slow_down(vsa_3r(), rest_to_rest(0.5), near_singular=1e-6)
+    factor = slow_down(vsa_3r(), rest_to_rest(0.5), min_margin=1e-6)
     assert 0.5 * factor == pytest.approx(0.536, rel=1e-12)
 
 

@@ -88,7 +88,7 @@ def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
 
 @pytest.mark.parametrize("noise", [blue, slow(low_passed)])
 def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(noise: Noise) -> None:
-    """They have nothing at frequency zero but what neighbouring frequencies let in."""
+    """They have nothing at frequency zero but what neighboring frequencies let in."""
     found = fits(noise)
     off = np.array([(fit.values - TRUTH) / fit.standard_errors for fit in found])
     assert np.all(np.mean(np.abs(off) < 2, axis=0) > 0.90)
@@ -97,7 +97,7 @@ def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(nois
 
 @pytest.mark.parametrize("noise", [red, derivative, blue])
 def test_errors_by_white_residuals_would_not(noise: Noise) -> None:
-    """The noise of the cases above is coloured enough to tell: the usual errors are off."""
+    """The noise of the cases above is colored enough to tell: the usual errors are off."""
     slopes, found = columns(600), fits(noise)
     spread = np.std([fit.values for fit in found], axis=0)
     rms = np.mean([fit.residual_rms["link"] for fit in found])

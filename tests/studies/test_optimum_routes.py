@@ -29,7 +29,7 @@ def reported(robot: Robot, trajectory: Trajectory, criterion: str, index: int = 
             return float(np.abs(torques).max())
         case "energy":
             return energy.spent + float(run.elastic_energy[0, index])
-        case "copper":
+        case "copper_loss":
             assert energy.copper_loss is not None
             return energy.copper_loss
     mean = np.trapezoid((torques**2).mean(axis=-1), run.time) / trajectory.duration
@@ -75,7 +75,7 @@ def check_routes(robot: Robot, found: Any, criterion: str, folder: Path, margin:
 def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion: str) -> None:
     robot = load_robot(TENDON)
     motion = load_trajectory(PULL, robot, {"rate": rate})
-    found = optimize(robot, motion, criterion, margin=MARGIN, seed=2)
+    found = optimize(robot, motion, criterion, min_margin=MARGIN, seed=2)
     [joint] = found.joints.values()
     # of the same at 1000 Hz; with one piece a step, 12 of them at 8 Hz, a spline follows its bounds to 1e-3
     expected = {"peak": 1.49876, "torque": 0.683972, "energy": 2.24903}[criterion]
@@ -89,7 +89,7 @@ def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion
 def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str) -> None:
     """At 10 Hz a pace has more detail than steps; the result has as many as describe it."""
     robot = load_robot(TENDON)
-    found = optimize(robot, load_trajectory(PULL, robot, {"rate": 10}), criterion, vary, margin=MARGIN)
+    found = optimize(robot, load_trajectory(PULL, robot, {"rate": 10}), criterion, vary, min_margin=MARGIN)
     check_routes(robot, found, criterion, tmp_path, MARGIN)
     if criterion == "time":
         # of the same at 1000 Hz, where the search ends within 1e-3 of its optimum
@@ -104,7 +104,7 @@ def test_costs_of_all_joints_are_those_of_runs(tmp_path: Path) -> None:
         {f"joints.*.actuator.motor.{name}": value for name, value in numbers.items()}
     )
     motion = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", robot, {"rate": 100})
-    for criterion in ("copper", "energy"):
+    for criterion in ("copper_loss", "energy"):
         folder = tmp_path / criterion
         folder.mkdir()
         found = optimize(robot, motion, criterion)
@@ -125,7 +125,7 @@ def test_limits_hold_between_samples_of_random_motions() -> None:
         robot = pendulum().replace({"joints.0.actuator.motor.max_torque": limit})
         criterion = draw.choice(["torque", "peak", "energy", "time"])
         vary = "timing" if criterion == "time" else "stiffness"
-        found = optimize(robot, motion, criterion, vary, margin=MARGIN)
+        found = optimize(robot, motion, criterion, vary, min_margin=MARGIN)
         if found.trajectory is None:
             assert "between" not in str(found)  # steps have nothing to do with what motors can do
             continue
@@ -144,7 +144,7 @@ def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: flo
     robot = load_robot(TENDON)
     motion = load_trajectory(PULL, robot, {"rate": 100}).stretched(shorter)
     assert not optimize(robot, motion, "torque").possible
-    found = optimize(robot, motion, "torque", "both", margin=MARGIN)
+    found = optimize(robot, motion, "torque", "both", min_margin=MARGIN)
     assert found.slow_down == pytest.approx(slow_down, rel=0.01)
     assert found.trajectory is not None
     assert found.pace is not None
@@ -160,7 +160,7 @@ def test_a_stiffness_that_is_out_of_reach_at_any_pace_is_where_a_search_begins_e
     """What the motors cost as commanded is not known then, and the fastest motion is the same."""
     robot = load_robot(TENDON)
     motion = load_trajectory(PULL, robot, {"rate": 500, "stiffness.start": 8, "stiffness.end": 38})
-    found = optimize(robot, motion, "time", "both", margin=MARGIN)
+    found = optimize(robot, motion, "time", "both", min_margin=MARGIN)
     assert found.timing is not None
     assert np.isnan(found.timing.uniform)
     assert found.timing.after == pytest.approx(0.5872, rel=2e-3)

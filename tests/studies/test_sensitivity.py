@@ -143,7 +143,7 @@ BAD = {
     "a tolerance must be at most 1e+30": ["--tolerances", "1e300%"],
     "none of 2 drawn robots is one, choose smaller": ["--tolerances", "900%", "--monte-carlo", "2"],
     "'x%' is no tolerance": ["--tolerances", "x%"],
-    "a tolerance of all numbers is a share, 0.05 % or another, or a file": ["--tolerances", "0.05"],
+    "a tolerance of all numbers is a share: write 5 % or 0.05": ["--tolerances", "5"],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
     "bad.yaml:2: no number of the robot fits": ["--tolerances", "bad.yaml"],

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.catalogues import GENERIC, random_motor, shares_used, write
+from samples.catalogs import GENERIC, random_motor, shares_used, write
 from samples.command_line import REPOSITORY
 from samples.marks import slow
 
@@ -26,7 +26,7 @@ from vsacli import (
     size_drives,
 )
 from vsacli.studies.sizing import sized_text
-from vsacli.studies.sizing.catalogue import read_catalogue
+from vsacli.studies.sizing.catalog import read_catalog
 from vsacli.studies.sizing.choices import choices
 from vsacli.studies.sizing.ratios import Gears
 
@@ -168,7 +168,7 @@ def test_a_turntable_in_closed_form(turntable, tmp_path):
     low, high = np.array([roots(most / fastest), roots(lasting * math.sqrt(2) / fastest)]).T
     assert best.low == pytest.approx(low.max(), rel=1e-6)  # samples miss the peaks by 1e-6 of them
     assert best.high == pytest.approx(high.min(), rel=1e-6)
-    assert sizing.criterion == "utilisation"
+    assert sizing.criterion == "utilization"
     assert best.ratio == pytest.approx(math.sqrt(INERTIA / rotor), rel=1e-4)  # to four digits
 
 
@@ -177,7 +177,7 @@ def test_the_gear_of_least_copper_loss_in_closed_form(turntable, tmp_path):
     motor = {"name": "m", "inertia": rotor, "max_torque": 5, "torque_constant": 0.1, "resistance": 0.5}
     sizing = size_drives(turntable[0], [turntable[1]], write(tmp_path / "m.csv", [motor]))
     best = sizing.motors[0].best
-    assert sizing.criterion == "copper"
+    assert sizing.criterion == "copper_loss"
     assert best.ratio == pytest.approx(math.sqrt(INERTIA / rotor), rel=1e-3)  # it is rounded to four digits
     rms = 2 * math.sqrt(INERTIA * rotor) * REACH * FREQUENCY**2 / math.sqrt(2)
     assert best.copper_loss == pytest.approx(0.5 / 0.1**2 * rms**2, rel=1e-6)
@@ -189,7 +189,7 @@ def test_ranges_of_gears_against_a_dense_scan(seed, tmp_path):
     rng = np.random.default_rng(seed)
     robot, trajectory = shipped(["hardening_1r", "awas_1r", "coupled_1r", "maccepa_1r"][seed % 4])
     motors = {name: random_motor(rng, name) for name in "abcdef"}
-    criterion = [None, "utilisation"][seed % 2]
+    criterion = [None, "utilization"][seed % 2]
     sizing = size_drives(robot, [trajectory], write(tmp_path / "m.csv", list(motors.values())), (), criterion)
     for place in sizing.motors:
         few = slice(None, None, 10)  # plain Python takes a microsecond a sample
@@ -211,10 +211,10 @@ def test_ranges_of_gears_against_a_dense_scan(seed, tmp_path):
                 assert choice.does, "any gear will do"
 
 
-@pytest.mark.parametrize("criterion", ["copper", "utilisation", "mass"])
+@pytest.mark.parametrize("criterion", ["copper_loss", "utilization", "mass"])
 @pytest.mark.parametrize("coupling", [0.001, 0.05, 0.3])
 def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(criterion, coupling, tmp_path):
-    """All pairs of the catalogue, each tried by building the robot with it."""
+    """All pairs of the catalog, each tried by building the robot with it."""
     robot, trajectory = shipped("awas_1r")
     motor = {"joints.0.actuator.motor": [{"inertia": 2.0, "damping": 0.1}, {"inertia": 0.5, "damping": 0.1}]}
     robot = robot.replace(motor).replace("joints.0.actuator.coupled_inertia", coupling)
@@ -226,7 +226,7 @@ def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(crit
     ]
     path = write(tmp_path / "m.csv", rows)
     sizing = size_drives(robot, [trajectory], path, ["100"], criterion)
-    motors = read_catalogue(path).records
+    motors = read_catalog(path).records
     first, second = (choices(each.demand, motors, Gears.read("100"), criterion) for each in sizing.motors)
 
     def buildable(one, other):
@@ -240,10 +240,10 @@ def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(crit
 
     def key(one, other):
         costs = [
-            {"copper": each.copper_loss, "utilisation": each.largest[1], "mass": each.mass}[criterion]
+            {"copper_loss": each.copper_loss, "utilization": each.largest[1], "mass": each.mass}[criterion]
             for each in (one, other)
         ]
-        return max(costs) if criterion == "utilisation" else sum(costs)
+        return max(costs) if criterion == "utilization" else sum(costs)
 
     assert all(choice.does for choice in (*first, *second))
     pairs = [(one, other) for one in first for other in second if buildable(one, other)]

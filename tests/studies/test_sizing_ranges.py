@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.sizing import CatalogueMotor
+from vsacli.studies.sizing import CatalogMotor
 from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.ratios import ratios_within, shares
 from vsacli.studies.sizing.shaft import Shaft
@@ -80,7 +80,7 @@ def test_ranges_are_where_no_limit_is_exceeded(seed: int) -> None:
 def test_where_load_and_rotor_cancel_nothing_is_asked_of_the_motor() -> None:
     """J n a + load/n vanishes at n^2 = -load/(J a), about which the mean square is lost in rounding."""
     demand = demand_of(np.zeros(1), np.full(1, 2.0), np.full(1, -3.0), np.ones(1))
-    motor = CatalogueMotor(name="m", inertia=1e-3, continuous_torque=0.01)
+    motor = CatalogMotor(name="m", inertia=1e-3, continuous_torque=0.01)
     found = ratios_within(demand, Shaft.of([motor.shaft]))
     # the roots of 0.002 n^2 -+ 0.01 n - 3
     ends = [(sign * 0.01 + math.sqrt(1e-4 + 0.024)) / 0.004 for sign in (-1, 1)]

@@ -65,7 +65,7 @@ def test_measured_derivatives_may_be_noisy():
     ],
 )
 @pytest.mark.parametrize("order", [slow(1), 2, slow(4)])
-def test_another_scale_is_recognised(order, factor, said):
+def test_another_scale_is_recognized(order, factor, said):
     given = [columns(k) for k in range(1, order + 1)]
     given[-1][:, 1] *= factor
     (sentence,) = complaints(*given, noise=1e-6)

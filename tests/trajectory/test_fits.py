@@ -160,7 +160,7 @@ def test_refined_solution_keeps_the_digits():
 
 
 def score(time, row, spans, degree=7):
-    """Generalised cross-validation, a coefficient counting 1.4 times."""
+    """Generalized cross-validation, a coefficient counting 1.4 times."""
     knots = np.concatenate([[0] * degree, np.linspace(0, time[-1], spans + 1), [time[-1]] * degree])
     error = row - make_lsq_spline(time, row, knots, k=degree)(time)
     return np.sum(error**2) / (1 - 1.4 * (spans + degree) / len(time)) ** 2

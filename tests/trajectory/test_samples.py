@@ -81,8 +81,8 @@ def test_derivatives_are_smooth_to_rounding_within_a_span():
     time = np.linspace(0, 1, 1001)
     smooth = profile(POSITION, time, sine(time, 0))
     step = 2.0**-14  # a sixteenth of the sample step
-    centre = 0.5005
-    rows = smooth.at(centre + step * np.arange(-3, 4))
+    center = 0.5005
+    rows = smooth.at(center + step * np.arange(-3, 4))
     for order in range(4):
         # up to the fifth degree this difference formula is exact, so only rounding of the values is left
         difference = rows[order, 0] @ np.array([-1, 9, -45, 0, 45, -9, 1]) / 60 / step

@@ -1,4 +1,4 @@
-"""Smoothing splines for records with noise of any colour: right, or said not to be."""
+"""Smoothing splines for records with noise of any color: right, or said not to be."""
 
 from contextlib import nullcontext
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from samples.marks import slow_but
 from samples.noisy_records import (
-    COLOURS,
+    COLORS,
     FILTERED,
     MOTIONS,
     Record,
@@ -25,7 +25,7 @@ from scipy.interpolate import BSpline
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, resolution
 from vsacli.trajectory.fits.bins import Bins, Moments, uniform_basis
 from vsacli.trajectory.fits.noise import Lines, filtered_noise, spectral_lines
-from vsacli.trajectory.fits.penalised import Model
+from vsacli.trajectory.fits.penalized import Model
 from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
@@ -48,15 +48,13 @@ def alarmed(fit):
     return known is not None and bool(not known.determined or known.lines.others)
 
 
-@pytest.mark.parametrize(
-    "colour", ["white, 1e-4 rad", "12-bit encoder", *list(COLOURS)[5:9:3], "hum of 50 Hz"]
-)
-def test_sines_with_noise_of_any_colour(colour):
-    of = record(sines, colour, 0)
+@pytest.mark.parametrize("color", ["white, 1e-4 rad", "12-bit encoder", *list(COLORS)[5:9:3], "hum of 50 Hz"])
+def test_sines_with_noise_of_any_color(color):
+    of = record(sines, color, 0)
     for method in (SMOOTH, None):
         fit = fitted(of, method)
         assert fit.parts[0].smooth
-        # the error was at most 1.6 % for twelve colours and five seeds
+        # the error was at most 1.6 % for twelve colors and five seeds
         assert error(fit, of) < 0.03
         assert not alarmed(fit)
 
@@ -74,22 +72,22 @@ def test_clean_samples_are_interpolated_in_silence(motion, rate):
 
 
 @pytest.mark.parametrize("motion", slow_but({"sweep to 4 Hz", "velocity steps, 50 ms"}, MOTIONS))
-@pytest.mark.parametrize("colour", FILTERED)
-def test_filtered_noise_is_found(colour, motion):
+@pytest.mark.parametrize("color", FILTERED)
+def test_filtered_noise_is_found(color, motion):
     for seed in range(2):
-        of = record(MOTIONS[motion], colour, seed)
+        of = record(MOTIONS[motion], color, seed)
         assert filtered_noise(of.time, of.values[None], 8).all()
 
 
 @pytest.mark.parametrize(
-    ("motion", "colour"),
+    ("motion", "color"),
     [
         (pauses, "12 bits, zero-phase 50 Hz"),
         pytest.param(velocity_steps, "zero-phase low-pass, 20 Hz", marks=pytest.mark.slow),
     ],
 )
-def test_what_a_record_does_not_determine_is_said(motion, colour):
-    of = record(motion, colour, 1)
+def test_what_a_record_does_not_determine_is_said(motion, color):
+    of = record(motion, color, 1)
     fit = fitted(of)
     # 15 and 30 to 60 %
     assert error(fit, of) > 0.1
@@ -97,10 +95,10 @@ def test_what_a_record_does_not_determine_is_said(motion, colour):
 
 
 @pytest.mark.parametrize(
-    ("method", "colour"), [(INTERPOLATE, "zero-phase low-pass, 20 Hz"), (LEAST_SQUARES, "first order 0.9")]
+    ("method", "color"), [(INTERPOLATE, "zero-phase low-pass, 20 Hz"), (LEAST_SQUARES, "first order 0.9")]
 )
-def test_a_fit_that_was_asked_for_is_judged_all_the_same(method, colour):
-    of = record(sines, colour, 2)
+def test_a_fit_that_was_asked_for_is_judged_all_the_same(method, color):
+    of = record(sines, color, 2)
     trajectory = Trajectory.from_samples(of.time, of.values[:, None], fit=method)
     assert trajectory.fits[0]["columns"][0]["method"] == method
     undetermined = "d4q of column 0 is not determined by the record to 10 %"
@@ -155,7 +153,7 @@ def test_spline_is_six_times_continuously_differentiable_and_stretches():
 
 @pytest.mark.parametrize("degree", [5, 7])
 def test_estimate_is_that_of_dense_algebra(degree):
-    """The penalised least squares of whitened bins, the restricted likelihood, and the deviations."""
+    """The penalized least squares of whitened bins, the restricted likelihood, and the deviations."""
     time = np.sort(np.random.default_rng(1).uniform(0, 2, 300))
     row = np.sin(3 * time) + 0.01 * np.random.default_rng(2).standard_normal(300)
     bins = Bins.of(Moments.of(time, row, 40, degree))
@@ -272,13 +270,13 @@ def test_noise_that_is_known_is_not_estimated():
     """A motion of 2 Hz too small for the noise: one that is said to be small makes it motion."""
     time = np.arange(10001) / 1000
     row = 1e-3 * np.random.default_rng(0).standard_normal(len(time))
-    for colour, correlation in (("white", 0.0), ("first order", 0.9)):
+    for color, correlation in (("white", 0.0), ("first order", 0.9)):
         values = np.sin(time) + (first_order(row, correlation) if correlation else row)
         free = fit_samples(time, values[None], 7, 4, SMOOTH)
         known = fit_samples(time, values[None], 7, 4, SMOOTH, noise=np.array([1e-3]))
         # what is known of it is true, so little changes
         deviations = [fit.parts[0].smoothing.deviations[0] for fit in (free, known)]
-        assert deviations[1] == pytest.approx(deviations[0], rel=0.5), colour
+        assert deviations[1] == pytest.approx(deviations[0], rel=0.5), color
         assert known.noise[0] == 1e-3
 
 
@@ -297,12 +295,12 @@ def test_a_stiffness_with_filtered_noise():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("colour", COLOURS)
-def test_no_record_is_wrong_in_silence(colour):
+@pytest.mark.parametrize("color", COLORS)
+def test_no_record_is_wrong_in_silence(color):
     """A part of the tables of the documentation, which tests/benchmarks/torques.py makes."""
     shown = []
     for motion in (sines, pauses, sweep):
-        of = record(motion, colour, 300)
+        of = record(motion, color, 300)
         fit = fitted(of)
         assert alarmed(fit) or error(fit, of) < 0.1
         assert motion is pauses or not alarmed(fit)
@@ -310,7 +308,7 @@ def test_no_record_is_wrong_in_silence(colour):
         deviation = np.sqrt(fit.covariance(of.time[inside])[0, 4, 4])
         off = fit.at(of.time, 5)[4, 0][inside] - of.truth[1][inside]
         shown.append(np.mean(np.abs(off) < 2 * deviation))
-    # of single records it was 80 % at least, of all of a colour 96 % and more
+    # of single records it was 80 % at least, of all of a color 96 % and more
     assert min(shown) > 0.8
     assert np.mean(shown) > 0.9
 

@@ -199,12 +199,12 @@ class Actuator(ABC):
             yield LimitCheck(Flag.VOLTAGE_LIMIT, "voltage", number, within(motor.max_voltage or math.inf))
 
     @abstractmethod
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
         """Compute the springs and the motion of the motors for a command.
 
         Args:
             command: Motion and elastic torque of the joint; arrays (samples,).
-            near_singular: Margin below which a sample is near-singular.
+            min_margin: Margin below which a sample is near-singular.
             integrated: Deflections phi to use instead of those that `solve` finds, NaN where there are none;
                 only for kinds that are `integrable`.
 

@@ -136,14 +136,14 @@ class Antagonistic(Actuator):
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:
         return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
         """Compute deflections on the actuator's branch, their rates, and motor accelerations.
 
         See `Actuator.transmit`.
         """
         solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
         stiffness = command.commanded["stiffness"]
-        phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
+        phi, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)
         moved = self._moved(command, solution, reached, phi)
         if self.coupling is None:
             return moved

@@ -158,7 +158,7 @@ class DampedSprings:
         rate = springs.state.torque_rate(self._coordinates(command.dq, dtheta))[..., 0]
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
-    def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> OfJoint:
+    def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> OfJoint:
         """Compute stiffness, motor motion and spring torques of an internal motion; see `Actuator.transmit`.
 
         The attainable range is that at the springs' torque. A sample is singular where the pivot is zero, not
@@ -169,7 +169,7 @@ class DampedSprings:
         if rate is None or acceleration is None:
             rate, acceleration = self.driven(phi, command)
         springs = self._springs(phi, command.q)
-        lower, upper, reached = self._reach(springs, phi, command, near_singular)
+        lower, upper, reached = self._reach(springs, phi, command, min_margin)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
         dtheta = self._velocities(springs, velocity, command)
         rates = self._coordinates(command.dq, dtheta)
@@ -196,7 +196,7 @@ class DampedSprings:
         }
 
     def _reach(
-        self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float
+        self, springs: _Springs, phi: FloatArray, command: Command, min_margin: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
         """Return minimum and maximum stiffness at the torque of the springs, and the reach of the samples."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
@@ -205,7 +205,7 @@ class DampedSprings:
             return none, none, Reach(lost, never, never, never)
         stiffness = command.commanded[STIFFNESS.key]
         solution = self._actuator.solve(springs.state.tau_e[..., 0], stiffness, command.q)
-        reached = reach(stiffness, solution, near_singular)
+        reached = reach(stiffness, solution, min_margin)
         margin = self._margin(springs, stiffness)
         return (
             solution.lower,
@@ -214,7 +214,7 @@ class DampedSprings:
                 infeasible=reached.infeasible | lost,
                 slack=reached.slack,
                 singular=margin <= SINGULAR_MARGIN,
-                near_singular=(margin > SINGULAR_MARGIN) & (margin < near_singular),
+                near_singular=(margin > SINGULAR_MARGIN) & (margin < min_margin),
             ),
         )
 

@@ -114,7 +114,7 @@ class Elastic(Actuator):
         torques = endless if self.spring is None else self.spring.torque_range
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
-    def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
         """Compute the deflection at which the spring carries tau_e, and its derivatives."""
         return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, has, marked
+from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, has, marked
 from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
@@ -158,10 +158,8 @@ class Reach(NamedTuple):
         return reduce(operator.or_, others, first)
 
 
-def reach(
-    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
-) -> Reach:
-    """Compare a stiffness with its attainable range; margins below `near_singular` count as near-singular."""
+def reach(stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN) -> Reach:
+    """Compare a stiffness with its attainable range; margins below `min_margin` count as near-singular."""
     # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular.
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
@@ -171,26 +169,24 @@ def reach(
         infeasible=infeasible,
         slack=infeasible & at_lower & solution.slack_below,
         singular=critical & (np.abs(gap) <= SINGULAR_MARGIN),
-        near_singular=critical & (gap > SINGULAR_MARGIN) & (gap < near_singular),
+        near_singular=critical & (gap > SINGULAR_MARGIN) & (gap < min_margin),
     )
 
 
 def deflections_within_reach(
-    stiffness: FloatArray, solution: PairSolution, near_singular: float, integrated: FloatArray | None
+    stiffness: FloatArray, solution: PairSolution, min_margin: float, integrated: FloatArray | None
 ) -> tuple[FloatArray, Reach]:
     """Return the deflections (61), (2, samples), NaN at infeasible samples, and the reach.
 
     Integrated deflections replace those of the solution; samples where they are NaN are infeasible.
     """
-    reached = reach(stiffness, solution, near_singular)
+    reached = reach(stiffness, solution, min_margin)
     if integrated is not None:
         reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
     phi = solution.deflections if integrated is None else integrated
     return np.where(reached.infeasible, np.nan, phi), reached
 
 
-def reach_flags(
-    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
-) -> FlagArray:
+def reach_flags(stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN) -> FlagArray:
     """Return the bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the samples of a joint, (samples,)."""
-    return reach(stiffness, solution, near_singular).flags
+    return reach(stiffness, solution, min_margin).flags

@@ -43,7 +43,7 @@ class Rigid(Actuator):
         """The one motor."""
         return (self.motor.at_joint,)
 
-    def transmit(self, command: Command, _near_singular: float, _integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
         """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(

@@ -141,7 +141,7 @@ class Serial(Actuator):
         """Return theta_1 = phi + q, and theta_2, which is the setting."""
         return np.stack((phi[0] + q, phi[1]))
 
-    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
         """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
 
         NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
@@ -150,7 +150,7 @@ class Serial(Actuator):
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
         )
         solution = self.solve(command.tau_e, stiffness, command.q)
-        phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
+        phi, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)
         state = self._state(phi, command.q)
         rates = np.where(
             reached.singular[..., None], np.nan, state.rates(command.dtau_e, dstiffness, command.dq)

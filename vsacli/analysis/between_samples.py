@@ -91,7 +91,7 @@ class Between:
     Args:
         robot: Robot.
         trajectory: Trajectory of the run.
-        near_singular: Margin that is flagged.
+        min_margin: Margin that is flagged.
         compute: Function that computes the block of a motion.
         judged: Function that corrects the flags of a block for uncertainty.
 
@@ -104,7 +104,7 @@ class Between:
         self,
         robot: Robot,
         trajectory: Trajectory,
-        near_singular: float,
+        min_margin: float,
         compute: Callable[[Motion], Block],
         judged: Callable[[Block], Block] = lambda block: block,
     ) -> None:
@@ -114,7 +114,7 @@ class Between:
         self._joints = len(robot.joints)
         self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=np.uint32)
-        self._flagged = np.array([0.0 if quantity.limit else near_singular for quantity in self.quantities])
+        self._flagged = np.array([0.0 if quantity.limit else min_margin for quantity in self.quantities])
         self._lowest = [np.empty(0)] * len(self.quantities)
         self._least_at_steps = np.full(len(self.quantities), np.inf)
         self._least_between: dict[int, tuple[float, Worst]] = {}

@@ -66,8 +66,8 @@ class Report(Stored):
 
     @property
     def deflections(self) -> str:
-        """Method for the deflections: "root" of (14) at each sample, or "integrate"."""
-        return "integrate" if self.drifts else "root"
+        """Method for the deflections: "root" of (14) at each sample, or "ode"."""
+        return "ode" if self.drifts else "root"
 
     def as_text(self, hint: str = "") -> ReportText:
         """Return the report in its parts, as people read it.

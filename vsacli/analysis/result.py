@@ -125,9 +125,9 @@ class Result(Shown, Block):
         Raises:
             ModuleNotFoundError: Xarray is not installed; the message says how to install it.
         """
-        from vsacli.results.exports.formats import labelled_dataset
+        from vsacli.results.exports.formats import labeled_dataset
 
-        return labelled_dataset(self.arrays(), self.robot.joint_names, self.robot.joint_types)
+        return labeled_dataset(self.arrays(), self.robot.joint_names, self.robot.joint_types)
 
 
 class ResultFile(Shown, StoredResult):
@@ -190,9 +190,9 @@ class ResultFile(Shown, StoredResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all variables of the file as an `xarray.Dataset`; see `Result.to_xarray`."""
-        from vsacli.results.exports.formats import labelled_dataset
+        from vsacli.results.exports.formats import labeled_dataset
 
-        return labelled_dataset(self.arrays(), self.joint_names, self.joint_types)
+        return labeled_dataset(self.arrays(), self.joint_names, self.joint_types)
 
 
 def open_result(path: str | os.PathLike[str]) -> ResultFile:

@@ -22,7 +22,7 @@ from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
+from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
     from vsacli.dynamics.internal_motion import InternalMotions
 
-DEFLECTIONS = ("root", "integrate")
+DEFLECTION_SOLVERS = ("root", "ode")
 """Methods for deflections: the root of (14) at each sample, or integration of (19) from the first root."""
 
 
@@ -53,8 +53,8 @@ class Run:
         trajectory: Commanded motion.
         stop_on_infeasible: Whether to end with the first infeasible sample, as the paper's algorithm does;
             also with the sample nearest to an infeasible point between samples.
-        near_singular: Margin below which a sample is near-singular.
-        deflections: "root" solves (14) at each sample; "integrate" follows the root of the first sample by
+        min_margin: Margin below which a sample is near-singular.
+        deflection_solver: "root" solves (14) at each sample; "ode" follows the root of the first sample by
             (19); or deflections that were integrated before.
         block_samples: Samples in a block, `usual_block` if None; results do not depend on it.
         engine: Backend, one of `vsacli.compute.engine.NAMES`.
@@ -77,28 +77,28 @@ class Run:
         trajectory: Trajectory,
         *,
         stop_on_infeasible: bool = False,
-        near_singular: float = NEAR_SINGULAR_MARGIN,
-        deflections: str | IntegratedDeflections = "root",
+        min_margin: float = MIN_MARGIN,
+        deflection_solver: str | IntegratedDeflections = "root",
         block_samples: int | None = None,
         engine: str = "numpy",
         threads: int | None = None,
         asked: Collection[str] = (JUDGED,),
         tell: Tell = unheard,
     ) -> None:
-        check_near_singular(near_singular)
+        check_min_margin(min_margin)
         trajectory = fitted(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
-        self._near_singular = near_singular
+        self._min_margin = min_margin
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
-        self._deflections = _integrated(deflections, robot, trajectory)
+        self._deflections = _integrated(deflection_solver, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self._internal = _internal_motions(robot, trajectory)
         inside = () if self._internal is None else self._internal.joints
         integrated = self._deflections is not None
         self._kernel = BalancedDynamics(
-            robot, frame, near_singular=near_singular, integrated=integrated, internal=inside
+            robot, frame, min_margin=min_margin, integrated=integrated, internal=inside
         )
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
@@ -108,7 +108,7 @@ class Run:
         self._energy = RunEnergy(robot, self.choice.engine)
         self._passages = FrictionPassages(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
-        self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
+        self._between = Between(robot, trajectory, min_margin, self._compute, self._judged)
         self._balances = BalanceCheck(robot, trajectory.samples)
         self._samples = 0
         self._stopped = False
@@ -180,8 +180,8 @@ class Run:
         """Engine and options, for repeating the run."""
         options = {
             "stop_on_infeasible": self._stop_on_infeasible,
-            "near_singular": self._near_singular,
-            "deflections": "root" if self._deflections is None else "integrate",
+            "min_margin": self._min_margin,
+            "deflection_solver": "root" if self._deflections is None else "ode",
         }
         return {**self.choice.provenance, "options": json.dumps(options)}
 
@@ -239,7 +239,7 @@ def inverse_dynamics(
     trajectory: Trajectory,
     *,
     stop_on_infeasible: bool = False,
-    deflections: str | IntegratedDeflections = "root",
+    deflection_solver: str | IntegratedDeflections = "root",
     engine: str = "numpy",
 ) -> Result:
     """Compute the motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
@@ -250,7 +250,7 @@ def inverse_dynamics(
         robot: Robot, from `load_robot` or built in Python.
         trajectory: Trajectory for this robot, from `load_trajectory` or `Trajectory.from_samples`.
         stop_on_infeasible: Whether to end with the first infeasible sample.
-        deflections: "root" solves (14) at each sample; "integrate" follows the root of the first sample by
+        deflection_solver: "root" solves (14) at each sample; "ode" follows the root of the first sample by
             (19); or deflections that were integrated before.
         engine: Backend: "numpy", compiled "c", or "auto", which uses compiled code where that saves time.
 
@@ -264,20 +264,25 @@ def inverse_dynamics(
     from vsacli.analysis.result import Result
 
     run = Run(
-        robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
+        robot,
+        trajectory,
+        stop_on_infeasible=stop_on_infeasible,
+        deflection_solver=deflection_solver,
+        engine=engine,
     )
     return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
 def _integrated(
-    deflections: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
+    deflection_solver: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
 ) -> IntegratedDeflections | None:
     """Return the deflections to use instead of the root of (14) at each sample; None for the root."""
-    if not isinstance(deflections, str):
-        return deflections
-    if deflections not in DEFLECTIONS:
-        raise InputError.one(f"unknown deflections {deflections!r}{did_you_mean(deflections, DEFLECTIONS)}")
-    if deflections == "root":
+    if not isinstance(deflection_solver, str):
+        return deflection_solver
+    if deflection_solver not in DEFLECTION_SOLVERS:
+        hint = did_you_mean(deflection_solver, DEFLECTION_SOLVERS)
+        raise InputError.one(f"unknown deflection solver {deflection_solver!r}{hint}")
+    if deflection_solver == "root":
         return None
     from vsacli.dynamics.integrated_deflections import integrate_deflections
 

@@ -117,7 +117,7 @@ def _rank(kind: str) -> tuple[int, int]:
     """Return the place of a kind of problem in a report; limits in the order of their flags."""
     if kind in GRAVEST:
         return 0, GRAVEST.index(kind)
-    return (2, 0) if kind == "near_singular" else (1, Flag.labelled(kind).value)
+    return (2, 0) if kind == "near_singular" else (1, Flag.labeled(kind).value)
 
 
 def _size(joint: JointReport, kind: str) -> tuple[float, int]:
@@ -222,7 +222,7 @@ def _limit(joint: JointReport, worst: Worst, _samples: int) -> str:
 
 def excess(worst: Worst) -> str:
     """Return by how much a limit is exceeded, and where."""
-    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
+    whose = Flag.labeled(worst.kind).quantity_of(worst.motor)
     value, bound = apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
     when = f"at t = {time_text(worst.time)}"

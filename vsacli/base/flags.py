@@ -16,7 +16,7 @@ from vsacli.base.errors import InputError
 SINGULAR_MARGIN = 1e-9
 """Relative margin that counts as zero: deflections are accurate to about 1e-16/margin, so to 1e-7 here."""
 
-NEAR_SINGULAR_MARGIN = 0.01
+MIN_MARGIN = 0.01
 """Relative margin to a critical point below which a sample is near-singular; the paper's runs keep 3 %."""
 
 
@@ -77,7 +77,7 @@ class Flag(enum.IntFlag):
         return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
 
     @classmethod
-    def labelled(cls, label: str) -> Flag:
+    def labeled(cls, label: str) -> Flag:
         """Return the flag with this label."""
         return cls[label.upper()]
 
@@ -108,14 +108,13 @@ def not_finite_flags(where: BoolArray) -> FlagArray:
     return marked(Flag.NOT_FINITE | Flag.INFEASIBLE, where)
 
 
-def check_near_singular(threshold: float) -> None:
-    """Refuse a threshold for near-singular samples that is not above `SINGULAR_MARGIN` and below 1.
+def check_min_margin(min_margin: float) -> None:
+    """Refuse a minimum margin that is not above `SINGULAR_MARGIN` and below 1.
 
     Raises:
         InputError: with the allowed interval.
     """
-    if not SINGULAR_MARGIN < threshold < 1:
+    if not SINGULAR_MARGIN < min_margin < 1:
         raise InputError.one(
-            f"the near-singular margin must lie between {SINGULAR_MARGIN:g} and 1, as 0.01 does, "
-            f"not {threshold:g}"
+            f"the minimum margin must lie between {SINGULAR_MARGIN:g} and 1, e.g. 0.01, not {min_margin:g}"
         )

@@ -8,7 +8,7 @@ import click
 
 from vsacli.cli.command_parts import (
     compute,
-    deflections_option,
+    deflection_solver_option,
     engine_options,
     example,
     json_option,
@@ -23,6 +23,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.option_types import SHARE
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -42,12 +43,11 @@ if TYPE_CHECKING:
 @json_option
 @stop_option
 @click.option(
-    "--near-singular",
-    metavar="MARGIN",
-    type=float,
-    help="Relative margin below which a step is near-singular; by default 0.01.",
+    "--min-margin",
+    type=SHARE,
+    help="Relative margin below which a step is near-singular, e.g. 3%; by default 1%.",
 )
-@deflections_option
+@deflection_solver_option
 @click.option(
     "--plot",
     "plot_folder",
@@ -78,8 +78,8 @@ def check_feasibility(
     changes: tuple[str, ...],
     as_json: bool,
     stop_on_infeasible: bool,
-    near_singular: float | None,
-    deflections: str,
+    min_margin: float | None,
+    deflection_solver: str,
     plot_folder: str | None,
     list_fixes: bool,
     number: int | None,
@@ -94,10 +94,10 @@ def check_feasibility(
     The same computation as invdyn, and the same report. Exit code 0 if every step is feasible, regular and
     within limits, and a record, if there is one, determines that; else 3.
 
-    --fixes lists changes after which it can: slower, another stiffness (by a constant, or as a smooth
-    profile), another branch, or several of these together, so that every step keeps the near-singular margin
-    and all limits. The list begins with the smallest change; each fix was confirmed by a run of its own. With
-    --write-fix N -o FILE, FILE is the trajectory with fix N of the list.
+    --fixes lists changes that make it executable: a slower motion, another stiffness (by a constant or as a
+    smooth profile), another branch, or several of these, so that every sample keeps --min-margin and all
+    limits. The smallest change comes first; each is confirmed by a run. --write-fix N -o FILE writes the
+    trajectory with fix N of the list.
     """
     if number is not None and output is None:
         raise click.UsageError(f"--write-fix {number} needs -o FILE, the trajectory file to write")
@@ -107,20 +107,20 @@ def check_feasibility(
         raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+    from vsacli.base.flags import MIN_MARGIN, check_min_margin
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import check_fixed_target, fixes
 
-    margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
-    check_near_singular(margin)
+    min_margin = MIN_MARGIN if min_margin is None else min_margin
+    check_min_margin(min_margin)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
-            near_singular=margin,
-            deflections=deflections,
+            min_margin=min_margin,
+            deflection_solver=deflection_solver,
             engine=engine,
             threads=threads,
             asked=("flags",),
@@ -130,7 +130,7 @@ def check_feasibility(
             report = compute(run, talk)
         else:
             report = _compute_and_draw(run, plot_folder, run_stem(robot, trajectory), outputs, talk)
-        found = fixes(*inputs, margin) if list_fixes or output is not None else None
+        found = fixes(*inputs, min_margin) if list_fixes or output is not None else None
         if found is not None and output is not None and number is not None:
             _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)

@@ -15,6 +15,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
+from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -72,9 +73,9 @@ robot_argument = click.argument("robot", type=FILE)
 trajectory_argument = click.argument("trajectory", type=FILE)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
-deflections_option = click.option(
-    "--deflections",
-    type=click.Choice(["root", "integrate"]),
+deflection_solver_option = click.option(
+    "--deflection-solver",
+    type=Words(["root", "ode"]),
     default="root",
     show_default=True,
     help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
@@ -131,7 +132,7 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
     threads = click.option(
         "--threads",
         type=click.IntRange(min=1),
-        metavar="COUNT",
+        metavar="N",
         help="Threads of compiled code; by default one a processor.",
     )
     return engine_option(threads(command))

@@ -40,10 +40,11 @@ overflows."""
 @click.argument("result", type=FILE)
 @click.argument("recording", type=FILE)
 @click.option(
-    "--begins-at",
+    "--time-offset",
     metavar="SECONDS",
     type=float,
-    help="When in the recording the result begins, from its first row on; by default found from the signals.",
+    help="Time in the recording at which the result begins, positive if the recording starts earlier; by "
+    "default found from the signals.",
 )
 @columns_option
 @json_option
@@ -54,7 +55,7 @@ overflows."""
 def compare(
     result: str,
     recording: str,
-    begins_at: float | None,
+    time_offset: float | None,
     columns: str | None,
     as_json: bool,
     folder: str | None,
@@ -84,7 +85,7 @@ def compare(
         page = page_asked_for(folder, file_format, f"{stem}-comparison", outputs)
         with open_stored(result) as stored:
             talk.detail(result_line(stored))
-            comparison = compared(stored, recording, begins_at, columns)
+            comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
                 page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
         if page is None and folder is not None:

@@ -78,7 +78,6 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 )
 @click.option(
     "--start",
-    metavar="RESULT",
     type=FILE,
     help="Of a robot as MJCF: add a key frame, `start`, with the first step of this result.",
 )
@@ -107,9 +106,9 @@ def export(
     Of a robot, URDF holds links and joints. MJCF holds motors and springs as well; forces for which it has no
     place go to a Python file beside it, FILE_forces.py.
     """
-    from vsacli.files.file_kinds import FileKind, recognise
+    from vsacli.files.file_kinds import FileKind, recognize
 
-    kind = recognise(file)
+    kind = recognize(file)
     output = None if output == STANDARD else output
     if kind is FileKind.ROBOT:
         _check_options()

@@ -31,7 +31,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.argument("recordings", type=FILE, nargs=-1, metavar="RECORDING...")
 @click.option(
     "--fit",
-    metavar="WORDS",
+    metavar="NAMES",
     callback=words_of("springs,motors"),
     help="What to find, of springs, motors, friction, links; or paths such as "
     "'joints.*.actuator.spring.k'. All by default.",
@@ -51,7 +51,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 )
 @click.option(
     "--duration",
-    metavar="S",
+    metavar="SECONDS",
     type=float,
     help=f"Of the planned trajectory; {USUAL_DURATION:g} s by default.",
 )

@@ -21,9 +21,7 @@ from vsacli.cli.file_names import FILE, FOLDER
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
 @click.argument("file", type=FILE, required=False)
-@click.option(
-    "--robot", metavar="ROBOT", type=FILE, help="The robot that a trajectory is for, or a recording of."
-)
+@click.option("--robot", type=FILE, help="The robot that a trajectory is for, or a recording of.")
 @click.option(
     "--rate",
     metavar="HZ",

@@ -12,7 +12,7 @@ import click
 from vsacli.cli.command_parts import (
     Inputs,
     compute,
-    deflections_option,
+    deflection_solver_option,
     engine_options,
     example,
     json_option,
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
 )
-@deflections_option
+@deflection_solver_option
 @json_option
 @overwrite_option
 @stop_option
@@ -82,7 +82,7 @@ def invdyn(
     variables: tuple[str, ...] | None,
     precision: str,
     plot_folder: str | None,
-    deflections: str,
+    deflection_solver: str,
     as_json: bool,
     overwrite: bool,
     stop_on_infeasible: bool,
@@ -112,7 +112,7 @@ def invdyn(
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
-            deflections=deflections,
+            deflection_solver=deflection_solver,
             engine=engine,
             threads=threads,
             asked=(JUDGED,) if variables is None else variables,

@@ -68,7 +68,7 @@ def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk:
     short_help="A trajectory, for a robot of yours or for a new one.",
     epilog=example("vsacli new trajectory --robot robots/rp_2.yaml -o move.yaml"),
 )
-@click.option("--robot", "robot_path", metavar="ROBOT", type=FILE, help="The robot that is to execute it.")
+@click.option("--robot", "robot_path", type=FILE, help="The robot that is to execute it.")
 @_output_option
 @overwrite_option
 @talk_options

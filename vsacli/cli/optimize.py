@@ -21,6 +21,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.option_types import SHARE, Words
 
 if TYPE_CHECKING:
     from vsacli.analysis.result import Result
@@ -35,16 +36,6 @@ CHANGE, PACE = "optimum", "pace"
 """Names of the figures."""
 
 
-def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
-    """Convert a share such as `3%` or `0.03`, as a click callback."""
-    if text is None:
-        return None
-    try:
-        return float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        raise click.BadParameter(f"expected a share such as 3% or 0.03, not {text!r}") from None
-
-
 @click.command(
     "optimize",
     short_help="Optimize the stiffness or the timing of a motion.",
@@ -57,7 +48,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @set_option
 @click.option(
     "--minimize",
-    type=click.Choice(["torque", "energy", "copper", "peak", "time"]),
+    type=Words(["torque", "energy", "copper_loss", "peak", "time"]),
     default="torque",
     show_default=True,
     help="Rms of motor torques, energy that motors spend, heat of their windings, peak of torques, duration.",
@@ -68,9 +59,8 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
     help="What may change: by default the stiffness, for time the timing.",
 )
 @click.option(
-    "--margin",
-    metavar="SHARE",
-    callback=_share,
+    "--min-margin",
+    type=SHARE,
     help="Relative margin that every step shall keep to the ends of its corridor, e.g. 3%; by default 1%.",
 )
 @click.option(
@@ -82,7 +72,14 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option(
     "--plot", "folder", type=FOLDER, help="Save figures of stiffness, torques and pace there, as png."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts drawn.")
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the starts drawn.",
+)
 @json_option
 @overwrite_option
 @talk_options
@@ -92,7 +89,7 @@ def optimize(
     changes: tuple[str, ...],
     minimize: str,
     vary: str | None,
-    margin: float | None,
+    min_margin: float | None,
     output: str | None,
     folder: str | None,
     seed: int,
@@ -102,12 +99,12 @@ def optimize(
 ) -> Exit:
     """Find the stiffness or the pace with which ROBOT executes TRAJECTORY at the least cost, or fastest.
 
-    Unless time is minimised, the motion takes as long as commanded. Every step keeps the margin and all
+    Unless time is minimized, the motion takes as long as commanded. Every step keeps the margin and all
     limits. What is found is a local optimum; the report says from how many starts the search came to it.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next
     inputs = load_inputs(robot, trajectory, talk, changes)
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.flags import MIN_MARGIN
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
@@ -127,7 +124,7 @@ def optimize(
                 *inputs,
                 minimize,
                 vary,
-                margin=NEAR_SINGULAR_MARGIN if margin is None else margin,
+                min_margin=MIN_MARGIN if min_margin is None else min_margin,
                 seed=seed,
                 progress=progress.update,
             )

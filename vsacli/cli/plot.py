@@ -53,7 +53,7 @@ RECORDING = "recording"
     callback=words_of("theta,dtheta"),
     help="A figure of each of these variables instead, e.g. theta,dtheta.",
 )
-@click.option("--robot", metavar="ROBOT", type=FILE, help="The robot that a recording is of.")
+@click.option("--robot", type=FILE, help="The robot that a recording is of.")
 @overwrite_option
 @talk_options
 def plot(
@@ -85,7 +85,7 @@ def plot(
 
     The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
     <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
-    Where runs were optimised, <stem>-cost is in place of the first two.
+    Where runs were optimized, <stem>-cost is in place of the first two.
 
     --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
     plots of every variable, and the robot at the time cursor; for results that fail the fixes, as
@@ -272,10 +272,10 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
 
 def is_recording(path: str) -> bool:
     """Return whether a file is a CSV table or a trajectory; False if its kind is unknown."""
-    from vsacli.files.file_kinds import FileKind, recognise
+    from vsacli.files.file_kinds import FileKind, recognize
 
     try:
-        return recognise(path) in (FileKind.TABLE, FileKind.TRAJECTORY)
+        return recognize(path) in (FileKind.TABLE, FileKind.TRAJECTORY)
     except (InputError, StorageError):
         return False  # readers of results and simulations report its problems
 

@@ -99,7 +99,7 @@ def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
 def _fix(result: StoredResult, talk: Talk) -> FixText | None:
     """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
     from vsacli.base.errors import InputError, StorageError
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.flags import MIN_MARGIN
     from vsacli.files.repetition import rebuilt
     from vsacli.results.pages import FixText
     from vsacli.studies.search import fixes
@@ -107,8 +107,8 @@ def _fix(result: StoredResult, talk: Talk) -> FixText | None:
     try:
         provenance = result.provenance()
         _check_version(provenance["generated_by"], result.path)
-        margin = provenance["options"].get("near_singular", NEAR_SINGULAR_MARGIN)
-        found = fixes(*rebuilt(result), margin)
+        min_margin = provenance["options"].get("min_margin", MIN_MARGIN)
+        found = fixes(*rebuilt(result), min_margin)
     except (InputError, StorageError) as error:
         reason = str(error).removeprefix(f"{result.path}: ")
         talk.note(f"{result.path}: no fixes on its page: {reason}")
@@ -137,15 +137,15 @@ def _check_version(made_by: str, path: Path) -> None:
 
 def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
     """Return announcement and command of the next step: write the first fix, or list all fixes again."""
-    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.flags import MIN_MARGIN
     from vsacli.base.texts import one_line
     from vsacli.documents.reading import written
 
     inputs = result.inputs()
     files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
     parts = ["vsacli", "check-feasibility", *files]
-    if found.near_singular != NEAR_SINGULAR_MARGIN:
-        parts += ["--near-singular", f"{found.near_singular}"]
+    if found.min_margin != MIN_MARGIN:
+        parts += ["--min-margin", f"{found.min_margin}"]
     changes = written({path: value for each in inputs for path, value in each.changes.items()})
     parts += [part for change in changes for part in ("--set", change)]
     if changes:

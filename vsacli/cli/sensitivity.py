@@ -58,11 +58,18 @@ SHOWN_FROM = 20_000
 @click.option(
     "--monte-carlo",
     "runs",
-    metavar="RUNS",
+    metavar="N",
     type=click.IntRange(min=2),
     help="Compute so many robots drawn from the tolerances as well.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of these draws.")
+@click.option(
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Seed of these draws.",
+)
 @click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time as HDF5.")
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of the ranking, and of the bands, there.")
 @json_option
@@ -94,14 +101,14 @@ def sensitivity(
     inputs = load_inputs(robot, trajectory, talk, changes)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        found = _analysed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
+        found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
         if folder is not None:
             _draw(found, inputs.robot, folder, run_stem(robot, trajectory), outputs)
     say(found, as_json)
     talk.wrote(outputs)
 
 
-def _analysed(
+def _analyzed(
     inputs: Inputs,
     patterns: tuple[str, ...],
     tolerances: str | None,
@@ -111,14 +118,14 @@ def _analysed(
     talk: Talk,
 ) -> Sensitivity:
     """Run the analysis; write the derivatives block by block if there is a file for them."""
-    from vsacli.studies.sensitivities import SensitivityRun, analysed
+    from vsacli.studies.sensitivities import SensitivityRun, analyzed
 
     run = SensitivityRun(*inputs, patterns)
     with ExitStack() as stack:
         writer = None if file is None else stack.enter_context(_writer(file, run))
         steps = inputs.trajectory.samples + runs
         progress = stack.enter_context(talk.progress(steps, shown_from=SHOWN_FROM))
-        found = analysed(
+        found = analyzed(
             run,
             tolerances,
             runs=runs,

@@ -28,6 +28,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.option_types import SHARE
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from vsacli.trajectory.trajectory import Trajectory
 
 PROGRESS_STEPS = 1000
-FEEDBACK = "feedback-linearization"
+FEEDBACK_LINEARIZATION = "feedback-linearization"
 
 
 class Options(NamedTuple):
@@ -56,8 +57,8 @@ class Options(NamedTuple):
     sensor_noise: tuple[float, ...] | None
     encoder_bits: int | None
     seed: int
-    measured: Any
-    tolerance: str
+    feedback: Any
+    goal_tolerance: str
     rtol: float
     atol: float
     budget: int | None
@@ -66,14 +67,14 @@ class Options(NamedTuple):
 @click.command(
     "simulate",
     short_help="Simulate the robot's full dynamics under a controller.",
-    epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --tolerance 2%"),
+    epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --goal-tolerance 2%"),
 )
 @robot_argument
 @trajectory_argument
 @set_option
 @click.option(
     "--controller",
-    type=click.Choice(["feedforward", FEEDBACK]),
+    type=click.Choice(["feedforward", FEEDBACK_LINEARIZATION]),
     default="feedforward",
     show_default=True,
     help="What sets the motor torques.",
@@ -99,10 +100,9 @@ class Options(NamedTuple):
 )
 @click.option(
     "--perturb",
-    metavar="ERROR",
-    type=float,
+    type=SHARE,
     default=0.0,
-    help="Largest relative error of each parameter of the controller's model, e.g. 0.05.",
+    help="Largest relative error of each parameter of the controller's model, e.g. 5%.",
 )
 @click.option(
     "--sensor-noise",
@@ -117,18 +117,19 @@ class Options(NamedTuple):
     type=int,
     help="Measured positions have 2^N steps in a turn of the joint, or of the motor's shaft; adds the same.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of errors of the model and noise.")
 @click.option(
-    "--measure",
-    "measured",
+    "--seed", metavar="N", type=int, default=0, show_default=True, help="Of errors of the model and noise."
+)
+@click.option(
+    "--feedback",
     type=click.Choice(["state", "positions"]),
     default="state",
     show_default=True,
     help="What the controller knows; of positions it takes samples, and filtered differences for rates.",
 )
 @click.option(
-    "--tolerance",
-    metavar="ERROR",
+    "--goal-tolerance",
+    metavar="SHARE|RAD",
     default="1%",
     show_default=True,
     help="How far off joints may be at the end: a share of each one's range, plus 1e-3 rad (m), or a number "
@@ -218,22 +219,22 @@ def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
         GoalTolerance,
         InitialError,
         Tolerances,
-        check_measured,
+        check_feedback,
         perturbed,
         simulate,
     )
 
     gains = _gains(inputs.robot, options)
-    check_measured(options.measured, gains)
+    check_feedback(options.feedback, gains)
     return partial(
         simulate,
         *inputs,
         gains=gains,
         model=perturbed(inputs.robot, options.perturb, options.seed),
         initial_error=InitialError(options.initial_error, options.initial_stiffness_error),
-        measured=options.measured,
+        feedback=options.feedback,
         sensors=_sensors(options),
-        goal_tolerance=GoalTolerance.from_text(options.tolerance),
+        goal_tolerance=GoalTolerance.from_text(options.goal_tolerance),
         tolerances=Tolerances(options.rtol, options.atol),
         budget=options.budget,
     )
@@ -257,9 +258,9 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
     from vsacli.control.poles import DEFAULT, gains_from_text, load_gains
 
     poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
-    if options.controller != FEEDBACK:
+    if options.controller != FEEDBACK_LINEARIZATION:
         if poles is not None or stiffness_poles is not None or integral:
-            raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
+            raise InputError.one(f"poles and integral action need --controller {FEEDBACK_LINEARIZATION}")
         return None
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:

@@ -10,6 +10,7 @@ import click
 from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, run_stem
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
+from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -20,12 +21,12 @@ if TYPE_CHECKING:
 @click.command(
     "size",
     short_help="Select motors, gears and springs for given motions.",
-    epilog=example("vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalogue motors.csv"),
+    epilog=example("vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalog motors.csv"),
 )
 @robot_argument
 @click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...", type=FILE)
 @click.option(
-    "--catalogue",
+    "--catalog",
     type=FILE,
     help="Motors to choose from, a CSV file; by default the robot's own motors are held to their limits.",
 )
@@ -38,9 +39,9 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--minimize",
-    type=click.Choice(["copper", "utilisation", "mass"]),
+    type=Words(["copper_loss", "utilization", "mass"]),
     help="What the best choice has least of: heat in its windings, the share of its limits that it uses, or "
-    "mass. By default the first if the catalogue says enough for it, else the second.",
+    "mass. By default the first if the catalog says enough for it, else the second.",
 )
 @click.option("-o", "--output", type=YAML_FILE, help="Write the robot file with the motors chosen.")
 @click.option("--plot", "folder", type=FOLDER, help="Save a figure of torques over speeds there.")
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 def size(
     robot: str,
     trajectories: tuple[str, ...],
-    catalogue: str | None,
+    catalog: str | None,
     gears: tuple[str, ...],
     minimize: str | None,
     output: str | None,
@@ -59,15 +60,15 @@ def size(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Say what TRAJECTORIES ask of motors, gears and springs of ROBOT, and which of a catalogue would do.
+    """Say what TRAJECTORIES ask of motors, gears and springs of ROBOT, and which of a catalog would do.
 
     Peaks are the largest of all trajectories, root mean squares are over all of them, one after the other as
     a cycle that repeats. Motors are held to their peak and continuous torque or current, speed and voltage.
 
     Exit code 3 if nothing does for some motor, or if steps were left out since they cannot be done.
     """
-    if catalogue is None and output is not None:
-        raise click.UsageError("--output is for the motors chosen from a catalogue: give --catalogue")
+    if catalog is None and output is not None:
+        raise click.UsageError("--output is for the motors chosen from a catalog: give --catalog")
     from vsacli.base.outputs import Outputs
     from vsacli.robot.file import load_robot
     from vsacli.studies.sizing import size_drives, sized_text
@@ -76,12 +77,12 @@ def size(
     loaded = load_robot(robot)
     motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
     sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
-    inputs = [*(source.path for source in sources), *([] if catalogue is None else [catalogue])]
+    inputs = [*(source.path for source in sources), *([] if catalog is None else [catalog])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         if output is not None:
             outputs.check(output)
         with talk.progress(sum(motion.samples for motion in motions)) as progress:
-            found = size_drives(loaded, motions, catalogue, gears, minimize, progress=progress.update)
+            found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
         if output is not None and found.lacking:
             talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")
         elif output is not None:

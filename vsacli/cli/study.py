@@ -37,7 +37,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option("-o", "--output", type=HDF5_FILE, help="Table; by default STUDY.h5 in this folder.")
 @click.option(
     "--processes",
-    metavar="COUNT",
+    metavar="N",
     type=click.IntRange(min=1),
     help="How many compute; by default one a processor. The table is the same for any number.",
 )

@@ -37,7 +37,7 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
     or a file of poles, must fit one of the robots among the files; without any, joint names, units and limits
     are not checked. Warnings and notes are no problems; with --quiet, only problems are printed.
     """
-    from vsacli.files.file_kinds import FileKind, recognise
+    from vsacli.files.file_kinds import FileKind, recognize
     from vsacli.files.validation import check_files
 
     if recompute and as_json:
@@ -52,7 +52,7 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
     if not all(file.passed for file in checked):
         return Exit.USAGE
     stored = (FileKind.RESULT, FileKind.SIMULATION)
-    again = [file.path for file in checked if recompute and recognise(file.path) in stored]
+    again = [file.path for file in checked if recompute and recognize(file.path) in stored]
     equal = [_recomputed(path, talk) for path in again]
     return Exit.OK if all(equal) else Exit.VERDICT
 

@@ -13,7 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.nested import read_record
-from vsacli.documents.source import Problems, Source, read_source, recognising_other_formats
+from vsacli.documents.source import Problems, Source, read_source, recognizing_other_formats
 from vsacli.documents.tree import Scope, parse_yaml
 
 _Document = TypeVar("_Document")
@@ -46,7 +46,7 @@ def read_document(
     Raises:
         InputError: with every problem of the file, each with its line.
     """
-    with recognising_other_formats(path):
+    with recognizing_other_formats(path):
         source, text = read_source(path)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)

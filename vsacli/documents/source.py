@@ -243,7 +243,7 @@ SENTENCES["db3"] = SENTENCES["mcap"]
 
 
 @contextmanager
-def recognising_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
+def recognizing_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
     """Replace an InputError within this context if the file is one of another program.
 
     Raises:

@@ -30,7 +30,7 @@ from vsacli.documents.source import (
     Source,
     check_input_file,
     decode_utf8,
-    recognising_other_formats,
+    recognizing_other_formats,
     refuse_other_formats,
 )
 from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a_clock
@@ -136,7 +136,7 @@ def read_table(
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with recognising_other_formats(name):
+        with recognizing_other_formats(name):
             with open(place_of(name), "rb") as content:
                 header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
                 digest, text = _survey(content, name)

@@ -18,7 +18,7 @@ from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
+from vsacli.base.flags import MIN_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
@@ -41,7 +41,7 @@ OF_DEVICES = ("tau_damper", *ELECTRICAL)
 def drive(
     joint: Joint,
     command: Command,
-    near_singular: float = NEAR_SINGULAR_MARGIN,
+    min_margin: float = MIN_MARGIN,
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
 ) -> OfJoint:
@@ -50,7 +50,7 @@ def drive(
     Args:
         joint: Joint with its actuator.
         command: Commanded motion and stiffness, and the elastic torque with its two derivatives.
-        near_singular: Margin below which a sample is near-singular.
+        min_margin: Margin below which a sample is near-singular.
         integrated: Deflections to use instead of the root of (14), (2, samples); a sample where they are
             NaN is infeasible.
         internal: Internal motion of a damped transmission.
@@ -60,7 +60,7 @@ def drive(
         motor variables are NaN; at singular samples those that need the inverse of the decoupling matrix. A
         motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, near_singular, integrated, internal)
+    driven = driven_by(joint, command, min_margin, integrated, internal)
     of_joint = {**command.arrays(), **driven}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven["flags"]))
     unexplained = not_finite_flags(_not_finite(joint, of_joint))
@@ -70,18 +70,18 @@ def drive(
 def driven_by(
     joint: Joint,
     command: Command,
-    near_singular: float,
+    min_margin: float,
     integrated: FloatArray | None = None,
     internal: InternalMotion | None = None,
 ) -> OfJoint:
     """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
     if internal is None:
-        found = dict(actuator.transmit(command, near_singular, integrated))  # (61)-(68), (70)-(72)
+        found = dict(actuator.transmit(command, min_margin, integrated))  # (61)-(68), (70)-(72)
     else:
         from vsacli.actuators.damped_springs import DampedSprings
 
-        found = dict(DampedSprings(actuator).transmit(command, internal, near_singular))
+        found = dict(DampedSprings(actuator).transmit(command, internal, min_margin))
     dtheta = actuator.motor_positions(found["dphi"], command.dq)  # (69)
     tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_spring"])
     tau_damper, beside = _damper_torques(joint, command, found["dphi"])

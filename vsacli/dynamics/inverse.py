@@ -19,7 +19,7 @@ from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
@@ -76,7 +76,7 @@ class InverseDynamics(RowKernel):
     Attributes:
         robot: Robot whose motion is computed.
         frame: Frame of the wrench; None without a wrench.
-        near_singular: Margin below which a sample is near-singular.
+        min_margin: Margin below which a sample is near-singular.
         integrated: Whether deflections are inputs; otherwise (14) is solved for them.
         internal: Joints with damped transmissions, by index; their internal motion is an input.
         driven: Whether only the internal deflections are inputs; their rates then follow from the damping.
@@ -88,7 +88,7 @@ class InverseDynamics(RowKernel):
 
     robot: Robot
     frame: str | None = None
-    near_singular: float = NEAR_SINGULAR_MARGIN
+    min_margin: float = MIN_MARGIN
     integrated: bool = False
     internal: tuple[int, ...] = ()
     driven: bool = False
@@ -148,7 +148,7 @@ class InverseDynamics(RowKernel):
             internal = self._internal(index, given)
             # Computes drive(joint, ...), (61)-(74). `call` lets equal joints share one recorded body.
             driving = behind_link(drive, joint, self.limits[index])
-            driven = call(rows[0], driving, command, self.near_singular, phi, internal)
+            driven = call(rows[0], driving, command, self.min_margin, phi, internal)
             found.append({**command.arrays(), **driven})
             _check_limits(self.limits[index], found[-1])
         if self.robot.has(VARIABLES["dissipated_power"]):
@@ -208,7 +208,7 @@ def _as_row(torque: Scalar, row: Scalar) -> Scalar:
 def compute_block(
     robot: Robot,
     motion: Motion,
-    near_singular: float = NEAR_SINGULAR_MARGIN,
+    min_margin: float = MIN_MARGIN,
     engine: Engine = NUMPY,
     internal: Mapping[int, InternalMotion] | None = None,
 ) -> Block:
@@ -218,14 +218,14 @@ def compute_block(
         robot: Robot whose motion is computed.
         motion: Commanded motion and stiffness, (samples, joints); actuators without a commanded stiffness
             have their own, or none.
-        near_singular: Margin below which a sample is near-singular.
+        min_margin: Margin below which a sample is near-singular.
         engine: Backend.
         internal: Internal motion of the damped transmissions, by index of the joint; if None, each is at the
             declared start of its damper, or else where its springs carry the joint alone.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal
-    kernel = InverseDynamics(robot, frame, near_singular, internal=tuple(internal))
+    kernel = InverseDynamics(robot, frame, min_margin, internal=tuple(internal))
     return block_of(kernel, motion, engine, internal=internal)
 
 

@@ -23,7 +23,7 @@ from vsacli.documents.source import (
     check_input_file,
     is_table,
     read_source,
-    recognising_other_formats,
+    recognizing_other_formats,
 )
 from vsacli.documents.tree import parse_yaml
 from vsacli.robot import file as robot_file
@@ -79,7 +79,7 @@ _DOCUMENT_KINDS = {document.format: FileKind(word) for word, document in DOCUMEN
 _BEGINNING_BYTES = 64
 
 
-def recognise(path: str | os.PathLike[str]) -> FileKind:
+def recognize(path: str | os.PathLike[str]) -> FileKind:
     """Return the kind of a file.
 
     Raises:
@@ -95,7 +95,7 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
         return FileKind.TABLE
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
         return FileKind.URDF
-    with recognising_other_formats(path):
+    with recognizing_other_formats(path):
         return _document_kind(path)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from vsacli.actuators.kinds import example
 from vsacli.base.errors import InputError
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
@@ -35,7 +35,7 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
     Raises:
         StorageError: the disk has no room for a temporary file.
     """
-    acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
+    acceptance, trajectory = Acceptance(robot, MIN_MARGIN), _read(text, robot)
     if not acceptance.refused_joints(trajectory).any():
         return usual, ""
     reasons = "; ".join(acceptance.reasons(TaskSamples.of(trajectory, 0, trajectory.samples)))

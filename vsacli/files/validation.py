@@ -12,7 +12,7 @@ from vsacli.control.poles import FORMAT, PolesFile, load_gains
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
-from vsacli.files.file_kinds import FileKind, recognise
+from vsacli.files.file_kinds import FileKind, recognize
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import open_stored
 from vsacli.results.store.study_table import StoredStudy
@@ -109,7 +109,7 @@ def check_files(paths: Sequence[str]) -> list[Checked]:
 
 def _kind(path: str) -> FileKind | Checked:
     try:
-        return recognise(path)
+        return recognize(path)
     except InputError as error:
         return _failed(path, error)
 

@@ -118,8 +118,8 @@ class Link:
     """The augmented link: the body with the motors mounted on it, without the inertia of their rotors."""
 
     mass: float = number(units.MASS, "mass of the augmented link", check=NON_NEGATIVE)
-    com: tuple[float, float, float] = vector(3, units.LENGTH, "centre of mass in the link frame (DH frame i)")
-    inertia: Inertia = value(Record(Inertia), "inertia tensor about the centre of mass, link axes")
+    com: tuple[float, float, float] = vector(3, units.LENGTH, "center of mass in the link frame (DH frame i)")
+    inertia: Inertia = value(Record(Inertia), "inertia tensor about the center of mass, link axes")
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -21,16 +21,16 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.plausibility import strange_of_robot
 from vsacli.robot.plausibility.bodies import (
-    CENTIMETRES,
+    CENTIMETERS,
     DEGREES,
     FASTEST,
-    MILLIMETRES,
+    MILLIMETERS,
     ROUNDED,
     SIZES,
     turns,
 )
 from vsacli.robot.plausibility.checked_robot import BodySizes, ratio
-from vsacli.robot.plausibility.springs import NEWTON_MILLIMETRES, TOO_SOFT, Corridor, corridor
+from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT, Corridor, corridor
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
 
@@ -56,7 +56,7 @@ UNITS_OF_TIME = (
     OtherUnit("min", 60, -1),
     OtherUnit("h", 3600, -1),
 )
-UNITS_OF_STIFFNESS = (*TOO_SOFT, NEWTON_MILLIMETRES)
+UNITS_OF_STIFFNESS = (*TOO_SOFT, NEWTON_MILLIMETERS)
 
 SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs")
 RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
@@ -220,7 +220,7 @@ MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
         size="times the reach of the robot", high=40, usual=0.1,
         reason="even the track under an arm is shorter; positions within the limits of the joint pass",
         finding="is {size} times the reach of the robot",
-        units=(MILLIMETRES, CENTIMETRES), explained_by=SIZES),
+        units=(MILLIMETERS, CENTIMETERS), explained_by=SIZES),
     Rule("slow motions", "`duration`, `times`", _slowness,
         size=f"1/s, mean velocity in rad (reaches of the robot) of motions longer than {LONG:g} s",
         low=1e-3, usual=0.5, reason="a turn would take more than an hour and a half",

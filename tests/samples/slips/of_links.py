@@ -13,7 +13,7 @@ TYPICAL: list[Slip] = [
         {"a: 0.30": "a: 300"}, "lengths", "dh.a", "300 mm"),
     Slip("mm as d", "ur5_6r", "ur5_6r",
         {"d: 0.089159": "d: 89.159"}, "lengths", "dh.d", "89.159 mm"),
-    Slip("mm as centre of mass", "vsa_3r", "rest_to_rest",
+    Slip("mm as center of mass", "vsa_3r", "rest_to_rest",
         {"[-0.15, 0, 0]": "[-150, 0, 0]"}, "lengths", "com.0", "-150 mm"),
     Slip("mm as tool", "panda_7r", "panda_7r",
         {"xyz: [0, 0, 0.107]": "xyz: [0, 0, 107]"}, "lengths", "tool.xyz.2", "107 mm"),

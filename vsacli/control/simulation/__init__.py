@@ -4,16 +4,16 @@ from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.perturbation import perturbed
 from vsacli.control.simulation.sensors import Sensors
-from vsacli.control.simulation.simulate import InitialError, Measured, Simulation, check_measured, simulate
+from vsacli.control.simulation.simulate import Feedback, InitialError, Simulation, check_feedback, simulate
 
 __all__ = [
+    "Feedback",
     "GoalTolerance",
     "InitialError",
-    "Measured",
     "Sensors",
     "Simulation",
     "Tolerances",
-    "check_measured",
+    "check_feedback",
     "perturbed",
     "simulate",
 ]

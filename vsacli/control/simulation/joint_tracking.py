@@ -59,7 +59,7 @@ class GoalTolerance:
         try:
             number = float(text.removesuffix("%"))
         except ValueError:
-            raise InputError.one(f"--tolerance: {_GRAMMAR.format(written)}") from None
+            raise InputError.one(f"--goal-tolerance: {_GRAMMAR.format(written)}") from None
         return cls(share=number / 100) if text.endswith("%") else cls(0.0, number)
 
     def of(self, commanded_range: float) -> float:

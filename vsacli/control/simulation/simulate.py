@@ -91,7 +91,7 @@ def _per_joint(name: str, values: npt.ArrayLike, joints: int) -> FloatArray:
     return np.broadcast_to(array, (joints,))
 
 
-Measured = Literal["state", "positions"]
+Feedback = Literal["state", "positions"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,7 +122,7 @@ def simulate(
     gains: Gains | None = None,
     model: Robot | None = None,
     initial_error: InitialError = InitialError(),
-    measured: Measured = "state",
+    feedback: Feedback = "state",
     sensors: Sensors | None = None,
     goal_tolerance: GoalTolerance = GoalTolerance(),
     tolerances: Tolerances = Tolerances(),
@@ -140,7 +140,7 @@ def simulate(
         gains: gains of feedback linearization; None for feedforward of the inverse dynamics' torques.
         model: robot as the controller knows it, e.g. from `perturbed`; None for the true robot.
         initial_error: difference of the initial state from the command.
-        measured: measurement of the controller: the full "state" at every instant, or the "positions" of
+        feedback: measurement of the controller: the full "state" at every instant, or the "positions" of
             joints and motors at the samples of the trajectory, between which it holds its torques.
         sensors: accuracy of measured positions and torques. None records no measurements, and a controller
             that measures positions has exact ones.
@@ -164,7 +164,7 @@ def simulate(
         TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
-    check_measured(measured, gains)
+    check_feedback(feedback, gains)
     first, elapsed = trajectory.start, trajectory.from_zero()
     loop = _closed_loop(robot, elapsed, model or robot, gains)
     start = start_state(robot, elapsed, initial_error)
@@ -175,11 +175,11 @@ def simulate(
 
     computing = Computing(engine, tell, runs)
     integrated = _integrate(
-        robot, loop, elapsed, start, measured, readings, tolerances, budget, passed, computing
+        robot, loop, elapsed, start, feedback, readings, tolerances, budget, passed, computing
     )
     past = history(robot, loop, integrated, first, readings)
     full: SimulationReport | None = None
-    if measured == "positions":
+    if feedback == "positions":
         conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
         integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine, "runs": runs}
         full = simulate(robot, trajectory, **conditions, **integration).report
@@ -237,15 +237,15 @@ def _report(
     )
 
 
-def check_measured(measured: Measured, gains: Gains | None) -> None:
-    """Raise an error for measurements that the controller cannot use.
+def check_feedback(feedback: Feedback, gains: Gains | None) -> None:
+    """Raise an error for feedback that the controller cannot use.
 
     Raises:
         InputError: the measurement is unknown, or positions are measured without feedback.
     """
-    if measured not in (words := get_args(Measured)):
-        raise InputError.one(f"unknown measurement {measured!r}{did_you_mean(measured, words)}")
-    if gains is None and measured == "positions":
+    if feedback not in (words := get_args(Feedback)):
+        raise InputError.one(f"unknown feedback {feedback!r}{did_you_mean(feedback, words)}")
+    if gains is None and feedback == "positions":
         raise InputError.one(
             "feedforward measures nothing: measured positions need the controller feedback-linearization"
         )
@@ -281,7 +281,7 @@ def _integrate(
     loop: ClosedLoop,
     trajectory: Trajectory,
     start: State,
-    measured: Measured,
+    feedback: Feedback,
     readings: Readings | None,
     tolerances: Tolerances,
     limit: int | None,
@@ -303,7 +303,7 @@ def _integrate(
     ends = list(boundaries(loop, vector))
     equations = RecordedEquations(loop, ends, budget, computing)
     integrator = Integrator(equations, tolerances, progress, slides)
-    if measured == "state":
+    if feedback == "state":
         integrated = continuous(loop, integrator, reached, vector)
     else:
         integrated = sampled(loop, integrator, reached, vector, readings)

@@ -21,7 +21,7 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.engine.cache import MOST_BYTES, Cache, CacheError, open_cache
 from vsacli.documents.paths import find
 from vsacli.documents.source import refuse_other_formats
-from vsacli.files.file_kinds import FileKind, recognise
+from vsacli.files.file_kinds import FileKind, recognize
 from vsacli.files.info.robot_info import describe_robot
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import StoredResult, open_stored
@@ -147,7 +147,7 @@ def describe_file(
         InputError: the file is of another kind, or cannot be used; or a rate is given for a file that is not
             a recording without times.
     """
-    kind = recognise(path)
+    kind = recognize(path)
     if rate is not None and kind is not FileKind.TABLE:
         raise InputError.one(f"is a {kind}; the rate is said of recordings without times", path)
     match kind:

@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.record_values import json_fields
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, frames, tip_position
@@ -190,7 +190,7 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     with np.errstate(all="ignore"):  # a load may be infinite or NaN
         if "stiffness" not in joint.actuator.commanded:
             at_rest = Command.at_rest(tau_e, np.full(3, q))
-            held = joint.actuator.transmit(at_rest, NEAR_SINGULAR_MARGIN, None)["stiffness"]
+            held = joint.actuator.transmit(at_rest, MIN_MARGIN, None)["stiffness"]
             return {
                 "unloaded": [float(held[0])] * 2,
                 "loaded": [float(held[1:].min()), float(held[1:].max())],

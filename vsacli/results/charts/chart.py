@@ -57,7 +57,7 @@ class Line(NamedTuple):
         curve: points of the curve.
         look: number of color and dashes in figures, or `DIFFERENCE`.
         label: name of the joint or of the component of a wrench.
-        colour: number of the color on pages.
+        color: number of the color on pages.
         joint: number of the joint, from 0; None if the curve belongs to no joint.
         file: number of the file, from 0.
         role: "computed", "commanded", "actual" or "measured".
@@ -68,7 +68,7 @@ class Line(NamedTuple):
     curve: Curve
     look: int
     label: str = ""
-    colour: int = 0
+    color: int = 0
     joint: int | None = None
     file: int = 0
     role: str = "computed"

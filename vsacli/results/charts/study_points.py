@@ -63,7 +63,7 @@ class StudyPoints:
         return next((self._cost(name) for name in COSTS if name in self._table.columns), None)
 
     @property
-    def optimised(self) -> bool:
+    def optimized(self) -> bool:
         """Whether each run is an optimum, whose margin is the requested one."""
         return "cost_after" in self._table.columns
 
@@ -71,7 +71,7 @@ class StudyPoints:
     def shown(self) -> list[tuple[str, FloatArray]]:
         """Columns to draw over the parameters: margin and cost, or for optima the costs before and after."""
         cost = [] if self.cost is None else [self.cost]
-        first = self._cost("cost_before") if self.optimised else ("smallest margin [%]", 100 * self.margin)
+        first = self._cost("cost_before") if self.optimized else ("smallest margin [%]", 100 * self.margin)
         return [first, *cost]
 
     def _cost(self, name: str) -> tuple[str, FloatArray]:
@@ -85,10 +85,10 @@ class StudyPoints:
         """Share of the feasible runs, with the interval of 95 % confidence (Wilson 1927)."""
         count, feasible = len(self.feasible), int(self.feasible.sum())
         share, square = feasible / count, NORMAL_95**2
-        centre = (share + square / (2 * count)) / (1 + square / count)
+        center = (share + square / (2 * count)) / (1 + square / count)
         spread = math.sqrt(share * (1 - share) / count + square / (4 * count**2))
         half = NORMAL_95 * spread / (1 + square / count)
-        return share, max(0.0, centre - half), min(1.0, centre + half)
+        return share, max(0.0, center - half), min(1.0, center + half)
 
     @property
     def exceedance(self) -> tuple[FloatArray, FloatArray]:

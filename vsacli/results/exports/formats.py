@@ -250,7 +250,7 @@ JOINT_TRAJECTORY = ResultFormat(
 )
 
 
-def labelled_dataset(
+def labeled_dataset(
     arrays: Mapping[str, AnyArray], joint_names: Sequence[str], joint_types: tuple[str, ...]
 ) -> xarray.Dataset:
     """Return the dataset that xarray would read from a result file with these variables.

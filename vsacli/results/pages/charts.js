@@ -1,7 +1,7 @@
 "use strict";
 /* The plots over time: each a card with a legend that shows the values at the cursor; one window of time for all. */
 vsacli.charts = (() => {
-  const { data, state, array, valueAt, number, colour, curveColour, element } = vsacli;
+  const { data, state, array, valueAt, number, color, curveColor, element } = vsacli;
   const { dash, addSeries, shade, newFigure, addTools } = vsacli.figures;
   const NEAR = 0.5, ROOM = 0.06;  // how far limits may be from curves to be shown, and room left; in heights of the curves
   const MANY = 8;  // joints, from which on a legend scrolls
@@ -38,9 +38,9 @@ vsacli.charts = (() => {
       return box;
     }
 
-    /* The corridor has a colour of its own; uncertainty that of its curve. */
-    get bandColour() {
-      return this.chart.name === "stiffness" ? colour("reachable") : "";
+    /* The corridor has a color of its own; uncertainty that of its curve. */
+    get bandColor() {
+      return this.chart.name === "stiffness" ? color("reachable") : "";
     }
 
     get visible() {
@@ -55,10 +55,10 @@ vsacli.charts = (() => {
       this.figure = newFigure(ranges, ["time [s]", `[${this.chart.unit}]`]);
       addTools(this.figure);
       this.shadeAll();
-      this.curves = this.chart.series.map((series) => addSeries(this.figure, series, this.bandColour));
+      this.curves = this.chart.series.map((series) => addSeries(this.figure, series, this.bandColor));
       this.addLimits();
       this.span = new Bokeh.Span({ dimension: "height", location: state.cursor + data.start,
-                                   line_color: colour("cursor"), line_width: 1 });
+                                   line_color: color("cursor"), line_width: 1 });
       this.figure.add_layout(this.span);
       this.follow();
       this.show();
@@ -73,7 +73,7 @@ vsacli.charts = (() => {
       shade(this.figure, "near-singular", joints, { fill_alpha: 0.25 });
       shade(this.figure, "infeasible", joints, { fill_alpha: 0.35 });
       shade(this.figure, "singular", joints, { fill_alpha: 0.0, hatch_pattern: "right_diagonal_line",
-                                               hatch_color: colour("singular"), hatch_alpha: 0.6, hatch_scale: 8 });
+                                               hatch_color: color("singular"), hatch_alpha: 0.6, hatch_scale: 8 });
     }
 
     /* What the axis of values shows at first: all curves that are not hidden, and limits that are near them. */
@@ -95,7 +95,7 @@ vsacli.charts = (() => {
 
     addLimits() {
       this.limits = this.chart.limits.map(({ joint, value }) => ({ joint, line: this.figure.hspan([value], {
-        line_color: curveColour(joint), line_dash: "dotted", line_width: 1.2 }) }));
+        line_color: curveColor(joint), line_dash: "dotted", line_width: 1.2 }) }));
     }
 
     follow() {
@@ -127,10 +127,10 @@ vsacli.charts = (() => {
 
     /* Hide what the filters hide. */
     show() {
-      if (this.area) this.area.style.background = this.bandColour || colour("soft");
+      if (this.area) this.area.style.background = this.bandColor || color("soft");
       this.values.forEach(({ series, part, swatch }) => {
         part.classList.toggle("hidden", !vsacli.shown(series));
-        swatch.style.borderTopColor = vsacli.named(series.colour);
+        swatch.style.borderTopColor = vsacli.named(series.color);
         swatch.style.borderTopStyle = dash(series)[1];
       });
       this.keys.forEach((key) => key.classList.toggle("hidden", !key.querySelector(".key:not(.hidden)")));

@@ -1,15 +1,15 @@
 "use strict";
-/* Figures of the library in the page's colours, and what is drawn into them: curves, their bands, stretches of time. */
+/* Figures of the library in the page's colors, and what is drawn into them: curves, their bands, stretches of time. */
 Bokeh.set_log_level("warn");
 vsacli.figures = (() => {
-  const { data, array, colour, curveColour } = vsacli;
+  const { data, array, color, curveColor } = vsacli;
   /* Dashes of a curve, and the border that stands for them in a legend. */
   const DASHES = [["solid", "solid"], ["dashed", "dashed"], ["dotdash", "double"], ["dotted", "dotted"]];
 
-  /* Joints have colours; what is beyond those, other files and other roles have other dashes. */
+  /* Joints have colors; what is beyond those, other files and other roles have other dashes. */
   function dash(series) {
     const roles = { commanded: 1, measured: 3 };
-    return DASHES[(roles[series.role] || series.file + Math.floor(series.colour / vsacli.COLOURS)) % DASHES.length];
+    return DASHES[(roles[series.role] || series.file + Math.floor(series.color / vsacli.COLORS)) % DASHES.length];
   }
 
   function absolute(times) {
@@ -32,7 +32,7 @@ vsacli.figures = (() => {
     const spans = stretches(kind, joints);
     if (spans.length) {
       const [x0, x1] = [0, 1].map((end) => spans.map((span) => span[end] + data.start));
-      figure.vstrip({ x0, x1, fill_color: colour(kind), line_color: colour(kind), line_alpha: look.fill_alpha,
+      figure.vstrip({ x0, x1, fill_color: color(kind), line_color: color(kind), line_alpha: look.fill_alpha,
                       level: "underlay", ...look });
     }
   }
@@ -60,9 +60,9 @@ vsacli.figures = (() => {
     });
   }
 
-  function addSeries(figure, series, bandColour) {
+  function addSeries(figure, series, bandColor) {
     const x = absolute(array(series.time)), y = array(series.values);
-    const look = { line_color: curveColour(series.colour), line_width: series.role === "measured" ? 1 : 1.7,
+    const look = { line_color: curveColor(series.color), line_width: series.role === "measured" ? 1 : 1.7,
                    line_dash: dash(series)[0] };
     const source = new Bokeh.ColumnDataSource({ data: { x, y } });
     const drawn = [figure.line({ field: "x" }, { field: "y" }, { source, ...look })];
@@ -71,21 +71,21 @@ vsacli.figures = (() => {
       drawn.push(figure.scatter(alone.map((at) => x[at]), alone.map((at) => y[at]),
                                 { size: 3, line_color: look.line_color, fill_color: look.line_color }));
     }
-    if (series.band) drawn.push(...addBand(figure, series, x, bandColour || look.line_color));
+    if (series.band) drawn.push(...addBand(figure, series, x, bandColor || look.line_color));
     return { series, drawn };
   }
 
   function paint(figure) {
     for (const axis of [...figure.xaxes, ...figure.yaxes]) {
-      axis.setv({ axis_line_color: colour("line"), major_tick_line_color: colour("line"), minor_tick_line_color: null,
-                  major_label_text_color: colour("soft"), axis_label_text_color: colour("soft"),
+      axis.setv({ axis_line_color: color("line"), major_tick_line_color: color("line"), minor_tick_line_color: null,
+                  major_label_text_color: color("soft"), axis_label_text_color: color("soft"),
                   axis_label_text_font_style: "normal", axis_label_text_font_size: "12px" });
     }
-    for (const grid of [...figure.xgrids, ...figure.ygrids]) grid.grid_line_color = colour("grid");
-    figure.setv({ background_fill_color: colour("card"), border_fill_color: colour("card"), outline_line_color: null });
+    for (const grid of [...figure.xgrids, ...figure.ygrids]) grid.grid_line_color = color("grid");
+    figure.setv({ background_fill_color: color("card"), border_fill_color: color("card"), outline_line_color: null });
   }
 
-  /* A figure in the page's colours, its labels taken literally. */
+  /* A figure in the page's colors, its labels taken literally. */
   function newFigure(attributes, labels) {
     const figure = Bokeh.Plotting.figure({ sizing_mode: "stretch_both", tools: [], min_border_right: 12,
                                            lod_threshold: null, ...attributes });

@@ -1,5 +1,5 @@
 "use strict";
-/* What the parts of a page share: its numbers, its colours, and the state that all of them follow. */
+/* What the parts of a page share: its numbers, its colors, and the state that all of them follow. */
 const vsacli = (() => {
   const data = JSON.parse(document.getElementById("page-data").textContent);
   const decoded = new Map();
@@ -44,13 +44,13 @@ const vsacli = (() => {
     return size !== 0 && (size >= 1e6 || size < 1e-3) ? value.toExponential(3) : String(Number(value.toPrecision(6)));
   }
 
-  function colour(name) {
+  function color(name) {
     return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   }
 
-  const COLOURS = 8;
-  const curveColour = (index) => colour(`curve-${index % COLOURS}`);
-  const named = (index) => `var(--curve-${index % COLOURS})`;  // which follows the scheme by itself
+  const COLORS = 8;
+  const curveColor = (index) => color(`curve-${index % COLORS}`);
+  const named = (index) => `var(--curve-${index % COLORS})`;  // which follows the scheme by itself
 
   /* An element with texts that are only ever texts. */
   function element(tag, attributes = {}, ...children) {
@@ -97,6 +97,6 @@ const vsacli = (() => {
   const shown = (series) => (series.joint === null || state.joints.has(series.joint)) && state.files.has(series.file);
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => tell("scheme"));
-  return { data, state, array, after, valueAt, number, colour, curveColour, named, COLOURS, element,
+  return { data, state, array, after, valueAt, number, color, curveColor, named, COLORS, element,
            listen, tell, setCursor, setWindow, shown };
 })();

@@ -52,7 +52,7 @@ class Packed:
             series.append(
                 {
                     "label": line.label,
-                    "colour": line.colour,
+                    "color": line.color,
                     "joint": line.joint,
                     "file": line.file,
                     "role": line.role,

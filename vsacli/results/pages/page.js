@@ -3,7 +3,7 @@
 (() => {
   const { data, state, element, number } = vsacli;
   const byId = (name) => document.getElementById(name);
-  /* Colours of what may be wrong, the worst first. */
+  /* Colors of what may be wrong, the worst first. */
   const SHADES = { infeasible: "infeasible", singular: "singular", "near-singular": "near-singular",
                      "over a limit": "over-limit", unreliable: "unreliable" };
 
@@ -135,8 +135,8 @@
   function zoom(factor) {
     const [start, end] = state.window;
     const seen = start <= state.cursor && state.cursor <= end;
-    const centre = seen ? state.cursor : (start + end) / 2;
-    vsacli.setWindow(centre - factor * (centre - start), centre + factor * (end - centre));
+    const center = seen ? state.cursor : (start + end) / 2;
+    vsacli.setWindow(center - factor * (center - start), center + factor * (end - center));
   }
 
   const STEP = 1 / 200;  // of what is shown, by which an arrow key moves the cursor

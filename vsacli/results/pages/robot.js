@@ -1,7 +1,7 @@
 "use strict";
 /* The robot at the time cursor: prisms in orthographic view, painted from the back to the front. */
 vsacli.robot = (() => {
-  const { data, state, array, after, colour, curveColour } = vsacli;
+  const { data, state, array, after, color, curveColor } = vsacli;
   const THICK = 0.034, THIN = 0.014;  // radii of joints and links, relative to the size of the motion
   const ISOMETRIC = { turn: -0.75 * Math.PI, tilt: 0.6155 };
   const view = { ...ISOMETRIC };
@@ -65,15 +65,15 @@ vsacli.robot = (() => {
     const along = scaled(axis, 1 / length);
     const aside = cross(along, Math.abs(along[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]);
     const u = scaled(aside, radius / size(aside)), v = cross(along, u);
-    const ring = (centre) => Array.from({ length: sides }, (_, side) => {
+    const ring = (center) => Array.from({ length: sides }, (_, side) => {
       const angle = 2 * Math.PI * (side + 0.5) / sides;
-      return add(add(centre, u, Math.cos(angle)), v, Math.sin(angle));
+      return add(add(center, u, Math.cos(angle)), v, Math.sin(angle));
     });
     const [first, last] = [ring(from), ring(to)];
     const face = (corners, normal) => {
       if (dot(normal, eye.towards) <= 0) return;
-      const centre = scaled(corners.reduce((sum, corner) => add(sum, corner), [0, 0, 0]), 1 / corners.length);
-      faces.push({ corners, depth: dot(centre, eye.towards), bright: 0.62 + 0.38 * dot(normal, eye.towards) / size(normal), paint });
+      const center = scaled(corners.reduce((sum, corner) => add(sum, corner), [0, 0, 0]), 1 / corners.length);
+      faces.push({ corners, depth: dot(center, eye.towards), bright: 0.62 + 0.38 * dot(normal, eye.towards) / size(normal), paint });
     };
     for (let side = 0; side < sides; side += 1) {
       const next = (side + 1) % sides;
@@ -95,13 +95,13 @@ vsacli.robot = (() => {
     const faces = [], radius = box.radius;
     const origins = pointsAt(chain, chain.origins, chain.points);
     const elbows = pointsAt(chain, chain.elbows, chain.count), axes = pointsAt(chain, chain.axes, chain.count);
-    const link = { fill: colour("soft") };
+    const link = { fill: color("soft") };
     const base = origins[0];
     prism([base[0], base[1], base[2] - 2.4 * THICK * radius], [base[0], base[1], base[2] - THICK * radius],
           2 * THICK * radius, 4, link, faces, eye);
     axes.forEach((axis, joint) => {
       const bad = trouble(chain.file, joint)[0];
-      const paint = { fill: bad ? colour("bad") : curveColour(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
+      const paint = { fill: bad ? color("bad") : curveColor(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
       const here = origins[joint], sleeve = scaled(axis, 1.3 * THICK * radius);
       const sliding = joints[joint].type === "prismatic";
       prism(add(here, sleeve, -1), add(here, sleeve), sliding ? 1.2 * wide : wide, sliding ? 4 : 18, paint, faces, eye);
@@ -125,7 +125,7 @@ vsacli.robot = (() => {
 
   function drawGround(context, flat) {
     const { middle, radius } = box, level = chains[0].origins[2] - 2.4 * THICK * radius, step = radius / 3;
-    context.strokeStyle = colour("line");
+    context.strokeStyle = color("line");
     context.lineWidth = devicePixelRatio;
     for (let line = -3; line <= 3; line += 1) {
       for (const [a, b] of [[[line, -3], [line, 3]], [[-3, line], [3, line]]]) {
@@ -142,7 +142,7 @@ vsacli.robot = (() => {
       trace.push([chain.origins[at], chain.origins[at + 1], chain.origins[at + 2]]);
     }
     path(context, trace.filter((point) => point.every(Number.isFinite)), flat);
-    context.strokeStyle = colour("accent");
+    context.strokeStyle = color("accent");
     context.lineWidth = 1.2 * devicePixelRatio;
     context.stroke();
   }

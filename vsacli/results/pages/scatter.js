@@ -1,11 +1,11 @@
 "use strict";
 /* The plots of studies: margin and cost of each run, over what varies; one run can be chosen in all of them. */
 (() => {
-  const { data, array, number, colour, curveColour, element } = vsacli;
+  const { data, array, number, color, curveColor, element } = vsacli;
   if (data.kind !== "study") return;
   const { newFigure, addTools } = vsacli.figures;
   const place = document.getElementById("plots");
-  const FEASIBLE = 2, LOST = 1;  // colours of curves
+  const FEASIBLE = 2, LOST = 1;  // colors of curves
   let plots = [], section;
 
   const ROOM = 0.05;  // left around all points, relative to what they span
@@ -51,12 +51,12 @@
       const rows = [...feasible.keys()].filter((row) => feasible[row] === wanted && Number.isFinite(x[row] + y[row]));
       if (!rows.length) continue;
       const source = new Bokeh.ColumnDataSource({ data: { x: rows.map((row) => x[row]), y: rows.map((row) => y[row]) } });
-      figure.scatter({ field: "x" }, { field: "y" }, { source, size: 6, marker, line_color: curveColour(curve),
-                                                       fill_color: curveColour(curve), fill_alpha: 0.5 });
-      addKey(legend, curveColour(curve), words);
+      figure.scatter({ field: "x" }, { field: "y" }, { source, size: 6, marker, line_color: curveColor(curve),
+                                                       fill_color: curveColor(curve), fill_alpha: 0.5 });
+      addKey(legend, curveColor(curve), words);
     }
     const chosen = new Bokeh.ColumnDataSource({ data: { x: [], y: [] } });
-    figure.scatter({ field: "x" }, { field: "y" }, { source: chosen, size: 14, line_color: colour("cursor"), line_width: 2.5,
+    figure.scatter({ field: "x" }, { field: "y" }, { source: chosen, size: 14, line_color: color("cursor"), line_width: 2.5,
                                                      fill_color: null });
     figure.on_event("tap", (event) => choose(study, nearest(figure, x, y, event)));
     plots.push({ study, figure, plot, choose: (row) => { chosen.data = { x: [x[row]], y: [y[row]] }; } });
@@ -109,11 +109,11 @@
     finish(figure);
     data.studies.forEach((study, index) => {
       const source = new Bokeh.ColumnDataSource({ data: { x: Float64Array.from(array(study.exceeded)), y: array(study.exceeding) } });
-      figure.step({ field: "x" }, { field: "y" }, "before", { source, line_color: curveColour(index), line_width: 1.8 });
+      figure.step({ field: "x" }, { field: "y" }, "before", { source, line_color: curveColor(index), line_width: 1.8 });
       const [share, low, high] = study.share.map((each) => number(Number((100 * each).toPrecision(3))));
-      addKey(legend, curveColour(index), `${study.label}: ${share} % feasible (95 % interval ${low} to ${high} %)`);
+      addKey(legend, curveColor(index), `${study.label}: ${share} % feasible (95 % interval ${low} to ${high} %)`);
     });
-    figure.add_layout(new Bokeh.Span({ dimension: "height", location: 0, line_color: colour("soft"), line_width: 1 }));
+    figure.add_layout(new Bokeh.Span({ dimension: "height", location: 0, line_color: color("soft"), line_width: 1 }));
     plots.push({ figure, plot, choose: () => {} });
   }
 
@@ -132,7 +132,7 @@
     for (const { path, unit, values } of study.varying) {
       const varied = [array(values), unit ? `[${unit}]` : ""];
       const figure = scatter(study, charts, `margin over ${path}`, varied, margin);
-      figure.add_layout(new Bokeh.Span({ dimension: "width", location: 0, line_color: colour("soft"), line_width: 1 }));
+      figure.add_layout(new Bokeh.Span({ dimension: "width", location: 0, line_color: color("soft"), line_width: 1 }));
       if (cost) scatter(study, charts, `cost over ${path}`, varied, cost);
     }
   }
@@ -140,7 +140,7 @@
   function addFront(study, figure, margin, cost) {
     if (study.front.length < 2) return;
     figure.line(study.front.map((row) => margin[row]), study.front.map((row) => cost[row]),
-                { line_color: curveColour(0), line_width: 1.5 });
+                { line_color: curveColor(0), line_width: 1.5 });
   }
 
   async function build() {

@@ -55,10 +55,10 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
     with house_style():
         figures = {FEASIBILITY_OF_RUNS: _feasibility([points], [points.name])}
         if points.varying:
-            figures[COST if points.optimised else MARGIN] = (
+            figures[COST if points.optimized else MARGIN] = (
                 _over_map(points) if _is_grid(points) else _over_numbers(points)
             )
-        if points.cost is not None and not points.optimised and len(points.front) > 1:
+        if points.cost is not None and not points.optimized and len(points.front) > 1:
             figures[PARETO] = _pareto(points)
     return figures
 
@@ -159,7 +159,7 @@ def _over_map(points: StudyPoints) -> Figure:
         Line2D([], [], color=_LOST, label="margin zero"),
         Patch(color="0.8", label="infeasible steps"),
     )
-    return complete(figure, points.name, [none] if points.optimised else [zero, none])
+    return complete(figure, points.name, [none] if points.optimized else [zero, none])
 
 
 def _fitting(label: str) -> str:

@@ -46,7 +46,7 @@ TIME_STEP = 1e-3
 SEEN = 2
 """Size of the initial view, as a multiple of the length of the arm."""
 
-LINK_COLOUR = (0.35, 0.45, 0.6, 1)
+LINK_COLOR = (0.35, 0.45, 0.6, 1)
 
 
 def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
@@ -118,9 +118,9 @@ def _link(parent: Element, joint: Joint, radius: float) -> Element:
 
 def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> None:
     if math.hypot(*origin) > radius:
-        draw_rod(body, origin, radius, LINK_COLOUR)
+        draw_rod(body, origin, radius, LINK_COLOR)
     else:
-        element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOUR, **GHOST)
+        element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOR, **GHOST)
 
 
 def _row_quaternion(joint: Joint) -> tuple[float, ...]:

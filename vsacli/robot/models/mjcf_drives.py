@@ -140,7 +140,7 @@ ANCHOR = 2.0
 DRAWN = 0.005
 """Size of a drawn point, m."""
 
-LEVER_COLOUR = (0.8, 0.4, 0.2, 1)
+LEVER_COLOR = (0.8, 0.4, 0.2, 1)
 
 GHOST: dict[str, Value] = {"contype": 0, "conaffinity": 0, "mass": 0}
 """Attributes of a shape that is only drawn."""
@@ -150,10 +150,10 @@ HIDDEN = 4
 radian."""
 
 
-def draw_rod(body: Element, end: Sequence[float], radius: float, colour: Sequence[float]) -> None:
+def draw_rod(body: Element, end: Sequence[float], radius: float, color: Sequence[float]) -> None:
     """Draw a rod from the origin of a body to a point, without mass and contact."""
     ends = (0, 0, 0, *end)
-    element(body, "geom", type="capsule", fromto=ends, size=radius, rgba=colour, **GHOST)
+    element(body, "geom", type="capsule", fromto=ends, size=radius, rgba=color, **GHOST)
 
 
 def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequence[Rotor]) -> None:
@@ -162,7 +162,7 @@ def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequenc
     half = joint.dh.theta / 2
     lever = add_rotor(below, first, type="hinge")
     add(lever, quat=(math.cos(half), 0, 0, math.sin(half)))
-    draw_rod(lever, (spring.lever, 0, 0), DRAWN, LEVER_COLOUR)
+    draw_rod(lever, (spring.lever, 0, 0), DRAWN, LEVER_COLOR)
     element(lever, "site", name=f"{joint.name}.lever", pos=(spring.lever, 0, 0), size=DRAWN)
     place = -math.copysign(ANCHOR, spring.lead)
     element(lever, "site", name=f"{second.name}.anchor", pos=(0, 0, place), size=DRAWN)

@@ -24,8 +24,8 @@ UNLIMITED_ANGLE = 1e4
 DEGREES = OtherUnit("deg", math.pi / 180)
 DEGREES_PER_SECOND = OtherUnit("deg/s", math.pi / 180)
 RPM = OtherUnit("rpm", math.pi / 30)
-MILLIMETRES = OtherUnit("mm", 1e-3)
-CENTIMETRES = OtherUnit("cm", 1e-2)
+MILLIMETERS = OtherUnit("mm", 1e-3)
+CENTIMETERS = OtherUnit("cm", 1e-2)
 GRAMS = OtherUnit("g", 1e-3, power=2.5)
 """Unit of the mass, which has the power 5/2 in the density of the sphere, at a given inertia."""
 
@@ -151,7 +151,7 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("ranges of prismatic joints", "`limits.position`", _numbers("m", "limits", size=_in_extents),
         size="times the reach of the robot", high=40, usual=0.1,
         reason="even the track under an arm is shorter than so many arms",
-        finding="is {size} times the reach of the robot", units=(MILLIMETRES, CENTIMETRES)),
+        finding="is {size} times the reach of the robot", units=(MILLIMETERS, CENTIMETERS)),
     Rule("velocities of revolute joints", "`limits.velocity`", _numbers("rad/s", "limits", size=_velocity),
         size="rad/s", high=FASTEST, usual=3,
         reason="limbs do not turn so fast; powers of ten from 100 on mean no limit",
@@ -164,11 +164,11 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         size="times the largest radius of gyration", high=30, usual=0.8,
         reason="masses lie along the rows that hold them; of 349 chains of real robots none has more than 8",
         finding="is {size} times the largest radius of gyration of a link, {gyration} m",
-        units=(MILLIMETRES, CENTIMETRES)),
+        units=(MILLIMETERS, CENTIMETERS)),
     Rule("place of the base", "`base.xyz`", _numbers("m", "base", size=_in_extents),
         size="times the reach of the robot", high=100,
         reason="a robot stands in a room, whose origin is not so far away",
-        finding="is {size} times the reach of the robot", units=(MILLIMETRES,)),
+        finding="is {size} times the reach of the robot", units=(MILLIMETERS,)),
     Rule("densities of links", "`mass`, `inertia`",
         _links(lambda checked, index: density_of_sphere(checked.joints[index].link)),
         size="kg/m^3, of the solid sphere with the same mass and sum of moments",

@@ -20,7 +20,7 @@ from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, mo
 TINY = 0.1
 """Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
 
-DAMPING_IN_MILLIMETRES = OtherUnit("N mm s/rad", 1e-3)
+DAMPING_IN_MILLIMETERS = OtherUnit("N mm s/rad", 1e-3)
 OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
 WHICH_SIDE = "with `gear_ratio` it is that of the motor's shaft, without that on the joint's side"
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
@@ -215,7 +215,7 @@ GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("gear ratios of prismatic joints", "`gear_ratio`", _motors("gear_ratio", unit="rad/m"),
         size="rad/m", low=5, high=1e5, usual=600,
         reason="a screw of 0.06 mm a turn has 100,000, a wheel of 0.4 m diameter 5",
-        finding="turns the motor by {size} rad for each metre", units=(OtherUnit("rad/mm", 1e3),),
+        finding="turns the motor by {size} rad for each meter", units=(OtherUnit("rad/mm", 1e3),),
         advice="of a screw it is 2*pi over the travel of a turn in m, e.g. 2*pi/0.020"),
 )  # fmt: skip
 
@@ -239,7 +239,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         size="1/s, over the inertia of the motor", high=500,
         reason="a motor that is let go runs on for more than 2 ms",
         finding="stops the motor alone at a rate of {size} 1/s",
-        units=(DAMPING_IN_MILLIMETRES, OtherUnit("N m s/krpm", 0.03 / math.pi)),
+        units=(DAMPING_IN_MILLIMETERS, OtherUnit("N m s/krpm", 0.03 / math.pi)),
         advice="check the units of damping and inertia"),
     Rule("velocities of motors", "`max_velocity`", _motors("max_velocity", unit="rad/s", carrying=True),
         size="rad/s, as written", high=2500, usual=400, reason="robots have no faster motors",
@@ -279,14 +279,14 @@ RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
         high=1, usual=0.05,
         reason="the joint could not go as fast as its limits say",
         finding="takes, at the largest velocity of the joint, {size} times the largest torque of its motors",
-        units=(DAMPING_IN_MILLIMETRES._replace(instead_of="N m s/rad"),),
+        units=(DAMPING_IN_MILLIMETERS._replace(instead_of="N m s/rad"),),
         explained_by=(*GEARS, "velocities of motors", "velocities of motors and joints", "weak motors")),
     Rule("damping of joints", "`damping`", _joint_damping,
         size="torque at 1 rad/s (force at 1 m/s) over the weight of the robot at its reach",
         high=500, usual=1e-3,
         reason="the robot could hardly move; placeholders in descriptions of real robots come to 50",
         finding="brakes, at 1 rad/s or 1 m/s, with {size} times the weight of the robot at its reach",
-        units=(DAMPING_IN_MILLIMETRES,), explained_by=(*SIZES, "damping beside torque")),
+        units=(DAMPING_IN_MILLIMETERS,), explained_by=(*SIZES, "damping beside torque")),
     Rule("dry friction beside torque", "`motor.friction.coulomb`",
         _coulomb(lambda rubbing, torque: torque / rubbing.max_torque),
         size="over the largest torque of the motor", high=1, usual=0.1,

@@ -12,11 +12,11 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETRES, SIZES, TURN
+from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
@@ -28,8 +28,8 @@ TOO_SOFT = (
     OtherUnit("kN m/rad", 1e3, instead_of="N m/rad"),
     OtherUnit("N/mm", 1e3, instead_of="N/m"),
 )
-NEWTON_MILLIMETRES = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
-TOO_STIFF = (NEWTON_MILLIMETRES, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
+NEWTON_MILLIMETERS = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
+TOO_STIFF = (NEWTON_MILLIMETERS, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller number (`TOO_SOFT`) or a larger one than in the expected unit."""
 
 SLIPS_OF_DAMPING = (
@@ -100,7 +100,7 @@ def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, Of
     for number, joint in checked.driven:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
             command = Command.at_rest(np.array([0.0, checked.sizes.loads[number]]), np.zeros(2))
-            held = joint.actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
+            held = joint.actuator.transmit(command, MIN_MARGIN, None)
             constant = getattr(joint.actuator, "stiffness", None)
             path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
             value = math.nan if constant is None else constant
@@ -154,7 +154,7 @@ def _least_stiffness(joint: Joint) -> float:
     found = corridor(joint)
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
-    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), NEAR_SINGULAR_MARGIN, None)
+    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
     return float(held["stiffness"][0])
 
 
@@ -201,7 +201,7 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="springs in joints do not wind up so far",
         finding="is a deflection of more than half a turn (than the reach)",
-        units=(DEGREES, MILLIMETRES), in_angles=True),
+        units=(DEGREES, MILLIMETERS), in_angles=True),
     Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
         size="over the lowest that the springs give at rest", low=1, high=500, usual=2,
         reason="below 1 nothing is within the limits, and springs do not become so much stiffer",

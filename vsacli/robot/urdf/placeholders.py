@@ -157,7 +157,7 @@ def joint_loads(
     """
     loads, beyond = [], _Masses()  # beyond joint i, as seen from the origin of frame i
     for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
-        radius, height = _centre(row, link)
+        radius, height = _center(row, link)
         about_axis = beyond.farther(abs(row.a)).joined(link, radius)
         inertia = about_axis.second if joint.is_revolute else about_axis.mass
         weight = STANDARD_GRAVITY * math.sqrt(about_axis.mass * inertia)
@@ -169,7 +169,7 @@ def joint_loads(
     return loads[::-1]
 
 
-def _centre(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
+def _center(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
     """Return the distance of a link's center of mass from its joint axis, and its height along it above d."""
     x, y, z = link.com
     c, s = math.cos(row.alpha), math.sin(row.alpha)

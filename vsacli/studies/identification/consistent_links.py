@@ -147,17 +147,17 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
 
 
 class _Problem(NamedTuple):
-    """Coordinates s of the parameters x = centre + directions @ s; the first s are errors of the result.
+    """Coordinates s of the parameters x = center + directions @ s; the first s are errors of the result.
 
     Attributes:
-        centre: parameters with the identified values, (parameters,).
+        center: parameters with the identified values, (parameters,).
         directions: directions, (parameters, parameters); the first ones change the identified values by
             standard errors, the others keep them.
         errors: number of the first directions.
         inverse: inverses of the pseudo-inertias of the reference links, (links, 4, 4).
     """
 
-    centre: FloatArray
+    center: FloatArray
     directions: FloatArray
     errors: int
     inverse: FloatArray
@@ -170,14 +170,14 @@ class _Problem(NamedTuple):
         q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
         count = len(estimate.values)
         to_estimate = q[:, :count]
-        centre = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
+        center = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
         errors = to_estimate @ solve_triangular(r[:count], root, trans="T")
         inverse = np.asarray(np.linalg.inv(pseudo_inertia(start.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
-        return cls(centre, np.hstack((errors, q[:, count:])), count, inverse)
+        return cls(center, np.hstack((errors, q[:, count:])), count, inverse)
 
     def parameters(self, s: FloatArray) -> FloatArray:
         """Return the standard parameters at s, (links, 10)."""
-        x: FloatArray = (self.centre + self.directions @ s).reshape(-1, len(SYMBOLS))
+        x: FloatArray = (self.center + self.directions @ s).reshape(-1, len(SYMBOLS))
         return x
 
     def value(self, s: FloatArray, weight: float) -> float:
@@ -196,7 +196,7 @@ class _Problem(NamedTuple):
         gradient = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
         moved = np.einsum("lij,pjk->lpik", inverse, _BASIS)
         blocks = np.einsum("lpik,lqki->lpq", moved, moved)
-        hessian = np.zeros((len(self.centre),) * 2)
+        hessian = np.zeros((len(self.center),) * 2)
         for link, block in enumerate(blocks):
             place = slice(link * len(SYMBOLS), (link + 1) * len(SYMBOLS))
             hessian[place, place] = block
@@ -209,7 +209,7 @@ class _Problem(NamedTuple):
 
 def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
     """Return the parameters of all links with the least value, (parameters,), from a consistent start."""
-    s = np.asarray(np.linalg.solve(problem.directions, start - problem.centre), dtype=np.float64)
+    s = np.asarray(np.linalg.solve(problem.directions, start - problem.center), dtype=np.float64)
     off = float(s[: problem.errors] @ s[: problem.errors])
     lighter = int(np.ceil(np.log10(max(off, 1.0) / WEIGHT) / np.log10(LIGHTER)))
     for power in range(lighter, -1, -1):

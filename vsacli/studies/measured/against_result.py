@@ -42,7 +42,7 @@ SAME_LAG = 0.2
 def compare(
     result: str | Path | StoredResult,
     recording: str | Path,
-    begins_at: float | None = None,
+    time_offset: float | None = None,
     columns: str | Path | None = None,
 ) -> Comparison:
     """Compare a recording with a result: error figures of each signal, aligned in time.
@@ -51,7 +51,7 @@ def compare(
         result: a result or simulation, or the path of its file.
         recording: CSV file with a column `time` and columns named as by `vsacli export`, at its own times; a
             unit in brackets may follow a name. Cells may be empty where a column has no sample.
-        begins_at: time in the recording at which the result begins, s since the first row; found from the
+        time_offset: time in the recording at which the result begins, s since the first row; found from the
             signals if None.
         columns: file that maps other column names.
 
@@ -60,13 +60,13 @@ def compare(
             cannot be aligned, or does not overlap with the result.
         StorageError: a file cannot be read.
     """
-    if begins_at is not None and not math.isfinite(begins_at):
+    if time_offset is not None and not math.isfinite(time_offset):
         raise InputError.one(
-            f"when the result begins must be a finite number of seconds, not {begins_at:g}", recording
+            f"the time offset must be a finite number of seconds, not {time_offset:g}", recording
         )
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
-            return compare(stored, recording, begins_at, columns)
+            return compare(stored, recording, time_offset, columns)
     places = known_columns(result, stand_ins(_variables(result)))
     recorded, behind = _most_direct(read_recording(recording, places, "the result", load_columns(columns)))
     computed = _interpolated(result, recorded.signals)
@@ -75,21 +75,21 @@ def compare(
         Pairing(function, duration, *_sampled(recorded, signal))
         for function, signal in zip(computed, recorded.signals, strict=True)
     ]
-    alignment = _aligned(recorded, pairings, recording) if begins_at is None else Alignment(begins_at)
-    covered = _covered(recorded.time - alignment.begins_at, duration, recording)
+    alignment = _aligned(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
+    covered = _covered(recorded.time - alignment.time_offset, duration, recording)
     signals = _agreements(result, recorded, pairings, alignment)
     notes = (
         *_alignment_notes(alignment),
-        *_common_lag(signals, alignment.begins_at),
+        *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, _gear_ratios(recorded, result)),
         *_left_out(recorded, behind),
     )
     return Comparison(
         result=str(result.path),
         recording=str(recording),
-        begins_at=alignment.begins_at,
-        begins_at_error=alignment.error,
-        found=begins_at is None,
+        time_offset=alignment.time_offset,
+        time_offset_error=alignment.error,
+        found=time_offset is None,
         duration=duration,
         compared=covered,
         signals=signals,
@@ -148,8 +148,8 @@ def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path)
     if alignment is None:
         raise InputError.one(
             "is like the computed signals at no shift in time; is it the recording of this motion, and does "
-            f"it move beyond its noise? {_other_unit(pairings[0])}--begins-at says when in the recording the "
-            "result begins",
+            f"it move beyond its noise? {_other_unit(pairings[0])}--time-offset says when in the recording "
+            "the result begins",
             path,
         )
     return alignment
@@ -176,7 +176,7 @@ def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
     if rows < FEWEST_SAMPLES:
         raise InputError.one(
             f"lies from {time[0]:.4g} to {time[-1]:.4g} s of the result, which takes {duration:.4g} s: "
-            f"{rows} of its rows are within, {FEWEST_SAMPLES} are needed; change --begins-at",
+            f"{rows} of its rows are within, {FEWEST_SAMPLES} are needed; change --time-offset",
             path,
         )
     return covered
@@ -187,7 +187,7 @@ def _agreements(
 ) -> tuple[Agreement, ...]:
     """Return the agreement of every column with the result."""
     groups = [_group(signal) for signal in recorded.signals]
-    places = exchanged_places(pairings, groups, alignment.begins_at)
+    places = exchanged_places(pairings, groups, alignment.time_offset)
     followed = [
         None if place == index else recorded.signals[place].column for index, place in enumerate(places)
     ]
@@ -200,14 +200,14 @@ def _agreements(
 def _agreement(
     result: StoredResult, signal: Measured, pairing: Pairing, alignment: Alignment, follows: str | None
 ) -> Agreement:
-    computed, there = pairing.overlap(alignment.begins_at)
-    time, computed = (pairing.time - alignment.begins_at)[there], computed[there]
+    computed, there = pairing.overlap(alignment.time_offset)
+    time, computed = (pairing.time - alignment.time_offset)[there], computed[there]
     values = pairing.measured[there]
     error, place = values - computed, signal.place
     worst = int(np.argmax(np.abs(error))) if error.size else None
     rms, scale = root_mean_square(error), root_mean_square(computed)
-    fit = LineFit() if follows else fit_line(pairing, alignment.begins_at)
-    still = still_signal(pairing, alignment.begins_at, fit) if error.size and not follows else None
+    fit = LineFit() if follows else fit_line(pairing, alignment.time_offset)
+    still = still_signal(pairing, alignment.time_offset, fit) if error.size and not follows else None
     line = LineFit() if still else fit
     left_out = int(np.count_nonzero(there) - np.count_nonzero(fit.used)) if fit.used.size else 0
     usual = root_mean_square(error[fit.used[there]]) if left_out else 0.0
@@ -242,10 +242,10 @@ def _agreement(
 def _alignment_notes(alignment: Alignment) -> Iterator[str]:
     if alignment.others:
         listed = ", ".join(f"{other:.3f} s" for other in alignment.others[:3])
-        yield f"beginning at {listed} it would agree as well, as periodic motions do; --begins-at chooses"
+        yield f"beginning at {listed} it would agree as well, as periodic motions do; --time-offset chooses"
 
 
-def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]:
+def _common_lag(signals: Sequence[Agreement], time_offset: float) -> Iterator[str]:
     """Yield a note if all signals but positions lag equally, as if joints did not follow their commands."""
     others = [signal for signal in signals if not signal.variable.startswith(POSITIONS)]
     lags = [signal.lag for signal in others if math.isfinite(signal.lag)]
@@ -254,7 +254,7 @@ def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]
     if sure and abs(middle) >= SHOWN_LAG and max(abs(lag - middle) for lag in lags) <= SAME_LAG * abs(middle):
         yield (
             f"all signals but positions lag by {1e3 * middle:+.1f} ms; if the joints did not follow their "
-            f"commands, --begins-at {begins_at + middle:.4f} may be right"
+            f"commands, --time-offset {time_offset + middle:.4f} may be right"
         )
 
 

@@ -92,9 +92,9 @@ class Comparison(Published):
 
     Attributes:
         result, recording: paths of the files.
-        begins_at: time in the recording at which the result begins, s since the first sample.
-        begins_at_error: standard error of `begins_at`, s; NaN if it was given.
-        found: whether `begins_at` was found from the signals.
+        time_offset: time in the recording at which the result begins, s since the first sample.
+        time_offset_error: standard error of `time_offset`, s; NaN if it was given.
+        found: whether `time_offset` was found from the signals.
         duration: duration of the result, s.
         compared: duration of the part that the recording covers, s.
         signals: agreement of each compared column.
@@ -104,8 +104,8 @@ class Comparison(Published):
 
     result: str
     recording: str
-    begins_at: float
-    begins_at_error: float
+    time_offset: float
+    time_offset_error: float
     found: bool
     duration: float
     compared: float
@@ -116,7 +116,7 @@ class Comparison(Published):
     format: ClassVar[str] = "vsacli-comparison/2"
     shape: ClassVar = {
         "format": "format",
-        **{name: name for name in ("result", "recording", "begins_at", "begins_at_error")},
+        **{name: name for name in ("result", "recording", "time_offset", "time_offset_error")},
         **{name: name for name in ("found", "duration", "compared")},
         **{name: name for name in ("signals", "notes")},
     }
@@ -129,8 +129,8 @@ class Comparison(Published):
         return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
 
     def _headline(self) -> str:
-        when = _with_error(abs(self.begins_at), self.begins_at_error, "s", ".4f")
-        where = f"{when} {'into' if self.begins_at >= 0 else 'before'} the recording"
+        when = _with_error(abs(self.time_offset), self.time_offset_error, "s", ".4f")
+        where = f"{when} {'into' if self.time_offset >= 0 else 'before'} the recording"
         how = "found from the signals" if self.found else "as given"
         covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared"
         return f"{self.result}, {self.recording}: {covered}; the result begins {where} ({how})"

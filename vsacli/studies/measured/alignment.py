@@ -61,12 +61,12 @@ class Alignment(NamedTuple):
     """The place of the result in the recording.
 
     Attributes:
-        begins_at: time in the recording at which the result begins, s; negative if it begins earlier.
+        time_offset: time in the recording at which the result begins, s; negative if it begins earlier.
         error: standard error, s; NaN if the time was given, or no column determines it.
         others: further times that explain nearly as much, as for periodic motions.
     """
 
-    begins_at: float
+    time_offset: float
     error: float = math.nan
     others: tuple[float, ...] = ()
 

@@ -58,11 +58,11 @@ class ImpossibleError(VsacliError):
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The rule by which samples are accepted: a margin of at least `near_singular`, and every limit kept.
+    """The rule by which samples are accepted: a margin of at least `min_margin`, and every limit kept.
 
     Attributes:
         robot: robot that executes the samples.
-        near_singular: required margin.
+        min_margin: required margin.
         recorded: allowance for the noise of a recorded task.
         reserve: required clearance to the limits of `RESERVED`, as a share of each limit.
         ignored: indices of joints that do not count.
@@ -71,7 +71,7 @@ class Acceptance:
     """
 
     robot: Robot
-    near_singular: float
+    min_margin: float
     recorded: RecordedLimits | None = None
     reserve: float = 0.0
     ignored: frozenset[int] = frozenset()
@@ -79,7 +79,7 @@ class Acceptance:
 
     def stricter(self, share: float) -> Acceptance:
         """Return the rule with a margin that is larger by a share, and with this share as the reserve."""
-        return replace(self, near_singular=(1 + share) * self.near_singular, reserve=share)
+        return replace(self, min_margin=(1 + share) * self.min_margin, reserve=share)
 
     def confirmed(
         self, attempt: Callable[[Acceptance], tuple[_Found, FloatArray | None]]
@@ -100,7 +100,7 @@ class Acceptance:
 
     def refused(self, part: TaskSamples) -> BoolArray:
         """Return a mask of the samples that are not accepted, (samples, joints)."""
-        block = compute_block(self.robot, part.motion, self.near_singular)
+        block = compute_block(self.robot, part.motion, self.min_margin)
         values = map(block.of_joint, range(len(self.robot.joints)))
         by_joint = [
             self._refused(joint, of_joint, part.instants)
@@ -172,14 +172,14 @@ class Acceptance:
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """Return all variables of one joint, by name."""
-        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular)}
+        return {**load.command.arrays(), **drive(joint, load.command, self.min_margin)}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])
         flags = values["flags"]
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, values, instants)
-        refused: BoolArray = (short < self.near_singular) | has(flags, Flag.INFEASIBLE | LIMITS)
+        refused: BoolArray = (short < self.min_margin) | has(flags, Flag.INFEASIBLE | LIMITS)
         return refused | self._near_limits(joint, values)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
@@ -197,9 +197,9 @@ class Acceptance:
         gap[np.isnan(gap)] = np.inf
         gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
         step = int(gap.argmin())
-        if gap[step] >= self.near_singular:
+        if gap[step] >= self.min_margin:
             return None
-        low, high = lower[step] / (1 - self.near_singular), upper[step] / (1 + self.near_singular)
+        low, high = lower[step] / (1 - self.min_margin), upper[step] / (1 + self.min_margin)
         bound = low if math.isnan(low) or asked[step] < low else high
         unit = units.STIFFNESS.unit(joint.type)
         return Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit, of_load=True)
@@ -375,7 +375,7 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     variable_stiffness_actuator(joint)
     if reason := acceptance.path_reason(joint, load):
         raise ImpossibleError(f"no stiffness changes that {reason}")
-    admissible = admissible_stiffness(joint, load.command, acceptance.near_singular)
+    admissible = admissible_stiffness(joint, load.command, acceptance.min_margin)
     if np.isnan(admissible.low).any():
         raise ImpossibleError(acceptance.reason(joint, load))
     return admissible
@@ -392,7 +392,7 @@ def variable_stiffness_actuator(joint: Joint) -> Actuator:
     return joint.actuator
 
 
-def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -> Range:
+def admissible_stiffness(joint: Joint, command: Command, min_margin: float) -> Range:
     """Return the stiffness range that keeps the margin, the stiffness limits and the deflection limits.
 
     The margin min(sigma - lower, upper - sigma)/sigma >= m means lower/(1-m) <= sigma <= upper/(1+m).
@@ -400,13 +400,13 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
     Args:
         joint: joint with springs and limits.
         command: command that gives the elastic torque; its stiffness serves as a scale only.
-        near_singular: margin m.
+        min_margin: margin m.
     """
     actuator = variable_stiffness_actuator(joint)
     corridor = actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
     least, most = joint.limits.stiffness
-    low = np.maximum(corridor.lower / (1 - near_singular), least)
-    high = np.minimum(corridor.upper / (1 + near_singular), most)
+    low = np.maximum(corridor.lower / (1 - min_margin), least)
+    high = np.minimum(corridor.upper / (1 + min_margin), most)
     if np.isinf(actuator.max_deflections).all():
         return Range(low, high)
     return Range(low, np.minimum(high, _deflection_ceiling(actuator, command, corridor.lower)))

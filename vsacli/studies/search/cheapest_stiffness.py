@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import as_name
@@ -92,7 +93,7 @@ def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criteri
         InputError: the name is unknown, or a joint lacks a parameter.
     """
     if name not in CRITERIA:
-        raise InputError.one(f"what is minimised must be one of {', '.join(CRITERIA)}, not {name!r}")
+        raise InputError.one(f"unknown objective {name!r}{did_you_mean(name, CRITERIA)}")
     criterion = CRITERIA[name]()
     for index in joints:
         criterion.check(robot.joints[index])
@@ -104,7 +105,7 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
 
     None means that it keeps them; an empty array means that only the self-check fails.
     """
-    task = Task(Acceptance(what.robot, what.margin), trajectory)
+    task = Task(Acceptance(what.robot, what.min_margin), trajectory)
     return task.falls_short(Fix(0.0, what.robot, trajectory))
 
 
@@ -124,7 +125,7 @@ def cheapest_stiffness(
     progress: Callable[[int], object],
 ) -> Optimum:
     """Return the best stiffness of all joints, confirmed by a run."""
-    search = CheapestStiffness(Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress)
+    search = CheapestStiffness(Acceptance(what.robot, what.min_margin), trajectory, criterion, seed, progress)
     try:
         found = search.confirmed(what)
     except ImpossibleError as error:

@@ -184,7 +184,7 @@ class CombinedSearch:
             if STIFFNESS.key not in joint.actuator.commanded:
                 impossible |= acceptance.refused_steps(joint, load)
             elif len(choices) == 1:
-                low, high = admissible_stiffness(joint, load.command, acceptance.near_singular)
+                low, high = admissible_stiffness(joint, load.command, acceptance.min_margin)
                 impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
         return impossible
 

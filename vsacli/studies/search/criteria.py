@@ -23,7 +23,7 @@ from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import apart
-from vsacli.studies.search.interior_point import LAST_GAP, WARM_GAP, Minimum, Problem, minimise
+from vsacli.studies.search.interior_point import LAST_GAP, WARM_GAP, Minimum, Problem, minimize
 from vsacli.studies.search.loads import Load
 from vsacli.studies.sensitivities.joint_derivatives import ImplicitSolution
 from vsacli.trajectory.trajectory import Trajectory
@@ -175,10 +175,10 @@ class Torque(Criterion):
         return math.hypot(*costs) / math.sqrt(len(costs))
 
 
-class Copper(Criterion):
+class CopperLoss(Criterion):
     """Copper loss of the motors of the joint."""
 
-    name = "copper"
+    name = "copper_loss"
     words = "heat in the windings"
 
     def check(self, joint: Joint) -> None:
@@ -286,7 +286,7 @@ class Peak(Criterion):
         return max(costs)
 
 
-CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, Copper, Peak)}
+CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, CopperLoss, Peak)}
 """Criteria by name."""
 
 
@@ -387,8 +387,8 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
         for each in costed:
             each.scale = each.scale._replace(smoothing=smoothing)
         last = WARM_GAP if smoothing != smoothings[-1] else ROUGH_GAP if cold else LAST_GAP
-        found = minimise(problem, start, gap, last)
+        found = minimize(problem, start, gap, last)
         start, gap = found.unknowns, WARM_GAP
     if not cold and not found.found:  # steps became short; with new multipliers they are long again
-        found = minimise(problem, start, gap, last)
+        found = minimize(problem, start, gap, last)
     return found

@@ -224,12 +224,12 @@ class Fixes(Published):
     stiffness has no transitions.
 
     Attributes:
-        near_singular: margin required of every sample.
+        min_margin: margin required of every sample.
         causes: reason why each refused joint is refused.
         fixes: fixes to choose from, the smallest first; those with another branch come last.
     """
 
-    near_singular: float
+    min_margin: float
     slow_down: SlowDown | NotPossible | None = None
     stiffness_offset: StiffnessOffset | NotPossible | None = None
     stiffness_profile: StiffnessProfile | NotPossible | None = None
@@ -242,7 +242,7 @@ class Fixes(Published):
 
     def _lines(self) -> Iterator[str]:
         """Yield the causes, a heading, and a numbered sentence for each fix."""
-        margin = f"a margin of at least {100 * self.near_singular:.6g} %"
+        margin = f"a margin of at least {100 * self.min_margin:.6g} %"
         if self.slow_down is None:
             yield f"nothing to change: every step has {margin} and keeps every limit"
             return

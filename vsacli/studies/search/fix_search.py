@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+from vsacli.base.flags import MIN_MARGIN, check_min_margin
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
 from vsacli.dynamics.inverse import fitted
@@ -44,7 +44,7 @@ FASTER_SHARE = 0.8
 """Share of the extra duration of another fix below which a larger fix of the same kinds is worth offering."""
 
 
-def fixes(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Fixes:
+def fixes(robot: Robot, trajectory: Trajectory, min_margin: float = MIN_MARGIN) -> Fixes:
     """Return the smallest changes after which every sample has the margin and keeps every limit.
 
     Slow-down, constant stiffness change, other stiffness profile and longer transition are tried alone, then
@@ -53,24 +53,24 @@ def fixes(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SING
     Args:
         robot: robot that executes the motion.
         trajectory: commanded motion.
-        near_singular: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
+        min_margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
 
     Raises:
-        InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is not a
+        InputError: the trajectory is not for the robot, a transmission is damped, or `min_margin` is not a
             valid margin.
         TypeError: robot or trajectory is of another type.
     """
     trajectory = fitted(robot, trajectory)
-    check_near_singular(near_singular)
-    acceptance = Acceptance(robot, near_singular, RecordedLimits(trajectory))
+    check_min_margin(min_margin)
+    acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)
     as_it_is = Fix(0.0, robot, trajectory)
     if damped_joints(robot, trajectory):
         if asked.falls_short(as_it_is) is not None:
             refuse_damped_transmissions(robot, trajectory, "fixes")
-        return Fixes(near_singular)
+        return Fixes(min_margin)
     if not acceptance.refused_joints(trajectory).any() and asked.falls_short(as_it_is) is None:
-        return Fixes(near_singular)
+        return Fixes(min_margin)
     found_causes = dict(causes(asked))
     tried = _tried(asked, found_causes)
     if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
@@ -80,7 +80,7 @@ def fixes(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SING
         }
         tried = _tried(asked, found_causes)
     return Fixes(
-        near_singular,
+        min_margin,
         **{name: tried.part(name) for name in ALONE},
         causes=tuple(found_causes.values()),
         fixes=tuple(tried.chosen),

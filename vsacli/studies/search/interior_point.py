@@ -25,7 +25,7 @@ WARM_GAP = 1e-3
 NEARLY_SOLVED = 0.1
 """Share of the gap below which the gain of a Newton step ends a barrier problem."""
 
-CENTRED = 10.0
+CENTERED = 10.0
 """Largest deviation of slack times multiplier from the barrier parameter then, as a multiple of it."""
 
 SAFEGUARD = 1e5
@@ -98,7 +98,7 @@ class Minimum:
     found: bool
 
 
-def minimise(
+def minimize(
     problem: Problem,
     start: FloatArray,
     gap: float = FIRST_GAP,
@@ -125,10 +125,10 @@ def minimise(
         if newton.factor is None:
             return Minimum(unknowns, point.cost, found=False)
         step = newton.step(gap / count)
-        while gap > last and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count):
+        while gap > last and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / count):
             gap = max(min(0.2 * gap, gap**1.5), last)
             step = newton.step(gap / count)
-        solved = gap <= last and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count)
+        solved = gap <= last and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / count)
         if solved or enough(unknowns) or _stalled(costs, stalled):
             break
         share = _line_search(problem, point, unknowns, step, gap / count)
@@ -175,10 +175,10 @@ class _Newton:
         )
         return _Step(unknowns, multipliers, float(right @ unknowns))
 
-    def centred(self, barrier: float) -> bool:
+    def centered(self, barrier: float) -> bool:
         """Return whether all products of slack and multiplier are near the barrier parameter."""
         off = np.abs(self._slack * self._multipliers - barrier)
-        return bool(off.max(initial=0.0) <= CENTRED * barrier)
+        return bool(off.max(initial=0.0) <= CENTERED * barrier)
 
 
 def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool] | None:

@@ -286,10 +286,10 @@ def _change(
     acceptance: Acceptance, joint: Joint, load: Load, margins: float, smoothings: float
 ) -> Change | None:
     """Return the nearest change for multiples of margin and smoothing time; None if no spline is found."""
-    near_singular = margins * acceptance.near_singular
-    if near_singular >= 1:
+    min_margin = margins * acceptance.min_margin
+    if min_margin >= 1:
         return None
-    admissible = admissible_stiffness(joint, load.command, near_singular)
+    admissible = admissible_stiffness(joint, load.command, min_margin)
     asked = load.command.commanded["stiffness"]
     bounds = _narrowed(load.time, admissible.low - asked, admissible.high - asked)
     if np.any(bounds.low > bounds.high):

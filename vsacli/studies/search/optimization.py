@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+from vsacli.base.flags import MIN_MARGIN, check_min_margin
 from vsacli.base.texts import as_name
 from vsacli.base.units import ENERGY
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
@@ -63,7 +63,7 @@ def optimize(
     minimize: str = "torque",
     vary: str = "stiffness",
     *,
-    margin: float = NEAR_SINGULAR_MARGIN,
+    min_margin: float = MIN_MARGIN,
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Optimum:
@@ -76,11 +76,11 @@ def optimize(
     Args:
         robot: robot that executes the motion.
         trajectory: motion to improve.
-        minimize: "torque" (rms of the motor torques), "energy" (positive motor work), "copper" (heat in the
-            windings) or "peak" (of the motor torques), for each joint separately, or for all joints together
-            if the timing varies; or "time".
+        minimize: "torque" (rms of the motor torques), "energy" (positive motor work), "copper_loss" (heat in
+            the windings) or "peak" (of the motor torques), for each joint separately, or for all joints
+            together if the timing varies; or "time".
         vary: "stiffness", "timing" or "both"; for "time" one of the latter two.
-        margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
+        min_margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
         seed: seed of the random starts.
         progress: function to call with the number of further searches done; `searches` gives the total.
 
@@ -89,10 +89,10 @@ def optimize(
             `vary` cannot be combined.
     """
     trajectory = fitted(robot, trajectory)
-    check_near_singular(margin)
-    refuse_damped_transmissions(robot, trajectory, "optimisations")
+    check_min_margin(min_margin)
+    refuse_damped_transmissions(robot, trajectory, "optimizations")
     varied = varied_joints(robot, vary)
-    what = Optimum(robot, trajectory.name, minimize, "duration", vary, margin)
+    what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin)
     if minimize == TIME:
         check_timing_varies(vary)
         return fastest(what, trajectory, varied, seed, progress)
@@ -210,7 +210,7 @@ def cheapest_pace(
         if not varied:
             return along(trajectory)
         stiffness = CheapestStiffness(
-            Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress
+            Acceptance(what.robot, what.min_margin), trajectory, criterion, seed, progress
         )
         try:
             return along(stiffness.confirmed(what).trajectory)
@@ -240,8 +240,8 @@ def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
     Raises:
         ImpossibleError: no slow-down was found.
     """
-    margin = what.margin + ROOM * (1 - what.margin)
-    found = CombinedSearch(Task(Acceptance(what.robot, margin), trajectory)).fastest()
+    min_margin = what.min_margin + ROOM * (1 - what.min_margin)
+    found = CombinedSearch(Task(Acceptance(what.robot, min_margin), trajectory)).fastest()
     if found is None:
         raise ImpossibleError("no slow-down keeps every limit with any constant change of the stiffness")
     return found
@@ -274,7 +274,7 @@ def _confirmed(
             short = np.mod(path_at(short, found.pace(count), path.duration), path.duration / count)
         return (search, found, best), short
 
-    found, kept = Acceptance(what.robot, what.margin).confirmed(attempt)
+    found, kept = Acceptance(what.robot, what.min_margin).confirmed(attempt)
     if not kept:
         raise ImpossibleError("what keeps every limit at some instants exceeds one between them")
     return found
@@ -287,7 +287,7 @@ def _retimed(
 
     Samples have the rate of the path, or a multiple if a file would not describe the motion between them.
     """
-    name = as_name(f"{what.asked}-{what.minimised}")
+    name = as_name(f"{what.asked}-{what.minimized}")
     parts = 1
     while True:
         best = retimed(path, found.pace(count), found.stiffness(count), name, parts)
@@ -312,7 +312,7 @@ def _costed(
         PacedJoint(
             motion,
             index,
-            rule.near_singular,
+            rule.min_margin,
             criterion,
             Scale(size, duration),
             share,

@@ -105,10 +105,10 @@ class Optimum(Published):
     Attributes:
         robot: robot that executes the trajectory.
         asked: name of the trajectory to be improved.
-        minimised: objective: torque, energy, copper, peak or time.
+        minimized: objective: torque, energy, copper_loss, peak or time.
         words: objective in words.
         varied: varied quantity: stiffness, timing or both.
-        margin: margin that every sample has.
+        min_margin: margin that every sample has.
         joints: results by joint name; empty if nothing was found, or if time is minimized.
         together: total cost of the joints if they share a timing, otherwise None.
         slow_down: factor by which the motion is slower than commanded, if a cost is minimized and no feasible
@@ -121,10 +121,10 @@ class Optimum(Published):
 
     robot: Robot = field(repr=False)
     asked: str
-    minimised: str
+    minimized: str
     words: str
     varied: str
-    margin: float
+    min_margin: float
     joints: dict[str, JointOptimum] = field(default_factory=dict)
     together: TotalCost | None = None
     slow_down: float = 1.0
@@ -139,7 +139,7 @@ class Optimum(Published):
         "robot": "robot_name",
         "trajectory": "asked",
         "possible": "possible",
-        **named("minimised", "varied", "margin", "joints"),
+        **named("minimized", "varied", "min_margin", "joints"),
         "together?": "together",
         "slow_down?": "slowed_down",
         "timing?": "timing",

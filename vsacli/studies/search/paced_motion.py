@@ -162,7 +162,7 @@ class PacedJoint:
     Args:
         motion: motion of all joints.
         index: index of the joint.
-        near_singular: required margin.
+        min_margin: required margin.
         criterion: cost of the joint.
         scale: scale of that cost.
         share: weight of the cost in that of all joints.
@@ -178,7 +178,7 @@ class PacedJoint:
         self,
         motion: PacedMotion,
         index: int,
-        near_singular: float,
+        min_margin: float,
         criterion: Criterion = NO_COST,
         scale: Scale = UNSCALED,
         share: float = 1.0,
@@ -186,7 +186,7 @@ class PacedJoint:
         *,
         varied: bool = False,
     ) -> None:
-        self._motion, self._index, self._near_singular = motion, index, near_singular
+        self._motion, self._index, self._min_margin = motion, index, min_margin
         self.criterion, self.scale, self._share = criterion, scale, share
         self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
@@ -231,7 +231,7 @@ class PacedJoint:
                 asked = dict(zip(STIFFNESS.names, rates, strict=True))
                 command = command._replace(commanded={**command.commanded, **asked})
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint
-            driven = driven_by(joint, command, self._near_singular)
+            driven = driven_by(joint, command, self._min_margin)
             variables = {**command.arrays(), **driven}
             bounds = [*self._corridor(driven), *limit_bounds(self._checks, variables, self._clearance)]
             costed = (self._joint, driven, level[0] if len(level) else None, self.scale)
@@ -242,10 +242,11 @@ class PacedJoint:
 
     def _corridor(self, driven: OfJoint) -> Iterator[Any]:
         if self._chosen:
-            margin = self._near_singular
-            yield driven["stiffness_lower"] / ((1 - margin) * driven["stiffness"]) - 1 + CLEARANCE
+            min_margin = self._min_margin
+            yield driven["stiffness_lower"] / ((1 - min_margin) * driven["stiffness"]) - 1 + CLEARANCE
             unbounded = np.isinf(driven["stiffness_upper"])
-            upper = np.where(unbounded, 1.0, driven["stiffness_upper"]) / ((1 + margin) * driven["stiffness"])
+            required = (1 + min_margin) * driven["stiffness"]
+            upper = np.where(unbounded, 1.0, driven["stiffness_upper"]) / required
             yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
 
 

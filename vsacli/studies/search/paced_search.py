@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.criteria import smoothed_minimum, trapezoidal
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
 from vsacli.studies.search.loads import Ends
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,
@@ -282,7 +282,7 @@ class TimingSearch(PacedSearch):
             PacedJoint(
                 motion,
                 index,
-                acceptance.near_singular,
+                acceptance.min_margin,
                 reserve=acceptance.reserve,
                 varied=index in varied,
             )
@@ -360,7 +360,7 @@ class TimingSearch(PacedSearch):
         return factor
 
     def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        return minimise(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
+        return minimize(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.compute.duals import Dual, seeds, tangent_of, value_of
-from vsacli.studies.search.interior_point import minimise
+from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.nearest_profile import peaks
 
 DIFFERENCE = 1e-6
@@ -277,7 +277,7 @@ def interior(
         return None
     relieved = SeparableProblem([_relieved(group, pulled) for group in problem.groups])
     start = np.append(pulled, bounds.max() + LEAST_RELIEF)
-    found = minimise(relieved, start, enough=lambda unknowns: bool(unknowns[-1] < -LEAST_RELIEF))
+    found = minimize(relieved, start, enough=lambda unknowns: bool(unknowns[-1] < -LEAST_RELIEF))
     return found.unknowns[:-1] if found.unknowns[-1] < 0 else None
 
 

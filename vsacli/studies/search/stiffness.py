@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import driven_by
@@ -32,7 +32,7 @@ from vsacli.studies.search.criteria import (
     smoothed_minimum,
     trapezoidal,
 )
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
@@ -100,7 +100,7 @@ class FixedMotion:
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._carrying if isinstance(rows[0], Dual) else self.joint
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), NEAR_SINGULAR_MARGIN)
+            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
 
 INSIDE = 1e-3
@@ -156,7 +156,7 @@ def nearest_profile(
     )
     problem = SeparableProblem([group])
     start = interior(problem, space.fitted(time, np.clip(target, *within)))
-    return None if start is None else minimise(problem, start).unknowns
+    return None if start is None else minimize(problem, start).unknowns
 
 
 INSTANTS_PER_PIECE = 8

@@ -301,7 +301,7 @@ class Task:
         also between samples, and those of a grid `FINER` times as fine. None are returned if only the
         self-check fails.
         """
-        run = Run(fix.robot, fix.trajectory, near_singular=self.acceptance.near_singular)
+        run = Run(fix.robot, fix.trajectory, min_margin=self.acceptance.min_margin)
         for _ in run:
             pass
         report = run.report()
@@ -316,7 +316,7 @@ class Task:
 
     def _is_short(self, joint: JointReport) -> bool:
         """Return whether a joint has less than the required margin or a verdict of `REFUSED`."""
-        return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
+        return joint.margin < self.acceptance.min_margin or any(map(joint.shows, REFUSED))
 
     def _refused_between(self, fix: Fix) -> FloatArray:
         """Return up to `WATCHED_STEPS` refused instants between the samples of a fix, s."""

@@ -150,10 +150,10 @@ def sensitivity(
         InputError: the trajectory does not fit the robot, a pattern matches no parameter, or a tolerance is
             invalid.
     """
-    return analysed(SensitivityRun(robot, trajectory, parameters), tolerances, runs=runs, seed=seed)
+    return analyzed(SensitivityRun(robot, trajectory, parameters), tolerances, runs=runs, seed=seed)
 
 
-def analysed(
+def analyzed(
     run: SensitivityRun,
     tolerances: str | None,
     *,

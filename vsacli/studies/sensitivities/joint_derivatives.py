@@ -18,7 +18,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.reach import margin
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.compute.duals import Dual, seeds, tangent_of, value_of
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.elastic_torques import TORQUES
@@ -190,7 +190,7 @@ def drive_derivatives(
     implicit = ImplicitSolution(robot.joints[index].actuator, carrying.actuator, directions)
     object.__setattr__(carrying.actuator, "solve", implicit.solve)  # a search would lose the derivatives
     with np.errstate(invalid="ignore", divide="ignore"):
-        driven = driven_by(carrying, command._replace(**torques), NEAR_SINGULAR_MARGIN)
+        driven = driven_by(carrying, command._replace(**torques), MIN_MARGIN)
         gap = margin(driven["stiffness"], driven["stiffness_lower"], driven["stiffness_upper"])
     found = {name: driven[name] for name in (*OF_MOTORS, SPEED)} | {MARGIN: gap}
     tangents = {

@@ -94,22 +94,25 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     """Return the tolerance of each parameter; None for exact ones.
 
     Args:
-        text: share such as `5 %`, or path of a YAML file that maps parameter paths to distributions; `*` in a
-            path matches anything, and the last matching entry counts.
+        text: share such as `5 %` or `0.05`, or path of a YAML file that maps parameter paths to
+            distributions; `*` in a path matches anything, and the last matching entry counts.
         chosen: parameters. A share does not apply to angles and lengths of links, which are often zero; these
             remain exact.
 
     Raises:
         InputError: an entry is not a distribution, or matches no parameter; with file and line.
     """
-    share = PER_CENT.fullmatch(text.strip())
-    if share is None:
-        if _PLAIN.fullmatch(text.strip()):
+    written = text.strip()
+    if share := PER_CENT.fullmatch(written):
+        size = _number(share["number"], text) / 100
+    elif _PLAIN.fullmatch(written):
+        size = _number(written, text)
+        if size > 1:  # more likely percent than a multiple
             raise InputError.one(
-                f"a tolerance of all numbers is a share, {text.strip()} % or another, or a file"
+                f"a tolerance of all numbers is a share: write {written} % or {size / 100:g}"
             )
+    else:
         return _from_file(text, chosen)
-    size = _number(share["number"], text) / 100
     exact = [each.quantity in SMALL_CHANGES or each.value == 0 for each in chosen]
     return tuple(
         None if known else Tolerance("normal", size * abs(each.value))

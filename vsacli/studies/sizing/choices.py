@@ -19,14 +19,14 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published, named
 from vsacli.robot.joint import Joint
-from vsacli.studies.sizing.catalogue import CatalogueMotor
+from vsacli.studies.sizing.catalog import CatalogMotor
 from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.ratios import Gears, Ratios, balanced, least_rms, ratios_within, rms_torque, shares
 from vsacli.studies.sizing.shaft import LIMITS, Shaft
 
 CRITERIA = {
-    "copper": "least copper loss",
-    "utilisation": "smallest share of any limit",
+    "copper_loss": "least copper loss",
+    "utilization": "smallest share of any limit",
     "mass": "least mass",
 }
 """Criteria, and the text for each in reports."""
@@ -76,19 +76,19 @@ class Choice(Published):
         return name, self.shares[name]
 
 
-def usual_criterion(motors: Sequence[CatalogueMotor]) -> str:
-    """Return the default criterion: "copper" if all resistances are known, otherwise "utilisation"."""
+def usual_criterion(motors: Sequence[CatalogMotor]) -> str:
+    """Return the default criterion: "copper_loss" if all resistances are known, otherwise "utilization"."""
     known = all(motor.resistance is not None for motor in motors)
-    return "copper" if known else "utilisation"
+    return "copper_loss" if known else "utilization"
 
 
-def check_criterion(criterion: str, motors: Sequence[CatalogueMotor]) -> None:
+def check_criterion(criterion: str, motors: Sequence[CatalogMotor]) -> None:
     """Check that all motors have the value that a criterion needs.
 
     Raises:
         InputError: some motors lack it; the error names the first.
     """
-    needed = {"copper": "resistance", "mass": "mass"}.get(criterion)
+    needed = {"copper_loss": "resistance", "mass": "mass"}.get(criterion)
     lacking = [motor.name for motor in motors if needed and getattr(motor, needed) is None]
     if lacking:
         more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
@@ -97,7 +97,7 @@ def check_criterion(criterion: str, motors: Sequence[CatalogueMotor]) -> None:
 
 
 def choices(
-    demand: MotorDemand, motors: Sequence[CatalogueMotor], gears: Gears, criterion: str
+    demand: MotorDemand, motors: Sequence[CatalogMotor], gears: Gears, criterion: str
 ) -> tuple[Choice, ...]:
     """Return every motor of a catalog with its best gear, sufficient ones first, sorted by the criterion.
 
@@ -110,7 +110,7 @@ def choices(
     shafts = Shaft.of(motor.shaft for motor in motors)
     possible = ratios_within(demand, shafts)
     trials = _trials(demand, motors, shafts, possible, gears, criterion)
-    cost = trials.largest if criterion == "utilisation" else trials.rms
+    cost = trials.largest if criterion == "utilization" else trials.rms
     ranked = np.where(trials.does.any(axis=0), np.where(trials.does, cost, np.inf), trials.largest)
     best = ranked.argmin(axis=0)
     found = [
@@ -140,7 +140,7 @@ class _Trials(NamedTuple):
 
 def _trials(
     demand: MotorDemand,
-    motors: Sequence[CatalogueMotor],
+    motors: Sequence[CatalogMotor],
     shafts: Shaft,
     possible: Ratios,
     gears: Gears,
@@ -164,9 +164,9 @@ def _best_of_range(
     ends = Ratios(np.full_like(possible.low, gears.low), np.full_like(possible.high, gears.high))
     within = possible.within(ends)
     wanted = least_rms(demand, shafts)
-    if criterion == "utilisation" or within.empty.any():
+    if criterion == "utilization" or within.empty.any():
         balance = balanced(demand, shafts, ends)
-        wanted = balance if criterion == "utilisation" else np.where(within.empty, balance, wanted)
+        wanted = balance if criterion == "utilization" else np.where(within.empty, balance, wanted)
     found = np.where(within.empty, ends.nearest(wanted), within.nearest(wanted))
     return _rounded(found, within)
 
@@ -178,7 +178,7 @@ def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:
 
 
 def _choice(
-    motor: CatalogueMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
+    motor: CatalogMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
 ) -> Choice:
     """Return the choice of a motor from its best trial."""
     _, index = place
@@ -208,7 +208,7 @@ def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
 def cost_of(choice: Choice, criterion: str) -> float:
     """Return the value of the criterion; for an insufficient choice, its largest share of a limit."""
     _, largest = choice.largest
-    wanted = {"copper": choice.copper_loss, "utilisation": largest, "mass": choice.mass or math.inf}
+    wanted = {"copper_loss": choice.copper_loss, "utilization": largest, "mass": choice.mass or math.inf}
     return wanted[criterion] if choice.does else largest
 
 
@@ -216,7 +216,7 @@ def coupled_choices(
     joint: Joint,
     first: Sequence[Choice],
     second: Sequence[Choice],
-    motors: Mapping[str, CatalogueMotor],
+    motors: Mapping[str, CatalogMotor],
     criterion: str,
 ) -> tuple[tuple[Choice, ...], tuple[Choice, ...]]:
     """Return the choices for each motor of a joint that can be coupled with the best choice for the other.
@@ -257,7 +257,7 @@ def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) ->
     if not possible.any():
         raise InputError.one(
             f"joint {joint.name}: coupled_inertia is {coupled:g} on the joint's side, that of rotors of the "
-            f"catalogue, with their best gears, must be below {largest.max():.4g}; correct it, or offer "
+            f"catalog, with their best gears, must be below {largest.max():.4g}; correct it, or offer "
             "heavier rotors or larger gears, and size again"
         )
     return possible
@@ -265,5 +265,5 @@ def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) ->
 
 def _costs(first: Sequence[Choice], second: Sequence[Choice], criterion: str) -> FloatArray:
     costs = [[cost_of(each, criterion) for each in some] for some in (first, second)]
-    together = np.maximum if criterion == "utilisation" else np.add
+    together = np.maximum if criterion == "utilization" else np.add
     return np.asarray(together.outer(*costs), dtype=np.float64)

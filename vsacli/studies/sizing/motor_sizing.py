@@ -12,7 +12,7 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
 from vsacli.base.units import TORQUE, VELOCITY
-from vsacli.studies.sizing.catalogue import CatalogueMotor
+from vsacli.studies.sizing.catalog import CatalogMotor
 from vsacli.studies.sizing.choices import Choice
 from vsacli.studies.sizing.demand import MotorDemand, Peak
 from vsacli.studies.sizing.shaft import LIMITS, Shaft
@@ -147,7 +147,7 @@ class MotorSizing(Published):
     gear_ratio: float | None
     own: OwnMotor | None = None
     choices: tuple[Choice, ...] = ()
-    record: CatalogueMotor | None = field(default=None, repr=False)
+    record: CatalogMotor | None = field(default=None, repr=False)
     shaft: Shaft | None = field(default=None, repr=False)
     points: WorkingPoints | None = field(default=None, repr=False)
 

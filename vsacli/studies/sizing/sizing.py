@@ -14,12 +14,13 @@ from typing import Any
 
 from vsacli.actuators.motor import JointMotor
 from vsacli.actuators.reach import LIMIT_ROUNDING
+from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, check_type
 from vsacli.documents.edited import edited, moved_files, unaliased
 from vsacli.documents.record_table import RecordTable
 from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
-from vsacli.studies.sizing.catalogue import CatalogueMotor, read_catalogue
+from vsacli.studies.sizing.catalog import CatalogMotor, read_catalog
 from vsacli.studies.sizing.choices import (
     CRITERIA,
     Choice,
@@ -39,7 +40,7 @@ from vsacli.trajectory.trajectory import Trajectory
 def size_drives(
     robot: Robot,
     trajectories: Sequence[Trajectory],
-    catalogue: str | os.PathLike[str] | None = None,
+    catalog: str | os.PathLike[str] | None = None,
     gears: Sequence[str] = (),
     minimize: str | None = None,
     *,
@@ -52,11 +53,11 @@ def size_drives(
     Args:
         robot: robot to size.
         trajectories: trajectories to execute.
-        catalogue: path of a CSV file of motors; None to check only the robot's own motors.
+        catalog: path of a CSV file of motors; None to check only the robot's own motors.
         gears: ratios such as "50,80,100", or a range such as "30..160", for all joints, or for one joint as
             in "slide=500..3000"; any ratio if empty. Motors that have a gear in the catalog keep it.
-        minimize: criterion for the best choice, "copper", "utilisation" or "mass"; if None, "copper" if the
-            catalog has all resistances, otherwise "utilisation".
+        minimize: criterion for the best choice, "copper_loss", "utilization" or "mass"; if None,
+            "copper_loss" if the catalog has all resistances, otherwise "utilization".
         progress: function to call with the number of further samples that are done.
 
     Raises:
@@ -69,7 +70,7 @@ def size_drives(
     if not trajectories:
         raise InputError.one("there is no trajectory to size for")
     by_joint = gears_of_joints(gears, robot.joint_names)
-    table = None if catalogue is None else read_catalogue(catalogue)
+    table = None if catalog is None else read_catalog(catalog)
     criterion = _criterion(table, gears, minimize)
     demand = demanded(robot, trajectories, progress)
     own = [motor for joint in robot.joints for motor in joint.actuator.motors]
@@ -79,7 +80,7 @@ def size_drives(
     return Sizing(
         robot=robot.name,
         outcomes=demand.outcomes,
-        catalogue=None if table is None else table.source.path,
+        catalog=None if table is None else table.source.path,
         candidates=0 if table is None else len(table.records),
         criterion=criterion,
         motors=tuple(found),
@@ -90,16 +91,16 @@ def size_drives(
 
 
 def _criterion(
-    table: RecordTable[CatalogueMotor] | None, gears: Sequence[str], minimize: str | None
+    table: RecordTable[CatalogMotor] | None, gears: Sequence[str], minimize: str | None
 ) -> str | None:
     if table is None:
         if gears or minimize is not None:
-            raise InputError.one("gears and a criterion are for motors of a catalogue; give one")
+            raise InputError.one("gears and a criterion are for motors of a catalog; give one")
         return None
     if minimize is None:
         return usual_criterion(table.records)
     if minimize not in CRITERIA:
-        raise InputError.one(f"unknown criterion {minimize!r}, expected one of {', '.join(CRITERIA)}")
+        raise InputError.one(f"unknown criterion {minimize!r}{did_you_mean(minimize, CRITERIA)}")
     check_criterion(minimize, table.records)
     return minimize
 
@@ -107,7 +108,7 @@ def _criterion(
 def _offered(
     robot: Robot,
     demands: Sequence[MotorDemand],
-    table: RecordTable[CatalogueMotor] | None,
+    table: RecordTable[CatalogMotor] | None,
     gears: Mapping[str, Gears],
     criterion: str | None,
 ) -> list[tuple[Choice, ...]]:
@@ -133,7 +134,7 @@ def _sized(
     demand: MotorDemand,
     motor: JointMotor,
     found: tuple[Choice, ...],
-    table: RecordTable[CatalogueMotor] | None,
+    table: RecordTable[CatalogMotor] | None,
 ) -> MotorSizing:
     """Return the sizing of one motor of the robot, without results if no sample is feasible."""
     if not demand.time.size:
@@ -162,13 +163,13 @@ def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMo
     return replace(own, low=float(low), high=float(high))
 
 
-def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[str]:
+def _notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> Iterator[str]:
     """Yield notes on assumptions that are not obvious."""
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
     if table is not None and table.others:
-        yield f"columns of the catalogue that were left out: {', '.join(table.others)}"
+        yield f"columns of the catalog that were left out: {', '.join(table.others)}"
 
 
 KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")

@@ -24,7 +24,7 @@ class Sizing(Published):
     Attributes:
         robot: name of the robot.
         outcomes: runs along the trajectories.
-        catalogue: path of the catalog; None without one.
+        catalog: path of the catalog; None without one.
         candidates: number of motors in the catalog.
         criterion: criterion of the best choice, one of `CRITERIA`; None without a catalog.
         motors: sizing of each motor, joint by joint.
@@ -35,7 +35,7 @@ class Sizing(Published):
 
     robot: str
     outcomes: tuple[Outcome, ...]
-    catalogue: str | None
+    catalog: str | None
     candidates: int
     criterion: str | None
     motors: tuple[MotorSizing, ...]
@@ -47,7 +47,7 @@ class Sizing(Published):
     shape: ClassVar = {
         **named("format", "verdict", "robot"),
         "trajectories": "outcomes",
-        **named("catalogue", "criterion", "warnings", "notes", "motors", "springs"),
+        **named("catalog", "criterion", "warnings", "notes", "motors", "springs"),
     }
 
     @property
@@ -79,8 +79,8 @@ class Sizing(Published):
             [
                 self._headline(),
                 *left_out(self.outcomes),
-                *(asked_table(known, several=several) if self.catalogue else ()),
-                *(choice_table(known) if self.catalogue else own_table(known, several=several)),
+                *(asked_table(known, several=several) if self.catalog else ()),
+                *(choice_table(known) if self.catalog else own_table(known, several=several)),
                 *lacking(self.lacking),
                 *spring_table(self.springs, several=several),
                 *warnings_and_notes(self.warnings, self.notes),
@@ -101,12 +101,12 @@ class Sizing(Published):
         places, lacking = len(self.motors), len(self.lacking)
         every = f"all {places} motors" if places > 1 else "the motor"
         which = f"{places - lacking} of {places} motors" if lacking else every
-        if self.catalogue is None:
+        if self.catalog is None:
             if not any(motor.own and motor.own.shares for motor in self.motors):
                 return "what is asked of its motors, for which the robot file has no limits"
             return f"the limits of {which} suffice"
-        assert self.criterion is not None, "as of every catalogue"
-        offered = f"{self.catalogue} ({self.candidates} motors) has"
+        assert self.criterion is not None, "as of every catalog"
+        offered = f"{self.catalog} ({self.candidates} motors) has"
         if lacking == places:
             return f"{offered} none that does"
         return f"{offered} one for {which}, chosen by {CRITERIA[self.criterion]}"
@@ -198,7 +198,7 @@ def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
     ]
     for motor in motors:
         best = motor.best
-        assert best is not None, "a catalogue has motors"
+        assert best is not None, "a catalog has motors"
         rows.append(
             (
                 motor.name,

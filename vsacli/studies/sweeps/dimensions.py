@@ -80,7 +80,7 @@ class Dimension(NamedTuple):
         path: path of a number, of several that have the same value, or of anything else.
         unit: SI unit of the number; empty if it is not a number, or the unit is unknown.
         values: values as in files; empty if they are drawn.
-        centre: center of the distribution.
+        center: center of the distribution.
         tolerance: distribution about the center; None if values are listed.
         linked: path of the dimension of which it is a multiple; "" if independent.
         factor: factor on the linked dimension.
@@ -90,7 +90,7 @@ class Dimension(NamedTuple):
     path: str
     unit: str
     values: tuple[Any, ...] = ()
-    centre: float = 0.0
+    center: float = 0.0
     tolerance: Tolerance | None = None
     linked: str = ""
     factor: float = 1.0
@@ -99,7 +99,7 @@ class Dimension(NamedTuple):
     def drawn(self, share: float) -> Any:
         """Return the quantile for a share; listed values have equal shares."""
         if self.tolerance is not None:
-            return self.centre + self.tolerance.below(share)
+            return self.center + self.tolerance.below(share)
         return self.values[int(share * len(self.values))]
 
     def number(self, value: Any) -> float | None:
@@ -252,7 +252,7 @@ class Entries:
         problems = Problems(self._path)
         for varied, dimension in self._found:
             with _noting(problems, varied):
-                for value in () if dimension.linked else dimension.values or (dimension.centre,):
+                for value in () if dimension.linked else dimension.values or (dimension.center,):
                     self._change(dimension.path, value)
         problems.check()
 

@@ -115,12 +115,12 @@ class Computer:
             )
         trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
         self._study.check_read([*robot.sources, *trajectory.sources])
-        costs, optimise = list[FloatArray](), self._study.file.optimize
-        if optimise is not None:
-            optimum = optimise.optimum(robot, trajectory)
+        costs, optimize = list[FloatArray](), self._study.file.optimize
+        if optimize is not None:
+            optimum = optimize.optimum(robot, trajectory)
             if optimum.trajectory is None:
                 return _without_values(run, key, IMPOSSIBLE, "; ".join(optimum.reasons))
-            trajectory, costs = optimum.trajectory, optimise.costs_of(optimum)
+            trajectory, costs = optimum.trajectory, optimize.costs_of(optimum)
         computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
         recorder = Recorder(self._study.over_time, self._study.file.every)
         for block in computed:

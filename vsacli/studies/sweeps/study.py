@@ -153,9 +153,9 @@ class Study:
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
         curves = [self.file.every, *(each.name for each in self.over_time)]
-        optimised = [] if self.file.optimize is None else [repr(self.file.optimize)]
+        optimized = [] if self.file.optimize is None else [repr(self.file.optimize)]
         files = [*self._named_files.values()]
-        return _digest([[*self.computed_by.values()], robot, kept, curves, files, *optimised])
+        return _digest([[*self.computed_by.values()], robot, kept, curves, files, *optimized])
 
     @property
     def computed_by(self) -> dict[str, str]:

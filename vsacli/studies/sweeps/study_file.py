@@ -12,7 +12,7 @@ from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
+from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.field_kinds import OwnKind, Refer, Schema, Share
@@ -163,7 +163,7 @@ def _text(node: Node, form: str) -> str:
 
 
 STIFFNESS, TIMING = "stiffness", "timing"
-MINIMIZED = ("torque", "energy", "copper", "peak", TIME)
+MINIMIZED = ("torque", "energy", "copper_loss", "peak", TIME)
 VARIED = (STIFFNESS, TIMING, "both")
 """Words of `vsacli optimize`, repeated here because importing the optimization is slow."""
 
@@ -176,7 +176,7 @@ _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
 
 
 @dataclass(frozen=True)
-class Optimised:
+class Optimized:
     """The optimization of each run, with the names and defaults of the options of `vsacli optimize`."""
 
     minimize: str = choice(
@@ -188,11 +188,11 @@ class Optimised:
     vary: str | None = choice(
         VARIED, "what may change: by default the stiffness, for time the timing", default=None
     )
-    margin: float = value(
+    min_margin: float = value(
         Share(),
         "relative margin that every step shall keep to the ends of its corridor",
         check=_MARGIN,
-        default=NEAR_SINGULAR_MARGIN,
+        default=MIN_MARGIN,
     )
     seed: int = integer("of the starts that are drawn", check=_SEED, default=0)
 
@@ -217,7 +217,9 @@ class Optimised:
         """
         from vsacli.studies.search import optimize
 
-        return optimize(robot, trajectory, self.minimize, self.varied, margin=self.margin, seed=self.seed)
+        return optimize(
+            robot, trajectory, self.minimize, self.varied, min_margin=self.min_margin, seed=self.seed
+        )
 
     def costs_of(self, optimum: Optimum) -> list[FloatArray]:
         """Return the costs of a run before and after; NaN for joints without an optimum."""
@@ -272,9 +274,9 @@ class StudyFile:
         "runs of each trajectory that are drawn; absent if the method is grid", check=_COUNT, default=None
     )
     seed: int = integer("of what is drawn", check=_SEED, default=0)
-    optimize: Optimised | None = value(
-        Record(Optimised),
-        "what is optimised in each run; all that is kept is of the optimum then",
+    optimize: Optimized | None = value(
+        Record(Optimized),
+        "what is optimized in each run; all that is kept is of the optimum then",
         default=None,
     )
     keep: tuple[str, ...] | None = value(

@@ -174,7 +174,7 @@ class Recorded(Declaration):
 
         doc = (
             "spline for derivatives that are not given: through the samples, or near noisy ones by least"
-            " squares, or a smoothing one for noise of any colour; by default what their noise asks for"
+            " squares, or a smoothing one for noise of any color; by default what their noise asks for"
         )
         file = text("path of the CSV file, relative to the trajectory file")
         bandwidth = "frequency in Hz above which there is no motion; by default the record tells"

@@ -1,6 +1,6 @@
 """Linear estimation with banded rows in square-root information form, by QR factorization block by block.
 
-`sort_rows` sorts rows into blocks, `factorise` makes the triangular factor, and `Posterior` solves for the
+`sort_rows` sorts rows into blocks, `factorize` makes the triangular factor, and `Posterior` solves for the
 unknowns and their covariances.
 """
 
@@ -76,7 +76,7 @@ def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
     return Rows(blocks, block, place)
 
 
-def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: FloatArray) -> Factor:
+def factorize(data: FloatArray, target: FloatArray, prior: FloatArray, weights: FloatArray) -> Factor:
     """Return the triangular factors of data and prior.
 
     Args:

@@ -152,7 +152,7 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
                 "noise": float(fit.noise[member]),
                 "unreliable": dict(zip(("start", "end"), part.unreliable, strict=True)),
                 "band": _band(part, member, fit),
-                **_judgement(part),
+                **_judgment(part),
             }
             for member, part in sorted(parts.items(), key=itemgetter(0))
         ],
@@ -167,7 +167,7 @@ def _band(part: Part, member: int, fit: Fit) -> float | None:
     return None if np.isnan(band) else band
 
 
-def _judgement(part: Part) -> dict[str, Any]:
+def _judgment(part: Part) -> dict[str, Any]:
     """Return the assessment of a component by a smoothing spline and by the spectrum."""
     found: dict[str, Any] = {}
     if part.smoothing is not None:

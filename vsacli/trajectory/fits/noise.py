@@ -133,10 +133,10 @@ MOST_LINES = 20
 """Most lines; more are the rounding of an encoder under a periodic motion, which has its period: some hundred
 lines for a motion that is repeated ten times."""
 
-NEIGHBOURS = 40
+NEIGHBORS = 40
 """Number of frequencies on each side whose median is computed."""
 
-FEW_NEIGHBOURS = 10
+FEW_NEIGHBORS = 10
 """The same number for low frequencies, with fewer below them: slow sines left by a coarse spline."""
 
 BLOCK_FREQUENCIES = 16384
@@ -205,11 +205,11 @@ def spectral_lines(
     """
     steps = np.diff(time)
     step = float(np.mean(steps))
-    if len(time) < 4 * NEIGHBOURS or np.abs(steps - step).max() > UNEVEN * step:
+    if len(time) < 4 * NEIGHBORS or np.abs(steps - step).max() > UNEVEN * step:
         return Lines()
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
-    narrow, wide = _standing_out(power, FEW_NEIGHBOURS), _standing_out(power, NEIGHBOURS)
-    slow = NEIGHBOURS + LEAKAGE  # lower frequencies have fewer neighbors
+    narrow, wide = _standing_out(power, FEW_NEIGHBORS), _standing_out(power, NEIGHBORS)
+    slow = NEIGHBORS + LEAKAGE  # lower frequencies have fewer neighbors
     found = np.concatenate([narrow[narrow < slow], wide])
     frequencies = found / (len(time) * step)
     # With a Hann window the magnitude at a line is a quarter of amplitude times number of samples.
@@ -229,18 +229,18 @@ def spectral_lines(
     return Lines(hum, others, share, resampled)
 
 
-def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
+def _standing_out(power: FloatArray, neighbors: int) -> IndexArray:
     """Return the indices of lines among frequencies with this number of neighbors on both sides."""
-    windows = np.lib.stride_tricks.sliding_window_view(power, neighbours)
+    windows = np.lib.stride_tricks.sliding_window_view(power, neighbors)
     starts = range(0, len(windows), BLOCK_FREQUENCIES)
     medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
-    centre = np.arange(neighbours + LEAKAGE, len(power) - neighbours - LEAKAGE)
-    below = medians[centre - neighbours - LEAKAGE]
+    center = np.arange(neighbors + LEAKAGE, len(power) - neighbors - LEAKAGE)
+    below = medians[center - neighbors - LEAKAGE]
     # In a steeply falling spectrum the lower side has the larger median.
-    beside = np.maximum(below, medians[centre + LEAKAGE + 1])
-    here = power[centre]
-    peak = (here >= power[centre - 1]) & (here >= power[centre + 1])
-    return np.asarray(centre[peak & (here > LINE_RATIO * beside)])
+    beside = np.maximum(below, medians[center + LEAKAGE + 1])
+    here = power[center]
+    peak = (here >= power[center - 1]) & (here >= power[center + 1])
+    return np.asarray(center[peak & (here > LINE_RATIO * beside)])
 
 
 def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:

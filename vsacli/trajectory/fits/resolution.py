@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
-from vsacli.trajectory.fits.penalised import Model, deviances, evidence, segment_of
+from vsacli.trajectory.fits.penalized import Model, deviances, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
 """Correlations of the noise of neighboring means in the first search."""
@@ -153,8 +153,8 @@ def _segmented(model: Model) -> Model:
 
 def _recorrelated(model: Model) -> Model:
     """Return the model with the most likely correlation near its own."""
-    centre = np.arctanh(model.correlation)
-    candidates = np.clip(np.tanh(centre + FINER_CORRELATIONS), -0.6, 0.985)
+    center = np.arctanh(model.correlation)
+    candidates = np.clip(np.tanh(center + FINER_CORRELATIONS), -0.6, 0.985)
     models = [Model(model.bins, each, model.penalties, model.segments) for each in candidates.tolist()]
     return min(models, key=lambda each: each.deviance)
 

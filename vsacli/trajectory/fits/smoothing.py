@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.banded_qr import Posterior
 from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines
-from vsacli.trajectory.fits.penalised import Model, falls, motion_power
+from vsacli.trajectory.fits.penalized import Model, falls, motion_power
 from vsacli.trajectory.fits.resolution import KnownNoise, Resolution, find_resolution
 from vsacli.trajectory.fits.spectrum import FollowedNoise
 

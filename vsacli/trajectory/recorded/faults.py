@@ -75,9 +75,9 @@ class Faults:
 def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Return samples, up to three together, that are far off a smooth curve through their neighbors."""
     size = np.abs(quantization.differences)
-    centres = np.arange(len(size)) + ORDER // 2
-    off = size > _noticeable(quantization, centres)
-    events = _events(centres[off], size[off])
+    centers = np.arange(len(size)) + ORDER // 2
+    off = size > _noticeable(quantization, centers)
+    events = _events(centers[off], size[off])
     isolated = [_isolated(time, values, event, quantization) for event in events]
     found = dict(_at_ends(values, quantization))
     for event, samples in zip(events, isolated, strict=True):
@@ -98,15 +98,15 @@ class _Event(NamedTuple):
     size: float
 
 
-def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
+def _events(centers: IndexArray, size: FloatArray) -> list[_Event]:
     """Return the `MOST_EVENTS` largest events."""
-    if not centres.size:
+    if not centers.size:
         return []
-    starts = np.flatnonzero(np.append(True, np.diff(centres) > ORDER))
-    stops = np.append(starts[1:], len(centres)) - 1
+    starts = np.flatnonzero(np.append(True, np.diff(centers) > ORDER))
+    stops = np.append(starts[1:], len(centers)) - 1
     largest = np.maximum.reduceat(size, starts)
     chosen = np.argsort(-largest, kind="stable")[:MOST_EVENTS]
-    firsts, lasts = centres[starts[chosen]] - ORDER // 2, centres[stops[chosen]] + ORDER // 2
+    firsts, lasts = centers[starts[chosen]] - ORDER // 2, centers[stops[chosen]] + ORDER // 2
     return list(map(_Event, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
 
 

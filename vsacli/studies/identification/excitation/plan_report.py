@@ -43,7 +43,7 @@ class ActiveLimit(Published):
     def __str__(self) -> str:
         worst = self.nearest
         corridor = worst.kind == CORRIDOR
-        what = "stiffness" if corridor else Flag.labelled(worst.kind).quantity_of(worst.motor)
+        what = "stiffness" if corridor else Flag.labeled(worst.kind).quantity_of(worst.motor)
         reason = " that its load allows" if corridor else ""
         return f"{self.joint}: {what} {worst.value:.4g} of {worst.bound:.4g} {worst.unit}{reason}"
 

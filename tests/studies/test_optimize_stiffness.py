@@ -1,4 +1,4 @@
-"""The best stiffness of a motion, against a dense grid, another optimiser, and runs of the result."""
+"""The best stiffness of a motion, against a dense grid, another optimizer, and runs of the result."""
 
 from __future__ import annotations
 
@@ -94,19 +94,19 @@ def test_no_profile_of_a_dense_grid_is_better(arm, load, criterion):
     spaces = lambda span, *_: SplineSpace.at_rest(span, 1)  # noqa: E731
     found = search(arm, load, CRITERIA[criterion](), spaces)
     basis = SplineSpace.at_rest((load.time[0], load.time[-1]), 1).basis(load.time, 3)
-    centre, width = np.array([3000.0, 3000.0]), 2500.0
+    center, width = np.array([3000.0, 3000.0]), 2500.0
     for _ in range(5):
         axis = np.linspace(-width, width, 15)
-        amounts = centre[:, None] + np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
+        amounts = center[:, None] + np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
         on_grid = costs(arm, load, criterion, np.einsum("ain,np->api", basis, amounts))
-        centre, width = amounts[:, on_grid.argmin()], width / 5
+        center, width = amounts[:, on_grid.argmin()], width / 5
     found_cost = costs(arm, load, criterion, found.rows[:, None])[0]
     # The last grid is 0.3 N m/rad wide, at a flat minimum; bounds are kept with 1e-6 to spare.
     assert found_cost == pytest.approx(on_grid.min(), rel=1e-4)
 
 
 @pytest.mark.slow
-def test_scipys_optimiser_comes_to_the_same_cost(arm, load):
+def test_scipys_optimizer_comes_to_the_same_cost(arm, load):
     """Without bounds, since none of them holds this motion back."""
     from scipy.optimize import minimize
 
@@ -144,10 +144,10 @@ def test_like_motors_heat_least_where_their_torques_are_least(arm, load):
     )
     coolest, least = (
         search(robot, load, CRITERIA[name](), SplineSpace.periodic)
-        for robot, name in ((wound, "copper"), (arm, "torque"))
+        for robot, name in ((wound, "copper_loss"), (arm, "torque"))
     )
     heat, torque = (
-        CRITERIA["copper"]().of(wound.joints[SHOULDER], driven(wound, load, coolest.rows), load.time),
+        CRITERIA["copper_loss"]().of(wound.joints[SHOULDER], driven(wound, load, coolest.rows), load.time),
         costs(arm, load, "torque", least.rows[:, None]),
     )
     # R/K^2 times the squares of both motors over the time; the step sums differ by less than the tolerance.
@@ -160,7 +160,7 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
         "optimize",
         ROBOT,
         REST_TO_REST,
-        "--margin",
+        "--min-margin",
         "2%",
         "--json",
         "-o",
@@ -194,10 +194,10 @@ def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
     assert "best.yaml is not written" in done.err
 
 
-def test_what_cannot_be_minimised_is_refused(arm, swing):
+def test_what_cannot_be_minimized_is_refused(arm, swing):
     with pytest.raises(InputError, match=r"the motors of base have no resistance.*or --minimize torque"):
-        optimize(arm, swing, "copper")
-    with pytest.raises(InputError, match="what is minimised must be one of torque, energy, copper, peak"):
+        optimize(arm, swing, "copper_loss")
+    with pytest.raises(InputError, match="unknown objective 'power'; valid: torque, energy, copper_loss"):
         optimize(arm, swing, "power")
     elastic = load_robot(REPOSITORY / "robots" / "hardening_1r.yaml")
     moved = load_trajectory(REPOSITORY / "trajectories" / "hardening_1r.yaml", elastic)

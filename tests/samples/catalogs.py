@@ -1,4 +1,4 @@
-"""Catalogues of motors as text, and what a motor does on its shaft, worked out without the program."""
+"""Catalogs of motors as text, and what a motor does on its shaft, worked out without the program."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ small-32,20,20,60,9000,20,2.5,4,24,60,0.5,1e-7
 
 
 def random_motor(rng: np.random.Generator, name: str) -> dict[str, Any]:
-    """A row of a catalogue, with and without what may be missing."""
+    """A row of a catalog, with and without what may be missing."""
     torque = 10 ** rng.uniform(-1, 1)
     motor: dict[str, Any] = {
         "name": name,
@@ -56,7 +56,7 @@ def random_motor(rng: np.random.Generator, name: str) -> dict[str, Any]:
 
 
 def write(path: Path, motors: Sequence[dict[str, Any]]) -> Path:
-    """The catalogue with these motors."""
+    """The catalog with these motors."""
     columns = list(dict.fromkeys(name for motor in motors for name in motor))
     rows = [",".join(str(motor.get(name, "")) for name in columns) for motor in motors]
     path.write_text("\n".join([",".join(columns), *rows, ""]))

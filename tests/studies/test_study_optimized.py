@@ -18,7 +18,9 @@ from vsacli.studies.sweeps.study_file import MINIMIZED, VARIED
 ONE_JOINT = HEAD.replace("arm.yaml", "tendon.yaml").replace("move.yaml", "pull.yaml")
 """The arm with one joint, which takes less time."""
 
-SPRINGS = "vary: {rate: [10, 12]}\noptimize: {minimize: peak, margin: 3%, seed: 2}\nkeep: [energy_spent]\n"
+SPRINGS = (
+    "vary: {rate: [10, 12]}\noptimize: {minimize: peak, min_margin: 3%, seed: 2}\nkeep: [energy_spent]\n"
+)
 
 
 def one_joint(folder: Path, text: str) -> str:
@@ -39,7 +41,9 @@ def test_a_row_has_the_optimum_of_its_run(vsacli: Any, own_folder: Path) -> None
     path = one_joint(own_folder, SPRINGS)
     assert vsacli("study", path, "-q", "--processes", "2").code == 0
     robot = load_robot("tendon.yaml")
-    found = optimize(robot, load_trajectory("pull.yaml", robot, {"rate": 12}), "peak", margin=0.03, seed=2)
+    found = optimize(
+        robot, load_trajectory("pull.yaml", robot, {"rate": 12}), "peak", min_margin=0.03, seed=2
+    )
     [joint] = found.joints.values()
     assert found.trajectory is not None
     report = inverse_dynamics(robot, found.trajectory).report
@@ -76,18 +80,18 @@ def test_durations_before_and_after(vsacli: Any, own_folder: Path) -> None:
     ("text", "message"),
     [
         ("optimize: {minimize: torqe}", "minimize: unknown word 'torqe'; did you mean 'torque'?"),
-        ("optimize: {margin: 300 %}", "margin: must be above 0 and below 1"),
-        ("optimize: {margin: 3 N m}", "margin: expected a number, found '3 N m'"),
+        ("optimize: {min_margin: 300 %}", "min_margin: must be above 0 and below 1"),
+        ("optimize: {min_margin: 3 N m}", "min_margin: expected a number, found '3 N m'"),
         ("optimize: {minimize: time, vary: stiffness}", "it is `timing` or `both` that varies"),
         ("optimize: torque", "optimize: expected a mapping"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_optimised(vsacli: Any, own_folder: Path, text: str, message: str) -> None:
+def test_what_cannot_be_optimized(vsacli: Any, own_folder: Path, text: str, message: str) -> None:
     done = vsacli("study", str(study(own_folder, text)))
     assert (done.code, message in done.err) == (2, True), done.err
 
 
-def test_what_cannot_be_minimised_of_a_robot_is_a_row_that_says_so(vsacli: Any, own_folder: Path) -> None:
-    done = vsacli("study", str(study(own_folder, "optimize: {minimize: copper}\n")))
+def test_what_cannot_be_minimized_of_a_robot_is_a_row_that_says_so(vsacli: Any, own_folder: Path) -> None:
+    done = vsacli("study", str(study(own_folder, "optimize: {minimize: copper_loss}\n")))
     assert (done.code, column("study.h5", "verdict").tolist()) == (3, ["failed"])
     assert "torque_constant" in done.out

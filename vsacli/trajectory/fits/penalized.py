@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import BLOCK, Factor, Posterior, factorise, sort_rows
+from vsacli.trajectory.fits.banded_qr import BLOCK, Factor, Posterior, factorize, sort_rows
 from vsacli.trajectory.fits.bins import Bins, Whitened, uniform_basis
 
 if TYPE_CHECKING:
@@ -221,7 +221,7 @@ def _factors(bins: Bins, whitened: Whitened, penalties: FloatArray) -> Factor:
     weights = np.ones((len(penalties), len(bins.differences) * BLOCK))
     weights[:, : penalties.shape[1]] = np.sqrt(penalties)
     shaped = weights.reshape(len(penalties), -1, BLOCK)
-    return factorise(whitened.rows, whitened.target, bins.differences, shaped)
+    return factorize(whitened.rows, whitened.target, bins.differences, shaped)
 
 
 def _freedom(bins: Bins) -> int:

@@ -1,4 +1,4 @@
-"""The cheapest pace in a given time, against dense grids, another optimiser, and runs of the result."""
+"""The cheapest pace in a given time, against dense grids, another optimizer, and runs of the result."""
 
 from __future__ import annotations
 
@@ -63,18 +63,18 @@ def test_no_pace_of_a_dense_family_is_better(swing, criterion):
     shape = free.fitted(s, 1 + np.cos(2 * np.pi * s / DURATION))[:, None]
     line = SplineSpace(free.knots, free.shapes @ shape, offset=1.0)
     found = cost(*swing, criterion, search(*swing, criterion, line).pace())
-    centre, width = 0.0, 0.32
+    center, width = 0.0, 0.32
     for _ in range(5):
-        amounts = centre + np.linspace(-width, width, 9)
+        amounts = center + np.linspace(-width, width, 9)
         on_grid = [cost(*swing, criterion, line.spline(np.array([amount]))) for amount in amounts]
-        centre, width = amounts[int(np.argmin(on_grid))], width / 4
+        center, width = amounts[int(np.argmin(on_grid))], width / 4
     # The last grid is 3e-4 wide, at a minimum that is flat, or a kink of slope one.
     assert found == pytest.approx(min(on_grid), rel=1e-4)
     assert found < 0.993 * cost(*swing, criterion, line.spline(np.zeros(1)))
 
 
 @pytest.mark.slow
-def test_scipys_optimiser_comes_to_the_same_cost(swing):
+def test_scipys_optimizer_comes_to_the_same_cost(swing):
     """Over all coefficients of a coarse spline, scaled to the duration."""
     from scipy.optimize import minimize
 
@@ -117,7 +117,7 @@ def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
         "stiffness: {type: constant, value: 4000}\n"
     )
     robot = pendulum()
-    found = optimize(robot, load_trajectory(path, robot), "peak", "timing", margin=0.03)
+    found = optimize(robot, load_trajectory(path, robot), "peak", "timing", min_margin=0.03)
     assert found.together.after < 0.97
     run = inverse_dynamics(robot, found.trajectory)
     half = len(run.time) // 2
@@ -138,7 +138,7 @@ def test_ends_that_move_go_on_as_commanded(tmp_path, criterion):
     )
     robot = pendulum().replace({"joints.0.actuator.motor.max_torque": 250.0})
     asked = load_trajectory(path, robot)
-    found = optimize(robot, asked, criterion, "timing", margin=0.03)
+    found = optimize(robot, asked, criterion, "timing", min_margin=0.03)
     before, after = (inverse_dynamics(robot, each) for each in (asked, found.trajectory))
     assert after.report.verdict == "ok"
     for name in ("q", "dq", "ddq", "d3q", "d4q"):

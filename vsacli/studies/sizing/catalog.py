@@ -37,7 +37,7 @@ _NEEDED = {
 
 
 @dataclass(frozen=True)
-class CatalogueMotor:
+class CatalogMotor:
     """A motor of a catalog, which may already have a gear."""
 
     name: str = value(Name(), "name of the motor, each once")
@@ -125,13 +125,13 @@ class CatalogueMotor:
         )
 
 
-def read_catalogue(path: str | os.PathLike[str]) -> RecordTable[CatalogueMotor]:
+def read_catalog(path: str | os.PathLike[str]) -> RecordTable[CatalogMotor]:
     """Read the motors of a catalog.
 
     Raises:
         InputError: the file is wrong; with file and line of every problem.
     """
-    return read_records(path, CatalogueMotor, "name")
+    return read_records(path, CatalogMotor, "name")
 
 
 def _or_infinite(bound: float | None) -> float:
