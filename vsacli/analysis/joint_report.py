@@ -123,8 +123,8 @@ class JointReport(Stored):
         margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
         margin_time: when.
         reachable: the corridor at that time.
-        stiffness_min: smallest commanded stiffness.
-        stiffness_max: the largest.
+        commanded_min: smallest commanded stiffness.
+        commanded_max: the largest.
         peak_tau_e: largest |tau_e|.
         peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
         start_theta: motor positions at the first step, to which the motors go before the start.
@@ -151,8 +151,8 @@ class JointReport(Stored):
     margin: float
     margin_time: float
     reachable: tuple[float, float]
-    stiffness_min: float
-    stiffness_max: float
+    commanded_min: float
+    commanded_max: float
     peak_tau_e: float
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
@@ -170,7 +170,7 @@ class JointReport(Stored):
     shape: ClassVar = {
         **named("name", "type", "actuator", "steps", "first_time", "worst"),
         "margin": {"min": "margin", "time": "margin_time", "reachable": "reachable"},
-        "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
+        "stiffness": {"min": "commanded_min", "max": "commanded_max"},
         "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
         "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},

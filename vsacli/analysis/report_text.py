@@ -93,7 +93,7 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         joint.name,
         f"{number(joint.peak_tau_e)} {torque}",
         f"{motors} {torque}",
-        _span(joint.stiffness_min, joint.stiffness_max),
+        _span(joint.commanded_min, joint.commanded_max),
         *(
             (_corridor(*joint.reachable), percent(joint.margin))
             if "stiffness" in kind_of(joint).commanded
