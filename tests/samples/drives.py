@@ -67,7 +67,7 @@ def with_preload(joint: Joint, preload: str) -> Joint:
 
 def lower_by_preload(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
     return {
-        preload: drive(with_preload(joint, preload), command(tau_e=tau_e))["stiffness_lower"]
+        preload: drive(with_preload(joint, preload), command(tau_e=tau_e))["stiffness_min"]
         for preload in ("positive", "negative")
     }
 

@@ -59,14 +59,14 @@ class Carried(NamedTuple):
         stiffness: of the joint.
         stiffness_size: the same for the terms of the stiffness, which rounding of the deflections changes by
             eps times this.
-        tau_spring: torque against each motor, (motors, samples).
+        tau_transmission: torque against each motor, (motors, samples).
     """
 
     tau_e: FloatArray
     size: FloatArray
     stiffness: FloatArray
     stiffness_size: FloatArray
-    tau_spring: FloatArray
+    tau_transmission: FloatArray
 
 
 class SpringLoad(NamedTuple):
@@ -204,7 +204,7 @@ class Actuator(ABC):
 
         Returns:
             The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `ddtheta`,
-            `tau_spring`, `elastic_energy`, `det_A`, `stiffness_lower`, `stiffness_upper` and `flags`; NaN
+            `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and `flags`; NaN
             where the actuator has none, such as a second motor.
         """
 
@@ -214,13 +214,13 @@ class Actuator(ABC):
 
     @abstractmethod
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
+        """Return the rates of tau_transmission, (motors, samples), from the other variables of the joint."""
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
         """Return the loads of its springs from the other variables; those behind motor 1 as one."""
         if not self.sprung:
             return ()
-        loaded = of_joint["phi"][0], of_joint["tau_spring"][0], of_joint["elastic_energy"]
+        loaded = of_joint["phi"][0], of_joint["tau_transmission"][0], of_joint["elastic_energy"]
         return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     def carried(self, of_joint: OfJoint) -> Carried:

@@ -58,12 +58,12 @@ def single_motor(**variables: AnyArray) -> OfJoint:
     """Return `Actuator.transmit` of an actuator with one motor, whose stiffness is not commanded.
 
     Args:
-        variables: `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_spring`, `elastic_energy`
-            and `flags`, each (samples,).
+        variables: `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_transmission`,
+            `elastic_energy` and `flags`, each (samples,).
     """
     none = np.full_like(variables["phi"], np.nan)
     transmitted = {
         name: np.stack((values, none)) if "motor" in VARIABLES[name].dims else values
         for name, values in variables.items()
     }
-    return {**transmitted, "det_A": none, "stiffness_lower": none, "stiffness_upper": none}
+    return {**transmitted, "det_A": none, "stiffness_min": none, "stiffness_max": none}

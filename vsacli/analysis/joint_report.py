@@ -128,8 +128,8 @@ class JointReport(Stored):
         peak_tau_e: largest |tau_e|.
         peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
         start_theta: motor positions at the first step, to which the motors go before the start.
-        torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
-            at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
+        torque_step: |tau_motor - tau_transmission| at the first step: by how much the torque that holds the
+            motor at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
         other_preload: whether every infeasible step could be done with the opposite preload.
         energy: work of the motors, elastic energy, co-contraction.
         start_dtheta: motor velocities at the first step.

@@ -11,7 +11,7 @@ TRACKED = ("q", "dq", "ddq", "stiffness", "dstiffness")
 
 ACTUAL = (
     *TRACKED,
-    *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
+    *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_transmission", "tau_motor"),
     *("elastic_energy", "motor_power", "motor_energy", "det_A"),
     *("damping", "tau_damper"),
     *("dissipated_power", "current", "voltage", "copper_loss"),

@@ -86,7 +86,7 @@ _COMPUTED = (
         "(72)",
         geared=1,
     ),
-    Variable("tau_spring", _MOTOR, units.TORQUE, "torque of each transmission", "(62)"),
+    Variable("tau_transmission", _MOTOR, units.TORQUE, "flexible torque of each transmission", "(62)"),
     Variable(
         "tau_motor", _MOTOR, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
     ),
@@ -150,18 +150,18 @@ _COMPUTED = (
         STIFFNESS.key,
     ),
     Variable(
-        "stiffness_lower",
+        "stiffness_min",
         _JOINT,
         units.STIFFNESS,
-        "smallest stiffness reachable at this elastic torque on the joint's branch",
+        "minimum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
         STIFFNESS.key,
     ),
     Variable(
-        "stiffness_upper",
+        "stiffness_max",
         _JOINT,
         units.STIFFNESS,
-        "largest stiffness reachable at this elastic torque on the joint's branch",
+        "maximum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
         STIFFNESS.key,
     ),

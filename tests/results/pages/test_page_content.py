@@ -87,7 +87,7 @@ def test_stiffness_is_drawn_inside_what_can_be_reached(page: Page, feasible_resu
     [series] = chart["series"]
     lower, upper = map(page.array, series["band"])
     with h5py.File(feasible_result) as file:
-        np.testing.assert_allclose(lower, file["stiffness_lower"][:, 2], rtol=SINGLE)
+        np.testing.assert_allclose(lower, file["stiffness_min"][:, 2], rtol=SINGLE)
     bottom, top = chart["shown"]
     assert np.all(upper > top)  # cubic springs become as stiff as one likes
     assert bottom < 800 < 1275 < top

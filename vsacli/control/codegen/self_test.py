@@ -126,8 +126,8 @@ class Reference:
             low, high = np.array([damper.range if damper else (0.0, 0.0) for damper in dampers]).T
             drawn[DAMPING.key] = low + self._rng.uniform(0.2, 0.8, (CASES, len(dampers))) * (high - low)
         block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
-        lower = np.nan_to_num(block.stiffness_lower)
-        upper = np.minimum(np.nan_to_num(block.stiffness_upper, nan=0.0), 4 * lower)
+        lower = np.nan_to_num(block.stiffness_min)
+        upper = np.minimum(np.nan_to_num(block.stiffness_max, nan=0.0), 4 * lower)
         stiffness = lower + self._rng.uniform(0.2, 0.8, lower.shape) * (upper - lower)
         stiffness[-1] = lower[-1] / 2
         return {**drawn, "stiffness": stiffness}
@@ -186,7 +186,7 @@ TOLERANCE = {"double": 1e-9, "float": 2e-3}
 """Largest difference from NumPy, relative to the largest value of an array; rounding grows with the condition
 of the mass matrix, and towards singularities."""
 
-BOUNDED, BOUND = "stiffness_upper", 100.0
+BOUNDED, BOUND = "stiffness_max", 100.0
 """A result that is compared up to this many times the largest stiffness demanded: what lies beyond decides
 nothing, and where a linkage is stretched it is as inaccurate as its geometry makes it."""
 

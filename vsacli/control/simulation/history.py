@@ -167,7 +167,7 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "dphi": np.where(deflected, drivetrain.merged(dphi, still), np.nan),
         "theta": theta,
         "dtheta": dtheta,
-        "tau_spring": drivetrain.merged(springs.tau_spring, tau_e),
+        "tau_transmission": drivetrain.merged(springs.tau_transmission, tau_e),
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,

@@ -139,14 +139,17 @@ def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tupl
 
 
 def _energies(robot: Robot, history: History) -> list[JointEnergy]:
-    time, work, power, tau_spring, elastic_energy = (
+    time, work, power, tau_transmission, elastic_energy = (
         _led(getattr(history, name))
-        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
+        for name in (
+            "time",
+            *map(actual, ("motor_energy", "motor_power", "tau_transmission", "elastic_energy")),
+        )
     )
     lost = history.dissipated_power_actual, history.copper_loss_actual
     intervals, done = np.diff(time), np.diff(work)
     losses = (None if taken is None else trapezoids(intervals, _led(taken)) for taken in lost)
-    torques = np.moveaxis(tau_spring, 1, 0)
+    torques = np.moveaxis(tau_transmission, 1, 0)
     exerted = efforts(intervals, torques[..., :-1], torques[..., 1:])
     meter = EnergyMeter()
     meter.add_stored(elastic_energy)

@@ -37,7 +37,7 @@ MOTION_HEIGHT, MOTION_ROWS = 1.7, 7
 FEASIBILITY = "feasibility"
 """Name of the figure of `check-feasibility`; its file is called `<stem>-feasibility`."""
 
-FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
+FEASIBILITY_VARIABLES = ("stiffness", "stiffness_min", "stiffness_max", "flags")
 """Variables of the figure."""
 
 Part: TypeAlias = tuple[str, str]

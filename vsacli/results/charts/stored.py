@@ -24,7 +24,7 @@ from vsacli.results.charts.reduction import BLOCK, GROWING, Sampled, calm_range,
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.joint import existing
 
-BOUNDS = ("stiffness_lower", "stiffness_upper")
+BOUNDS = ("stiffness_min", "stiffness_max")
 
 By: TypeAlias = Literal["joint", "file", "role"]
 """Property that colors and dashes of the lines of a chart distinguish."""

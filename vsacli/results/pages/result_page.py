@@ -72,7 +72,7 @@ SECTIONS = (
     Section("Position and stiffness", ("q", "stiffness"), shown=True),
     Section("Motor torque", ("tau_motor",), shown=True),
     Section("Elastic torque", ("tau_e",), shown=True),
-    Section("Springs", ("phi", "tau_spring", "elastic_energy", "det_A")),
+    Section("Springs", ("phi", "tau_transmission", "elastic_energy", "det_A")),
     Section("Motion of the motors", ("theta", "dtheta", "ddtheta", "dphi")),
     Section("Power, work and losses", ("motor_power", "motor_energy", "dissipated_power", "copper_loss")),
     Section("Current and voltage", ("current", "voltage")),

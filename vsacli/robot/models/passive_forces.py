@@ -163,5 +163,5 @@ def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
     """Return the torques of springs of a joint that are known by their potential alone."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))
-    against = (torques.tau_spring[..., side] for side in range(len(joint.actuator.motors)))
+    against = (torques.tau_transmission[..., side] for side in range(len(joint.actuator.motors)))
     return [torques.tau_e, *(-each for each in against)]

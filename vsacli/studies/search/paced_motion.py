@@ -242,9 +242,9 @@ class PacedJoint:
     def _corridor(self, driven: OfJoint) -> Iterator[Any]:
         if self._chosen:
             margin = self._near_singular
-            yield driven["stiffness_lower"] / ((1 - margin) * driven["stiffness"]) - 1 + CLEARANCE
-            unbounded = np.isinf(driven["stiffness_upper"])
-            upper = np.where(unbounded, 1.0, driven["stiffness_upper"]) / ((1 + margin) * driven["stiffness"])
+            yield driven["stiffness_min"] / ((1 - margin) * driven["stiffness"]) - 1 + CLEARANCE
+            unbounded = np.isinf(driven["stiffness_max"])
+            upper = np.where(unbounded, 1.0, driven["stiffness_max"]) / ((1 + margin) * driven["stiffness"])
             yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
 
 

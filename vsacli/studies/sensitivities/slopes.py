@@ -185,7 +185,7 @@ class Derivatives:
     @property
     def margin(self) -> FloatArray:
         """Derivative of the relative margin of the stiffness, (samples, joints)."""
-        return margin(self.block.stiffness, self.block.stiffness_lower, self.block.stiffness_upper)
+        return margin(self.block.stiffness, self.block.stiffness_min, self.block.stiffness_max)
 
     def over_time(self, name: str) -> FloatArray:
         """Derivatives of a variable by all numbers, (samples, numbers, joints[, 2]); NaN wherever it is."""
