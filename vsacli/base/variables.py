@@ -12,6 +12,7 @@ from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.renamed import now_called
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
@@ -228,7 +229,8 @@ class Block:
     def __getattr__(self, name: str) -> Any:
         if name in self.declared:
             return None
-        raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
+        hint = now_called(name, self.declared)
+        raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}{hint}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
         """Return the variables of one joint by name, (samples,), those of its motors (2, samples)."""

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray, by_joint, of_joint
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.json_records import Stored, named
-from vsacli.base.simulation_variables import actual
+from vsacli.base.simulation_variables import COMMANDS
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
@@ -75,7 +75,7 @@ STIFFNESS_SHARE = 0.01
 
 @dataclass(frozen=True)
 class Deviation(Stored):
-    """The deviation of an actual value from the command: largest, time (s), last; NaN without any."""
+    """The deviation of a simulated value from the command: largest, time (s), last; NaN without any."""
 
     peak: float
     time: float
@@ -141,12 +141,9 @@ def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tupl
 def _energies(robot: Robot, history: History) -> list[JointEnergy]:
     time, work, power, tau_transmission, elastic_energy = (
         _led(getattr(history, name))
-        for name in (
-            "time",
-            *map(actual, ("motor_energy", "motor_power", "tau_transmission", "elastic_energy")),
-        )
+        for name in ("time", "motor_energy", "motor_power", "tau_transmission", "elastic_energy")
     )
-    lost = history.dissipated_power_actual, history.copper_loss_actual
+    lost = history.dissipated_power, history.copper_loss
     intervals, done = np.diff(time), np.diff(work)
     losses = (None if taken is None else trapezoids(intervals, _led(taken)) for taken in lost)
     torques = np.moveaxis(tau_transmission, 1, 0)
@@ -167,7 +164,7 @@ def _tracking(
     joint: Joint, index: int, history: History, energy: JointEnergy, goal: GoalTolerance
 ) -> JointTracking:
     flags = history.flags[:, index]
-    first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
+    first, second = np.fmax.reduce(np.abs(history.tau_motor[:, index]), axis=0).tolist()
     return JointTracking(
         name=joint.name,
         type=joint.type,
@@ -177,7 +174,7 @@ def _tracking(
         steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
         energy=energy,
-        tolerance=goal.of(float(np.ptp(history.q[:, index]))),
+        tolerance=goal.of(float(np.ptp(history.q_ref[:, index]))),
     )
 
 
@@ -198,8 +195,8 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
 
 
 def _checked(variable: str) -> str:
-    """Return the variable that a limit bounds: the commanded torque, else the actual value."""
-    return variable if variable == "tau_motor" else actual(variable)
+    """Return the variable that a limit bounds: the commanded torque, else the simulated value."""
+    return COMMANDS[variable] if variable == "tau_motor" else variable
 
 
 def row(joint: JointTracking) -> tuple[str, ...]:
@@ -246,11 +243,11 @@ def end_sentence(joint: JointTracking) -> str:
 def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
     """Yield a warning for each joint that arrives with another stiffness than commanded."""
     errors = history.stiffness_error[-1]
-    allowed = STIFFNESS_SHARE * history.stiffness.max(axis=0)
+    allowed = STIFFNESS_SHARE * history.stiffness_ref.max(axis=0)
     for index in np.flatnonzero(np.abs(errors) > allowed):  # NaN of rigid joints exceeds nothing
         joint = robot.joints[index]
         unit = STIFFNESS.unit(joint.type)
         yield (
             f"{joint.name}: at the end the stiffness is {errors[index]:.3g} {unit} off the command "
-            f"of {history.stiffness[-1, index]:.4g} {unit}"
+            f"of {history.stiffness_ref[-1, index]:.4g} {unit}"
         )

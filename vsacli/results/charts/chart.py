@@ -59,7 +59,7 @@ class Line(NamedTuple):
         colour: number of its color on pages.
         joint: number of the joint; None if it is of none.
         file: number of the file, from 0.
-        role: "computed", "commanded", "actual" or "measured".
+        role: "computed", "commanded", "simulated" or "measured".
         band: area around it, if there is one.
         rms: root mean square of a difference; None of anything else.
     """
