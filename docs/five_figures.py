@@ -48,7 +48,7 @@ def run() -> Result:
 def at_heaviest(result: Result) -> Instant:
     """The shoulder when it carries most."""
     step = int(np.argmin(np.abs(result.time - HEAVIEST)))
-    names = ("q", "theta", "phi", "tau_spring", "tau_e", "stiffness")
+    names = ("q", "theta", "phi", "tau_transmission", "tau_e", "stiffness")
     return Instant(*(getattr(result, name)[step, SHOULDER] for name in names))
 
 
@@ -143,7 +143,7 @@ def _sign(figure: Figure, result: Result) -> None:
 
 def _who_pulls(figure: Figure, result: Result) -> None:
     axes = figure.subplots()
-    springs = result.tau_spring[:, SHOULDER]
+    springs = result.tau_transmission[:, SHOULDER]
     axes.axhline(0, color="0.4", linewidth=0.8)
     axes.plot(result.time, springs[:, 0], color=BLUE)
     axes.plot(result.time, springs[:, 1], color=RED)

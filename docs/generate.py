@@ -261,7 +261,7 @@ def _cost(name: str) -> tuple[str, ...]:
     low, high = (result.elastic_energy[step].sum() for step in (0, -1))
     base = result.report.joints[0]
     return (
-        " to ".join(f"{value:.0f}" for value in dict.fromkeys((base.stiffness_min, base.stiffness_max))),
+        " to ".join(f"{value:.0f}" for value in dict.fromkeys((base.commanded_min, base.commanded_max))),
         f"{max(base.peak_tau_motor):.1f} N m",
         f"{base.energy.co_contraction:.1f} N m",
         f"{spent:.1f} J",

@@ -45,13 +45,13 @@ def test_the_full_model_follows(coupling: str) -> None:
     law, drive = SAMPLES[coupling].law, drive_of(coupling)
     coupled = assert_follows(LINK, [pair(law)], [drive], [RANGE])
     alone = inverse_dynamics(robot_of(LINK, [pair(None)]), motion_of([RANGE]))
-    changed = {"tau_spring", "tau_motor", "elastic_energy", "motor_power", "motor_energy"}
+    changed = {"tau_transmission", "tau_motor", "elastic_energy", "motor_power", "motor_energy"}
     for name, values in coupled.arrays().items():
         if name not in changed:
             np.testing.assert_array_equal(values, getattr(alone, name), err_msg=name)
-    added = coupled.tau_spring - alone.tau_spring
+    added = coupled.tau_transmission - alone.tau_transmission
     # what is taken away again is off by the rounding of what it was added to
-    rounding = 4 * np.spacing(np.abs(coupled.tau_spring).max())
+    rounding = 4 * np.spacing(np.abs(coupled.tau_transmission).max())
     np.testing.assert_allclose(added.sum(axis=-1), 0, atol=rounding)
     apart = coupled.theta[..., 0] - coupled.theta[..., 1]
     np.testing.assert_allclose(added[..., 0], law.torque(apart), rtol=1e-13, atol=rounding)
@@ -84,7 +84,7 @@ def test_the_compiled_engine_agrees() -> None:
     robot, motion = robot_of(ARM, [pair(SAMPLES[name].law) for name in COUPLINGS]), motion_of([RANGE] * 3)
     numpy, compiled = (inverse_dynamics(robot, motion, engine=name) for name in ("numpy", "c"))
     np.testing.assert_array_equal(compiled.flags, numpy.flags)
-    for name in ("tau_spring", "tau_motor", "elastic_energy", "motor_energy"):
+    for name in ("tau_transmission", "tau_motor", "elastic_energy", "motor_energy"):
         one, other = getattr(numpy, name), getattr(compiled, name)
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-12 * np.abs(one).max())
 

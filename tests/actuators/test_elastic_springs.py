@@ -60,7 +60,7 @@ def test_the_full_model_follows(name: str) -> None:
         np.testing.assert_allclose(
             found[:, 0], stiffness(result.time, order), rtol=0, atol=1e-6 * np.abs(found).max()
         )
-    assert np.isnan([result.stiffness_lower, result.stiffness_upper, result.det_A]).all()
+    assert np.isnan([result.stiffness_min, result.stiffness_max, result.det_A]).all()
 
 
 @pytest.mark.slow
@@ -99,7 +99,7 @@ def test_a_tendon_does_not_push() -> None:
     np.testing.assert_allclose(found["stiffness"], [np.nan, np.nan, 24, 42])
     for name in ("stiffness", "dstiffness", "ddstiffness", "elastic_energy"):
         assert np.isnan(found[name][:2]).all()
-    for name in ("phi", "dphi", "ddtheta", "tau_spring"):
+    for name in ("phi", "dphi", "ddtheta", "tau_transmission"):
         assert np.isnan(found[name][0, :2]).all()
         assert np.isfinite(found[name][0, 2:]).all()
 
@@ -107,7 +107,7 @@ def test_a_tendon_does_not_push() -> None:
 def test_a_tendon_without_stiffness_at_rest_is_singular_there() -> None:
     found = transmit(Quadratic(k=100), [0.0, 4.0], dtau_e=1.0)
     assert found["flags"].tolist() == [Flag.SINGULAR, 0]
-    assert (found["phi"][0, 0], found["tau_spring"][0, 0], found["stiffness"][0]) == (0, 0, 0)
+    assert (found["phi"][0, 0], found["tau_transmission"][0, 0], found["stiffness"][0]) == (0, 0, 0)
     for values in (found["dphi"][0], found["ddtheta"][0], found["dstiffness"], found["ddstiffness"]):
         assert np.isnan(values[0])
         assert np.isfinite(values[1])

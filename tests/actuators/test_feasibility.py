@@ -33,7 +33,7 @@ from vsacli.base.flags import LIMITS, MIN_MARGIN, Flag
 from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint, Limits
 
-MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
+MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 LOST_AT_A_FOLD = ("dphi", "dtheta", "ddtheta", "tau_motor")
 
 
@@ -134,20 +134,20 @@ def test_infeasible_step_has_no_motor_variables():
         values = values_of(driven, name)
         assert np.all(np.isnan(values[1])), name
         assert np.all(np.isfinite(values[[0, 2]])), name
-    assert np.all(np.isfinite(driven["stiffness_lower"]))
-    assert np.all(driven["stiffness_upper"] == math.inf)
+    assert np.all(np.isfinite(driven["stiffness_min"]))
+    assert np.all(driven["stiffness_max"] == math.inf)
 
 
 @pytest.mark.parametrize("tau_e", [0.0, 40.0, 400.0])
 def test_singular_step_keeps_what_needs_no_inverse(tau_e: float):
-    lower = drive(joint_with(), command(tau_e=tau_e))["stiffness_lower"]
+    lower = drive(joint_with(), command(tau_e=tau_e))["stiffness_min"]
     driven = drive(joint_with(), command(tau_e=tau_e, stiffness=lower, dtau_e=5.0))
     assert Flag(int(driven["flags"][0])) == Flag.SINGULAR
     for name in MOTOR_VARIABLES:
         lost = name in LOST_AT_A_FOLD
         assert np.all(np.isnan(driven[name]) == lost), name
     # The springs carry the load: rounding of the spread's square root, 1e-8, squared.
-    assert driven["tau_spring"].sum() == pytest.approx(tau_e, abs=1e-12 * (1 + tau_e))
+    assert driven["tau_transmission"].sum() == pytest.approx(tau_e, abs=1e-12 * (1 + tau_e))
 
 
 def test_other_joints_are_untouched_by_an_infeasible_one():
@@ -166,16 +166,16 @@ def test_other_joints_are_untouched_by_an_infeasible_one():
 
 def test_end_of_a_laws_domain_is_no_singularity():
     actuator = springs(Stopped(k=400, k_c=2000), Stopped(k=400, k_c=2000))
-    upper = drive(joint_with(actuator), command(tau_e=10.0))["stiffness_upper"]
+    upper = drive(joint_with(actuator), command(tau_e=10.0))["stiffness_max"]
     tau_e = np.array([10.0, 10.0, 10.0, 61.0])
     driven = drive(
         joint_with(actuator), command(tau_e=tau_e, stiffness=upper * np.array([0.999, 1, 1.001, 1]))
     )
     assert [int(bits) for bits in driven["flags"]] == [0, 0, Flag.INFEASIBLE, Flag.INFEASIBLE]
     # One spring is at its stop, the other carries the rest.
-    np.testing.assert_allclose(driven["tau_spring"][:, 1], [30, -20], rtol=1e-14)
+    np.testing.assert_allclose(driven["tau_transmission"][:, 1], [30, -20], rtol=1e-14)
     assert np.all(np.isfinite(driven["tau_motor"][:, :2]))
-    assert np.isnan([driven["stiffness_lower"][3], driven["stiffness_upper"][3]]).all()
+    assert np.isnan([driven["stiffness_min"][3], driven["stiffness_max"][3]]).all()
 
 
 # Limits
@@ -227,7 +227,7 @@ def test_limits_do_not_flag_what_does_not_exist():
 
 def test_limits_do_not_move_the_corridor():
     limited = springs(*[Cubic(k=400, k_c=2000, max_deflection=1e-3)] * 2)
-    for name in ("phi", "tau_motor", "stiffness_lower", "stiffness_upper"):
+    for name in ("phi", "tau_motor", "stiffness_min", "stiffness_max"):
         free, held = (drive(joint_with(each), command(tau_e=20.0)) for each in (None, limited))
         if name != "tau_motor":
             np.testing.assert_array_equal(free[name], held[name])

@@ -87,7 +87,7 @@ def same(found: FloatArray, expected: FloatArray) -> None:
 def test_the_dynamics_are_those_of_the_motor_on_the_joint_side():
     robots = rig(SHAFT), rig(REFLECTED)
     geared, reflected = (inverse_dynamics(robot, load_trajectory("move.yaml", robot)) for robot in robots)
-    for name in ("theta", "dtheta", "ddtheta", "tau_spring", "tau_motor"):
+    for name in ("theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor"):
         same(getattr(geared, name), getattr(reflected, name))
     np.testing.assert_array_equal(geared.flags, reflected.flags)
     assert {"motor_torque_limit", "motor_velocity_limit"} <= geared.report.joints[0].first_time.keys()
@@ -113,8 +113,8 @@ def exported(vsacli: Callable[..., Any], *options: str) -> dict[str, FloatArray]
 
 
 def test_what_is_exported_obeys_the_equation_of_the_shaft(vsacli: Callable[..., Any]):
-    """J theta'' + D theta' + tau_spring/n = tau, with the numbers of the datasheet."""
-    names = "theta,dtheta,ddtheta,tau_spring,tau_motor"
+    """J theta'' + D theta' + tau_transmission/n = tau, with the numbers of the datasheet."""
+    names = "theta,dtheta,ddtheta,tau_transmission,tau_motor"
     table = exported(vsacli, "--side", "motor", "--variables", names)
     motors = {
         "a_1": (0.02, 0.01, -10),
@@ -125,7 +125,7 @@ def test_what_is_exported_obeys_the_equation_of_the_shaft(vsacli: Callable[..., 
     for motor, (inertia, damping, ratio) in motors.items():
         joint, number = motor.split("_")
         shaft = {name: table[f"{joint}.{name}_shaft_{number}"] for name in ("dtheta", "ddtheta", "tau_motor")}
-        spring = table[f"{joint}.tau_spring_{number}"]
+        spring = table[f"{joint}.tau_transmission_{number}"]
         same(inertia * shaft["ddtheta"] + damping * shaft["dtheta"] + spring / ratio, shaft["tau_motor"])
 
 
@@ -157,7 +157,7 @@ def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any]):
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err.startswith("result.h5: the robot file gives no gear_ratio at a, c, so what happens on")
     assert "add it (1 without a gear)" in outcome.err
-    assert vsacli("export", "result.h5", "--side", "motor", "--variables", "q,tau_spring").code == 0
+    assert vsacli("export", "result.h5", "--side", "motor", "--variables", "q,tau_transmission").code == 0
 
 
 def test_the_result_holds_the_joint_side_and_the_ratio(vsacli: Callable[..., Any]):

@@ -64,7 +64,7 @@ def test_the_state_is_that_of_the_potential(any_device: Device) -> None:
     found = {
         "tau_e": (state.tau_e, tau_e),
         "stiffness": (state.stiffness, sigma),
-        "tau_spring": (state.tau_spring.T, np.array([motor[0] for motor in motors])),
+        "tau_transmission": (state.tau_transmission.T, np.array([motor[0] for motor in motors])),
         "torque_rate": (state.torque_rate(rates), dtau_e),
         "stiffness_rate": (state.stiffness_rate(rates), dsigma),
         "spring_rates": (state.spring_rates(rates).T, np.array([motor[1] for motor in motors])),

@@ -109,7 +109,7 @@ def test_a_simulation_ends_where_a_cam_does() -> None:
     simulation = simulate(plant, motion_of([(290, 1200)]), model=model)
     assert "a spring left the range of its law" in str(simulation.report.ending)
     history = simulation.history
-    phi, s = history.phi_actual[-1, 0, 0], history.theta_actual[-1, 0, 1]
+    phi, s = history.phi[-1, 0, 0], history.theta[-1, 0, 1]
     # the last step before the end, a step being half a millisecond
     assert max(abs(phi + s), abs(phi - s)) == pytest.approx(0.4, abs=2e-3)
 

@@ -81,7 +81,7 @@ def test_step_at_which_the_branch_splits_is_named(vsacli, sinking):
 def test_lower_end_jumps_past_the_stiffness_between_two_samples(sinking):
     robot = load_robot(sinking[0])
     result = inverse_dynamics(robot, load_trajectory(sinking[1], robot))
-    lower, infeasible = result.stiffness_lower[:, 0], has(result.flags[:, 0], Flag.INFEASIBLE)
+    lower, infeasible = result.stiffness_min[:, 0], has(result.flags[:, 0], Flag.INFEASIBLE)
     first = int(infeasible.argmax())
     assert np.all(infeasible[first:])
     assert lower[first - 1] < 1937 < 1950 < 1965 < lower[first]
@@ -134,7 +134,7 @@ def dip(laws: tuple[SpringLaw, SpringLaw], closest: float) -> tuple[Result, Floa
     moment[:, 5] = -LOAD
     still = np.zeros((201, 1))
     probe = Trajectory.from_samples(time, still, still + 1000, wrench=moment)
-    lower = inverse_dynamics(robot, probe).stiffness_lower
+    lower = inverse_dynamics(robot, probe).stiffness_min
     stiffness = lower * (1 + closest + (time[:, None] - 1) ** 2)
     slopes = {"dstiffness": 2 * lower * (time[:, None] - 1), "ddstiffness": 2 * lower}
     trajectory = Trajectory.from_samples(time, still, stiffness, wrench=moment, **slopes)
@@ -167,7 +167,7 @@ def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
         values = getattr(result, name)[:, 0]
         assert np.all(np.isnan(values[singular])), name
         assert np.all(np.isfinite(values[~singular])), name
-    for name in ("phi", "theta", "tau_spring"):
+    for name in ("phi", "theta", "tau_transmission"):
         values, near = getattr(result, name)[:, 0], getattr(passing, name)[:, 0]
         assert np.all(np.isfinite(values)), name
         # A millionth of stiffness away is a thousandth of deflection.
@@ -202,4 +202,4 @@ def test_springs_of_a_slide(laws: tuple[SpringLaw, SpringLaw]):
     assert result.report.verdict == "ok"
     # The weight and the inertia of 1 kg, in N, and no more than the damping beside.
     np.testing.assert_allclose(result.tau_e, 9.81 + ddq + 0.1 * dq, rtol=1e-12)
-    np.testing.assert_allclose(result.tau_spring.sum(axis=2), result.tau_e, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(result.tau_transmission.sum(axis=2), result.tau_e, rtol=0, atol=1e-10)

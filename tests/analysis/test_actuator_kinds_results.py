@@ -164,12 +164,12 @@ def exported(vsacli: Callable[..., Outcome], *names: str) -> list[list[str]]:
 
 @pytest.mark.usefixtures("stored")
 def test_columns_that_a_joint_does_not_have_are_not_exported(vsacli: Callable[..., Outcome]) -> None:
-    header, *rows = exported(vsacli, "stiffness", "tau_motor", "stiffness_lower", "flags")
+    header, *rows = exported(vsacli, "stiffness", "tau_motor", "stiffness_min", "flags")
     assert header == [
         "time",
         *("shoulder.stiffness", "elbow.stiffness"),
         *("base.tau_motor_1", "shoulder.tau_motor_1", "elbow.tau_motor_1", "elbow.tau_motor_2"),
-        "elbow.stiffness_lower",
+        "elbow.stiffness_min",
         *("base.flags", "shoulder.flags", "elbow.flags"),
     ]
     assert len(rows) == 5
@@ -234,7 +234,7 @@ def test_a_robot_with_one_motor_a_joint_is_stored_without_the_second(
 
 def drawn(**options: object) -> Result:
     result = rest_to_rest(101, actuators=KINDS, **options)
-    for name, joints in (("stiffness", [0]), ("stiffness_lower", [0, 1]), ("stiffness_upper", [0, 1])):
+    for name, joints in (("stiffness", [0]), ("stiffness_min", [0, 1]), ("stiffness_max", [0, 1])):
         result.read(name)[:, joints] = np.nan
     result.read("tau_motor")[:, :2, 1] = np.nan
     return result

@@ -141,7 +141,7 @@ def test_margins_that_are_smaller_than_at_any_step(
     if promised and rate > 100:
         pytest.skip("the difference is less than the thousandth to which a margin is known")
     robot = limited(random_robot(letter, seed=8))
-    at_steps, everywhere = largest(robot, swinging(rate), "stiffness_lower")
+    at_steps, everywhere = largest(robot, swinging(rate), "stiffness_min")
     stiffness = (at_steps + everywhere) / 2 / (1 - promised)
     trajectory, least = swinging(rate, stiffness=stiffness), 1 - everywhere / stiffness
     result = inverse_dynamics(robot, trajectory)
@@ -169,7 +169,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
     robot = random_robot("RRR", seed=3)
     trajectory = swinging(rate, joints=3)
     block = compute_block(robot, trajectory.at(np.linspace(0, DURATION, 5 * int(DURATION * rate) + 1)))
-    lower = block.stiffness_lower
+    lower = block.stiffness_min
     at_steps, everywhere = lower[::5].max(axis=0), lower.max(axis=0)
     stiffness = np.where(everywhere > at_steps + 1e-3, (at_steps + everywhere) / 2, 2 * everywhere)
     constant = Constant(signal=STIFFNESS, span=(0.0, DURATION), value=tuple(stiffness.tolist()))
@@ -201,7 +201,7 @@ def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> 
     assert trajectory.samples > SCANNED
     dense = trajectory.at(np.linspace(0, DURATION, 100 * (trajectory.samples - 1) + 1))
     block = compute_block(robot, dense)
-    gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+    gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
     result = inverse_dynamics(robot, trajectory)
     assert result.report.verdict == "infeasible"
     for index, joint in enumerate(result.report.joints):
@@ -245,7 +245,7 @@ def test_a_spike_between_coarse_steps() -> None:
         constant = Constant(signal=STIFFNESS, span=span, value=(stiffness,))
         return Trajectory(times, position, {"stiffness": constant}, name="zeros")
 
-    at_steps, everywhere = largest(robot, zeros(1500.0), "stiffness_lower")
+    at_steps, everywhere = largest(robot, zeros(1500.0), "stiffness_min")
     assert everywhere > 1.09 * at_steps
     stiffness = 1.05 * at_steps
     report = inverse_dynamics(robot, zeros(stiffness)).report

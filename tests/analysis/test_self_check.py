@@ -130,7 +130,7 @@ def test_standing_still_passes(duration: float):
 
 @pytest.mark.parametrize("least_margin", [1e-3, 1e-5, 1e-8])
 def test_motion_close_to_a_fold_passes(least_margin: float):
-    lower = inverse_dynamics(vsa_3r(), motion(duration=4)).stiffness_lower.max()
+    lower = inverse_dynamics(vsa_3r(), motion(duration=4)).stiffness_min.max()
     stiffness = (float(lower / (1 - least_margin)),) * 3
     report = inverse_dynamics(vsa_3r(), motion(duration=4, stiffness=stiffness)).report
     assert sum(joint.samples["near_singular"] for joint in report.joints) > 0

@@ -26,7 +26,7 @@ from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
-MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
+MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 
 
 def troubled() -> tuple[Robot, Trajectory]:
@@ -56,7 +56,7 @@ def test_results_do_not_depend_on_the_blocks():
         run = Run(robot, trajectory, block_samples=block_samples)
         blocks = list(run)
         assert max(len(block.time) for block in blocks) == block_samples
-        for name in ("time", "q", "tau_e", "ddtau_e", *MOTOR_VARIABLES, "stiffness_lower", "flags"):
+        for name in ("time", "q", "tau_e", "ddtau_e", *MOTOR_VARIABLES, "stiffness_min", "flags"):
             joined = np.concatenate([getattr(block, name) for block in blocks])
             np.testing.assert_array_equal(joined, getattr(whole, name), err_msg=name)
         assert run.report().as_json() == whole.report.as_json()
@@ -86,15 +86,15 @@ def test_report_counts_and_dates_each_trouble():
 def test_report_names_the_worst_step_and_what_it_allows():
     result = inverse_dynamics(*troubled())
     elbow = result.report.joints[2]
-    gap = margin(result.stiffness, result.stiffness_lower, result.stiffness_upper)[:, 2]
+    gap = margin(result.stiffness, result.stiffness_min, result.stiffness_max)[:, 2]
     step = gap.argmin()
     assert (elbow.margin, elbow.margin_time) == (gap[step], result.time[step])
-    assert elbow.attainable == (result.stiffness_lower[step, 2], math.inf)
+    assert elbow.attainable == (result.stiffness_min[step, 2], math.inf)
     worst = elbow.worst["infeasible"]
     assert (worst.time, worst.value, worst.bound) == (
         result.time[step],
         result.stiffness[step, 2],
-        result.stiffness_lower[step, 2],
+        result.stiffness_min[step, 2],
     )
     assert worst.unit == "N m/rad"
 
@@ -218,7 +218,7 @@ def test_springs_that_cannot_carry_the_load_leave_no_margin():
     result = inverse_dynamics(heavy, motion(duration=20))
     carried = np.abs(result.tau_e[:, 1]) <= 60
     assert 0 < carried.sum() < len(carried)
-    np.testing.assert_array_equal(np.isfinite(result.stiffness_lower[:, 1]), carried)
+    np.testing.assert_array_equal(np.isfinite(result.stiffness_min[:, 1]), carried)
     report = result.report.joints[1]
     assert report.samples["infeasible"] >= (~carried).sum()
     assert math.isnan(report.margin)

@@ -150,7 +150,7 @@ def test_a_simulation_becomes_a_joint_trajectory_as_it_went(vsacli, tmp_path, mo
     check_message(message)
     assert message["joint_names"] == ["base", "shoulder", "elbow"]
     positions = [point["positions"] for point in message["points"]]
-    np.testing.assert_array_equal(positions, stored(tmp_path / "s.h5", "q_actual")[::5])
+    np.testing.assert_array_equal(positions, stored(tmp_path / "s.h5", "q")[::5])
 
 
 @pytest.mark.parametrize(

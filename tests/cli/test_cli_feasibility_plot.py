@@ -126,7 +126,7 @@ def test_upper_end_of_the_corridor_is_drawn():
     result = rest_to_rest(sigma=(850, 1275))
     upper = np.full_like(result.read("stiffness"), 1200.0)
     above = result.read("stiffness") > upper
-    bounded = rest_to_rest(sigma=(850, 1275), stiffness_upper=upper, flags=above.astype(np.uint32))
+    bounded = rest_to_rest(sigma=(850, 1275), stiffness_max=upper, flags=above.astype(np.uint32))
     assert set(FEASIBILITY_VARIABLES) <= set(bounded.variables)
     for axes in drawn_sheet(feasibility(StoredCharts([bounded]))).axes:
         assert any((line.get_ydata() == 1200).all() for line in axes.lines)

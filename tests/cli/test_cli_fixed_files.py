@@ -196,7 +196,7 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     assert fixes
     trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
     block = compute_block(load_robot(ROBOT), trajectory.block(0, trajectory.samples))
-    room = (block.stiffness - block.stiffness_lower) / block.stiffness
+    room = (block.stiffness - block.stiffness_min) / block.stiffness
     assert room[:, [0, 2]].min() >= 0.01 - 1e-9
 
 

@@ -72,7 +72,7 @@ def test_stiffness_below_reach_is_named_with_joint_time_and_what_is_reachable(vs
     with h5py.File(tmp_path / "vsa_3r-soft.h5") as file:
         infeasible = (file["flags"][:] & 1) != 0
         assert np.isnan(file["tau_motor"][:]).any(axis=-1).tolist() == infeasible.tolist()
-        assert file["stiffness_lower"][-1, 1] == pytest.approx(bound, rel=1e-9)  # two roundings of one number
+        assert file["stiffness_min"][-1, 1] == pytest.approx(bound, rel=1e-9)  # two roundings of one number
         assert file.attrs["verdict"] == "infeasible"
         first = file["time"][infeasible[:, 0].argmax()]
     count = infeasible[:, 0].sum()

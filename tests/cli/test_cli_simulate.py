@@ -41,8 +41,8 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         assert (stored.verdict, stored.complete, stored.samples) == ("ok", True, 26)
         declared = [name for name, each in SIMULATION_VARIABLES.items() if each.requires in OF_ANY_ROBOT]
         assert list(stored.variables) == [name for name in declared[1:] if not name.endswith("_measured")]
-        q, actual, error = (stored.read(name) for name in ("q", "q_actual", "q_error"))
-        assert np.array_equal(actual - q, error)
+        q, commanded, error = (stored.read(name) for name in ("q", "q_ref", "q_error"))
+        assert np.array_equal(q - commanded, error)
         assert np.abs(error).max() < 1e-8  # the integrator's tolerance, as elsewhere
         assert stored.report_json["format"] == "vsacli-simulation-report/1"
 
@@ -50,10 +50,11 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with xarray.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as data:
-        assert data.q_actual.dims == ("time", "joint")
-        assert data.tau_motor_actual.dims == ("time", "joint", "motor")
-        assert data.q_actual.attrs["units"] == "rad"
-        assert "as it was" in data.q_actual.attrs["long_name"]
+        assert data.q.dims == ("time", "joint")
+        assert data.tau_motor.dims == ("time", "joint", "motor")
+        assert data.q.attrs["units"] == "rad"
+        assert data.q.attrs["long_name"] == "joint position"
+        assert data.q_ref.attrs["long_name"] == "commanded joint position"
 
 
 def test_feedback_from_a_poles_file(vsacli, quick, tmp_path):
@@ -98,7 +99,7 @@ def test_a_run_that_ends_off_the_command_is_off_target(vsacli, quick, tmp_path, 
     assert ("off the command, more than the tolerance" in done.out) == (verdict == "off_target")
     with StoredSimulation.open(tmp_path / "s.h5") as stored:
         assert (stored.verdict, stored.complete) == (verdict, True)
-        ends, q = stored.read("q_error")[-1], stored.read("q")
+        ends, q = stored.read("q_error")[-1], stored.read("q_ref")
         joints = stored.report_json["joints"]
     ranges = q.max(axis=0) - q.min(axis=0)
     allowed = {"1%": 0.01 * ranges + 1e-3, "30%": 0.3 * ranges + 1e-3, "0.2": np.full(3, 0.2)}[tolerance]

@@ -143,10 +143,10 @@ def test_installed_command_exports_what_happened(tmp_path: Path, simulated: Path
     done = installed("export", simulated / "s.h5", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     header, values = parsed(done.stdout)
-    torques = [f"{joint}.tau_motor_actual_{motor}" for joint in JOINTS for motor in (1, 2)]
-    of_joints = [f"{joint}.{name}" for name in ("q_actual", "stiffness_actual") for joint in JOINTS]
+    torques = [f"{joint}.tau_motor_{motor}" for joint in JOINTS for motor in (1, 2)]
+    of_joints = [f"{joint}.{name}" for name in ("q", "stiffness") for joint in JOINTS]
     assert header == ["time", *of_joints, *torques]
-    names = ("q_actual", "stiffness_actual", "tau_motor_actual")
+    names = ("q", "stiffness", "tau_motor")
     expected = [stored(simulated / "s.h5", name).reshape(26, -1) for name in names]
     np.testing.assert_array_equal(values[:, 1:], np.hstack(expected))
     np.testing.assert_array_equal(values[:, 0], np.arange(26) / 25)
@@ -161,7 +161,7 @@ def test_variables_and_rate(vsacli: Callable[..., Any], simulated: Path) -> None
     np.testing.assert_array_equal(values[:, 1:], expected)
 
 
-def test_the_commanded_motion_reads_back_as_a_trajectory(
+def test_the_simulated_motion_reads_back_as_a_trajectory(
     vsacli: Callable[..., Any], tmp_path: Path, simulated: Path
 ) -> None:
     vsacli("export", simulated / "s.h5", "--variables", "q,stiffness", "-o", "again.csv")
@@ -179,10 +179,10 @@ def test_joints_of_every_kind_have_the_columns_they_have_in_a_result(
     assert vsacli("invdyn", robot, motion, "-o", "r.h5").code == 0
     vsacli("simulate", robot, motion, "-o", "s.h5")
     of_result = vsacli("export", "r.h5", "--variables", "tau_motor,stiffness,det_A").out
-    names = "tau_motor_actual,stiffness_actual,det_A_actual"
+    names = "tau_motor,stiffness,det_A"
     of_simulation = vsacli("export", "s.h5", "--variables", names)
     assert of_simulation.code == 0
-    columns = of_simulation.out.splitlines()[0].replace("_actual", "").split(",")
+    columns = of_simulation.out.splitlines()[0].split(",")
     assert sorted(columns) == sorted(of_result.splitlines()[0].split(","))
     assert len(columns) < 1 + 3 * 4
 
@@ -191,20 +191,20 @@ def test_shafts_of_the_motors(vsacli: Callable[..., Any], tmp_path: Path) -> Non
     (tmp_path / "rig.yaml").write_text(HEAD + GEARED)
     (tmp_path / "move.yaml").write_text(MOVE + "stiffness: {type: constant, value: 1000}\n")
     assert vsacli("simulate", "rig.yaml", "move.yaml", "-o", "s.h5").code == 0
-    names = "q_actual,theta_actual,dtheta_actual,tau_motor,tau_motor_actual,phi_actual"
+    names = "q,theta,dtheta,tau_motor_cmd,tau_motor,phi"
     done = vsacli("export", "s.h5", "--side", "motor", "--variables", names)
     assert done.code == 0
     header, values = parsed(done.out)
     columns = dict(zip(header, values.T, strict=True))
     ratio = np.array([-10.0, 40.0])
-    for name, factor in {"theta_actual": ratio, "dtheta_actual": ratio, "tau_motor": 1 / ratio}.items():
+    for name, factor in {"theta": ratio, "dtheta": ratio, "tau_motor_cmd": 1 / ratio}.items():
         for motor in (0, 1):
             shaft, joint = (
                 columns[f"a.{name}_shaft_{motor + 1}"],
                 stored(tmp_path / "s.h5", name)[:, 0, motor],
             )
             np.testing.assert_allclose(shaft, factor[motor] * joint, rtol=1e-15)  # one rounding
-    expected = {"a.q_actual", "a.tau_motor_actual_shaft_1", "a.phi_actual_1", "a.phi_actual_2"}
+    expected = {"a.q", "a.tau_motor_shaft_1", "a.phi_1", "a.phi_2"}
     assert expected < set(header)
 
 
@@ -218,11 +218,11 @@ def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any], simulate
 @pytest.mark.parametrize(
     ("name", "there"),
     [
-        ("theta", "'theta_actual' or 'theta_measured'"),
-        *((n, f"'{n}_actual'") for n in ("tau_e", "phi", "det_A")),
+        ("ddtheta", "'dtheta'"),
+        ("ddq_error", "'dq_error'"),
     ],
 )
-def test_a_name_of_a_result_leads_to_that_of_the_simulation(
+def test_a_name_without_a_variable_leads_to_the_nearest(
     vsacli: Callable[..., Any], simulated: Path, name: str, there: str
 ) -> None:
     done = vsacli("export", simulated / "s.h5", "--variables", name)

@@ -92,7 +92,7 @@ PAIRS = {
 }
 
 
-STRETCH_MARGIN = {"stiffness_upper": 1e-9}
+STRETCH_MARGIN = {"stiffness_max": 1e-9}
 """At the end of the four-bar's domain one unit in the last place of a deflection changes it by 1e-10."""
 
 

@@ -320,7 +320,7 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)
     block = compute_block(robot, motion_of(command))
     with np.errstate(invalid="ignore"):
-        margin = (block.stiffness - block.stiffness_lower) / block.stiffness - 0.1 + 1e-3
+        margin = (block.stiffness - block.stiffness_min) / block.stiffness - 0.1 + 1e-3
     for key, values in found.items():
         expected = expected_of(block, key)
         chosen = clear(margin, expected.shape) & np.isfinite(expected)

@@ -46,7 +46,7 @@ def lossy() -> Robot:
 
 def margins(block: Block) -> FloatArray:
     with np.errstate(invalid="ignore"):
-        room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
+        room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
     return np.abs(room) / block.stiffness
 
 
@@ -65,7 +65,7 @@ def check_inverse_dynamics(robot: Robot, folder: Path, rtol_of_upper: float = 0.
         np.testing.assert_array_equal(np.isnan(values), np.isnan(expected), err_msg=name)
         chosen = clear(margins(block), expected.shape) & np.isfinite(expected)
         peak = np.abs(expected[chosen]).max(initial=0.0)
-        rtol = rtol_of_upper if name == "stiffness_upper" else 0.0
+        rtol = rtol_of_upper if name == "stiffness_max" else 0.0
         np.testing.assert_allclose(
             values[chosen], expected[chosen], rtol=rtol, atol=CLOSE * peak, err_msg=name
         )

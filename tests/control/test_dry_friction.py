@@ -153,8 +153,8 @@ def test_feedforward_follows(friction):
     assert simulation.report.verdict == "ok"
     past, commanded = simulation.history, inverse_dynamics(robot, trajectory)
     # without friction 1e-10; torques jump as the motors turn back, which they do to within a millisecond/1000
-    np.testing.assert_allclose(past.q_actual, past.q, rtol=0, atol=1e-7)
-    assert past.dissipated_power_actual.min() > -2.0  # the offset pushes along
+    np.testing.assert_allclose(past.q, past.q_ref, rtol=0, atol=1e-7)
+    assert past.dissipated_power.min() > -2.0  # the offset pushes along
     for was, planned in zip(simulation.report.joints, commanded.report.joints, strict=True):
         assert was.energy.dissipated == pytest.approx(planned.energy.dissipated, rel=1e-3)  # trapezoids
 
@@ -179,7 +179,7 @@ def test_feedback_moves_a_block_only_if_the_error_demands_more_than_its_friction
         expected = start if start == held else error_course(poles, start, past.time)
         # the integration is good to 1e-9 of what moves
         np.testing.assert_allclose(past.q_error[:, 0], expected, rtol=0, atol=1e-10)
-        assert (past.dq_actual == 0).all() == (start == held)
+        assert (past.dq == 0).all() == (start == held)
 
 
 @pytest.mark.slow
@@ -188,20 +188,20 @@ def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():
     trajectory = short_motion(3, duration=0.5, size=0.2, stiffness=(1100, 1200))
     simulation = simulate(robot, trajectory, gains=GAINS)
     past = simulation.history
-    held = past.dtheta_actual[1:20] == 0
+    held = past.dtheta[1:20] == 0
     assert held.any()
     assert np.abs(past.q_error).max() > 1e-5  # what sticks is late
     assert np.abs(past.q_error[-1]).max() < 0.02
     again = simulate(robot, trajectory, gains=GAINS, tolerances=Tolerances(1e-11, 1e-12)).history
-    np.testing.assert_allclose(past.q_actual, again.q_actual, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(past.q, again.q, rtol=0, atol=1e-5)
 
 
 def test_held_torques_break_a_block_loose():
     """The controller acts at samples: what it asks for then may at once be more than friction can hold."""
     trajectory, gains = step_of(0.15, duration=0.5, rate=100), Gains.from_poles([-10.0] * 2)
     past = simulate(block(), trajectory, gains=gains, feedback="positions").history
-    assert (past.dq_actual[:5] == 0).all()  # 100 1/s^2 times the error are less than 2 N
-    assert past.q_actual[-1, 0] > 0.3  # of 0.35
+    assert (past.dq[:5] == 0).all()  # 100 1/s^2 times the error are less than 2 N
+    assert past.q[-1, 0] > 0.3  # of 0.35
 
 
 @pytest.mark.slow

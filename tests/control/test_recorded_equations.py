@@ -127,7 +127,7 @@ def test_engines_find_the_same_motion(gains):
         assert run.report.verdict == text.report.verdict
         # steps follow rounding, but every 1e3 evaluations some 10 differ
         assert run.report.evaluations == pytest.approx(text.report.evaluations, rel=0.02)
-        for name in ("q_actual", "dq_actual", "theta_actual", "tau_motor"):
+        for name in ("q", "dq", "theta", "tau_motor_cmd"):
             found, expected = getattr(run.history, name), getattr(text.history, name)
             # tolerances of 1e-9, which the open loop magnifies; torques of 100 N m
             assert found == pytest.approx(expected, rel=1e-6, abs=1e-7, nan_ok=True)
@@ -157,7 +157,7 @@ def test_controllers_that_hold_their_torques_are_recorded_too():
     trajectory = short_motion(3, rate=100, duration=0.2)
     runs = [simulate(vsa_3r(), trajectory, engine=engine, **conditions) for engine in ("c", "numpy")]
     assert runs[0].provenance["engine"] == "c"
-    assert runs[0].history.q_actual == pytest.approx(runs[1].history.q_actual, abs=1e-8)
+    assert runs[0].history.q == pytest.approx(runs[1].history.q, abs=1e-8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -253,7 +253,7 @@ def test_motors_that_stick_are_left_to_the_text():
     sharp = Rigid(motor=Motor(inertia=0.5, friction=Friction(coulomb=(2.0, 2.0))))
     robot, trajectory = single_joint(sharp), step_of(1.0)
     auto, plain = (simulate(robot, trajectory, engine=engine) for engine in ("auto", "numpy"))
-    assert np.array_equal(auto.history.q_actual, plain.history.q_actual)
+    assert np.array_equal(auto.history.q, plain.history.q)
     with pytest.raises(InputError, match=r"motors with sharp friction stick and slide; take .* numpy"):
         simulate(robot, trajectory, engine="c")
 
@@ -279,7 +279,7 @@ def test_laws_that_cannot_be_recorded_are_left_to_the_text(law):
     laws = [each(k=380.0, k_c=3500.0) for each in (law, Cubic)]
     robot, plain = (with_joint(vsa_3r(), 1, joint_with(springs(each, each))) for each in laws)
     own, usual = (simulate(each, short_motion(3), engine="auto") for each in (robot, plain))
-    assert own.history.q_actual == pytest.approx(usual.history.q_actual, abs=1e-8)
+    assert own.history.q == pytest.approx(usual.history.q, abs=1e-8)
     assert own.provenance == PLAIN
     with pytest.raises(InputError, match=r"this cannot be compiled: .*; take the engine numpy"):
         simulate(robot, short_motion(3), engine="c")
@@ -289,7 +289,7 @@ def test_laws_that_cannot_be_recorded_are_left_to_the_text(law):
 def test_potentials_are_left_to_the_text():
     robot, trajectory = shipped_run("sliding_anchor_1r", "sliding_anchor_1r")
     auto, plain = (simulate(robot, trajectory, engine=engine) for engine in ("auto", "numpy"))
-    assert np.array_equal(auto.history.q_actual, plain.history.q_actual)
+    assert np.array_equal(auto.history.q, plain.history.q)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -25,7 +25,7 @@ GAINS = Gains.from_poles([-12] * 4, [-12] * 2)
 def test_noise_is_normal_white_and_as_large_as_said():
     past = simulate(vsa_3r(), short_motion(3, rate=1000), sensors=Sensors(2e-5, 0.5, seed=4)).history
     for name, deviation in (("q", 2e-5), ("theta", 2e-5), ("tau_motor", 0.5)):
-        noise = getattr(past, f"{name}_measured") - getattr(past, f"{name}_actual")
+        noise = getattr(past, f"{name}_measured") - getattr(past, name)
         noise = noise.reshape(len(past.time), -1) / deviation
         samples = len(noise)
         # five standard deviations of the estimates from so many samples
@@ -58,15 +58,15 @@ def test_encoders_round_to_their_steps_on_either_side_of_the_gear():
     step = 2 * np.pi / 4096
     steps = np.array([[step / 100, step], [step, step], [step, step]])
     for read, true, size in (
-        (past.q_measured, past.q_actual, step),
-        (past.theta_measured, past.theta_actual, steps),
+        (past.q_measured, past.q, step),
+        (past.theta_measured, past.theta, steps),
     ):
         whole = read / size
         assert np.abs(whole - np.round(whole)).max() < 1e-9  # rounding of some 1e5 steps
         assert np.abs(read - true).max() <= np.max(size) / 2 * (1 + 1e-9)
         assert (np.abs(read - true) <= size / 2 * (1 + 1e-9)).all()
         assert np.abs(read - true).max() > 0.4 * np.max(size)  # they do round
-    assert np.array_equal(past.tau_motor_measured, past.tau_motor_actual)
+    assert np.array_equal(past.tau_motor_measured, past.tau_motor)
 
 
 def test_an_encoder_of_a_slide_divides_its_range():
@@ -98,8 +98,8 @@ def test_perfect_sensors_change_nothing():
     conditions = {"gains": GAINS, "feedback": "positions"}
     plain = simulate(vsa_3r(), short_motion(3), **conditions).history
     read = simulate(vsa_3r(), short_motion(3), **conditions, sensors=Sensors()).history
-    assert np.array_equal(plain.tau_motor, read.tau_motor)
-    assert np.array_equal(read.q_measured, plain.q_actual)
+    assert np.array_equal(plain.tau_motor_cmd, read.tau_motor_cmd)
+    assert np.array_equal(read.q_measured, plain.q)
     assert plain.q_measured is None
 
 
@@ -110,7 +110,7 @@ def test_a_controller_that_measures_positions_knows_what_is_recorded():
     past = simulate(vsa_3r(), motion, gains=GAINS, feedback="positions", sensors=sensors).history
     control = FeedbackLinearization(vsa_3r(), GAINS)
     q, theta = past.q_measured, past.theta_measured
-    dq, dtheta = past.dq_actual[0], past.dtheta_actual[0]  # known at the start: the robot rests
+    dq, dtheta = past.dq[0], past.dtheta[0]  # known at the start: the robot rests
     keep = np.exp(-0.2 * np.pi)
     for sample in range(1, 20):
         step = past.time[sample] - past.time[sample - 1]
@@ -119,7 +119,7 @@ def test_a_controller_that_measures_positions_knows_what_is_recorded():
         state = State(q=q[sample], dq=dq, theta=theta[sample], dtheta=dtheta)
         expected = control(state, motion.at(past.time[sample]))
         # rounding: the largest terms of the law, gains times inertias, cancel to six digits
-        assert past.tau_motor[sample] == pytest.approx(expected, rel=1e-9, abs=1e-7)
+        assert past.tau_motor_cmd[sample] == pytest.approx(expected, rel=1e-9, abs=1e-7)
 
 
 @pytest.mark.parametrize(

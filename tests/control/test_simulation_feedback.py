@@ -77,7 +77,7 @@ def check_errors(robot, paired, trajectory, stiffness_error, has_stiffness):
     assert np.abs(past.q_error[probed] - position[:, None]).max() < TRACKING * 0.02
     off = past.stiffness_error[probed][:, has_stiffness] - stiffness[:, None]
     assert np.abs(off).max() < TRACKING * stiffness_error
-    fixed = past.stiffness_actual[:, ~has_stiffness]
+    fixed = past.stiffness[:, ~has_stiffness]
     assert np.array_equal(fixed, np.full_like(fixed, 1200.0))
 
 
@@ -103,7 +103,7 @@ def test_computed_torque_obeys_its_linear_dynamics():
     # a rigid drive takes q' as commanded, but no q'' or q''': the error starts from (e, 0)
     expected = error_course([-8 + 3j, -8 - 3j], 0.05, past.time[::10])
     assert np.abs(past.q_error[::10] - expected[:, None]).max() < TRACKING * 0.05
-    assert np.isnan(past.stiffness_actual).all()
+    assert np.isnan(past.stiffness).all()
 
 
 @pytest.mark.parametrize("frame", [None, "base"])
@@ -114,11 +114,11 @@ def test_accelerations_and_jerks_are_the_derivatives_of_the_simulated_motion(fra
     wrench = trajectory.at(past.time).wrench
     link = law.law.link_motion(*law.plant.unpacked(state), wrench)
     # Sixth-order differences over 1 ms: 1e-9 of local error over 1e-3 s, 1e-6 of the peak
-    for values, derivative in ((past.dq_actual, link.ddq), (link.ddq, link.d3q)):
+    for values, derivative in ((past.dq, link.ddq), (link.ddq, link.d3q)):
         assert np.abs(difference(values, 1e-3) - derivative[3:-3]).max() < 3e-6 * np.abs(derivative).max()
     for values, derivative in ((link.tau_e, link.dtau_e), (link.stiffness, link.dstiffness)):
         assert np.abs(difference(values, 1e-3) - derivative[3:-3]).max() < 3e-6 * np.abs(derivative).max()
-    assert past.ddq_actual == pytest.approx(link.ddq, rel=1e-9, abs=1e-9)  # the same (34), programs apart
+    assert past.ddq == pytest.approx(link.ddq, rel=1e-9, abs=1e-9)  # the same (34), programs apart
 
 
 def difference(values, step):
@@ -138,7 +138,7 @@ def test_the_power_balance_holds(robot):
     data = model.createData()
     links = [
         pin.computeKineticEnergy(model, data, q, dq) + pin.computePotentialEnergy(model, data, q)
-        for q, dq in zip(past.q_actual, past.dq_actual, strict=True)
+        for q, dq in zip(past.q, past.dq, strict=True)
     ]
     motors = [joint.actuator.motor for joint in robot.joints]
     inertia, damping = (
@@ -146,13 +146,13 @@ def test_the_power_balance_holds(robot):
         for name in ("inertia", "damping")
     )
     springs = sum(
-        law.energy(past.phi_actual[:, index, side])
+        law.energy(past.phi[:, index, side])
         for index, joint in enumerate(robot.joints)
         for side, law in enumerate(joint.actuator.laws)
     )
-    energy = np.array(links) + springs + (inertia * past.dtheta_actual**2).sum(axis=(1, 2)) / 2
+    energy = np.array(links) + springs + (inertia * past.dtheta**2).sum(axis=(1, 2)) / 2
     friction = np.array([joint.damping for joint in robot.joints])
-    power = (past.tau_motor_actual * past.dtheta_actual - damping * past.dtheta_actual**2).sum(axis=(1, 2))
-    power -= (friction * past.dq_actual**2).sum(axis=1)
+    power = (past.tau_motor * past.dtheta - damping * past.dtheta**2).sum(axis=(1, 2))
+    power -= (friction * past.dq**2).sum(axis=1)
     # first differences of the energy over 1 ms, of sixth order: local errors of 1e-9 over 1e-3 s
     assert np.abs(difference(energy, 1e-3) - power[3:-3]).max() < 1e-5 * np.abs(power).max()

@@ -46,9 +46,9 @@ def test_motors_saturate():
     limit = 0.8 * free
     simulation = simulate(with_torque_limit(vsa_3r(), limit), short_motion(3), **conditions)
     past, base = simulation.history, simulation.report.joints[0]
-    beyond = np.abs(past.tau_motor[:, 0]) > limit
+    beyond = np.abs(past.tau_motor_cmd[:, 0]) > limit
     assert base.peak_tau_motor[0] == limit
-    assert np.array_equal(past.tau_motor_actual[:, 0], np.clip(past.tau_motor[:, 0], -limit, limit))
+    assert np.array_equal(past.tau_motor[:, 0], np.clip(past.tau_motor_cmd[:, 0], -limit, limit))
     flagged = (past.flags[:, 0] & Flag.MOTOR_TORQUE_LIMIT) != 0
     assert flagged.any()
     assert np.array_equal(flagged, beyond.any(axis=1))
@@ -56,7 +56,7 @@ def test_motors_saturate():
     assert simulation.report.verdict == "off_target"  # without the torque asked for; worse than a limit
     worst = base.worst["motor_torque_limit"]
     assert abs(worst.bound) == limit
-    assert abs(worst.value) == np.abs(past.tau_motor[:, 0]).max()
+    assert abs(worst.value) == np.abs(past.tau_motor_cmd[:, 0]).max()
     assert f"base: joint-side torque of motor {worst.motor} is {worst.value:.6g}" in str(simulation.report)
 
 
@@ -74,7 +74,7 @@ def test_stamps_since_1970_do_as_well_as_those_from_zero():
     )
     np.testing.assert_array_equal(late.history.time, 1.7e9 + stamps)
     # the steps themselves are rounded by 1.2e-7 s, at speeds below 3 rad/s
-    np.testing.assert_allclose(late.history.q_actual, zero.history.q_actual, rtol=0, atol=4e-7)
+    np.testing.assert_allclose(late.history.q, zero.history.q, rtol=0, atol=4e-7)
 
 
 def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
@@ -91,7 +91,7 @@ def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     assert past.flags[-1].tolist() == [0, Flag.SINGULAR, 0]
     assert not past.flags[:-1].any()
     # at 1e-4 of the first determinant, to what the event's root finder leaves
-    assert past.det_A_actual[-1, 1] / past.det_A_actual[0, 1] == pytest.approx(1e-4, rel=1e-3)
+    assert past.det_A[-1, 1] / past.det_A[0, 1] == pytest.approx(1e-4, rel=1e-3)
 
 
 def test_a_boundary_lies_where_its_distance_is_no_number_any_more():
@@ -111,7 +111,7 @@ def test_feedforward_ends_where_there_are_no_torques():
     assert simulation.report.verdict == "infeasible"
     assert "cannot be executed, so there are no torques to apply" in simulation.report.ending
     assert 0.5 < simulation.history.time[-1] < trajectory.duration
-    assert np.isfinite(simulation.history.tau_motor).all()
+    assert np.isfinite(simulation.history.tau_motor_cmd).all()
     assert (simulation.history.flags[-1] & Flag.INFEASIBLE).any()
 
 
@@ -125,7 +125,7 @@ def test_a_tendon_that_goes_slack_ends_the_run():
     simulation = simulate(robot, motion((530.0,) * 3, (530.0,) * 3), initial_error=InitialError(0.02, 50))
     assert simulation.report.verdict == "infeasible"
     assert "a spring left the range of its law" in simulation.report.ending
-    phi = simulation.history.phi_actual[-1]
+    phi = simulation.history.phi[-1]
     assert np.abs(phi * [1, -1]).min() == pytest.approx(0, abs=1e-9)  # the event's root in deflection
 
 
@@ -134,7 +134,7 @@ def test_feedforward_that_only_has_torques_at_the_start_ends_there():
     assert simulation.report.verdict == "infeasible"
     assert "cannot be executed, so there are no torques to apply" in simulation.report.ending
     assert simulation.history.time.tolist() == [0]
-    assert np.isfinite(simulation.history.tau_motor).all()
+    assert np.isfinite(simulation.history.tau_motor_cmd).all()
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
         assert simulation.report.complete
         assert simulation.report.with_full_state == tuple(joint.q for joint in ideal.report.joints)
         assert np.array_equal(simulation.history.time, ideal.history.time)
-        losses[rate] = np.abs(simulation.history.q_actual - ideal.history.q_actual).max()
+        losses[rate] = np.abs(simulation.history.q - ideal.history.q).max()
     # delay and hold are proportional to the step
     assert 1e-6 < losses[1000] < losses[250] / 2
     assert "base: with the full state the q error is 0.01 rad at its peak" in str(simulation.report)

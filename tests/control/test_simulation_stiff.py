@@ -61,7 +61,7 @@ def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(st
     deflection = LINK_INERTIA * torque / (stiffness * whole)
     exact = center - MOTOR_INERTIA * deflection / whole
     # two hundred steps with local errors of 1e-9
-    assert simulation.history.q_actual[:, 0] == pytest.approx(exact, abs=1e-8)
+    assert simulation.history.q[:, 0] == pytest.approx(exact, abs=1e-8)
     assert simulation.report.verdict == "off_target"
 
 
@@ -85,7 +85,7 @@ def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
     implicit = simulate(vsa_3r(), trajectory, **conditions)
     assert methods(implicit) == ["DOP853", "Radau"]
     assert 0.1 < implicit.report.methods[1].start < 0.2
-    for name in ("time", "q_actual", "dq_actual", "theta_actual", "tau_motor"):
+    for name in ("time", "q", "dq", "theta", "tau_motor_cmd"):
         found, expected = (getattr(simulation.history, name) for simulation in (implicit, explicit))
         # tolerances of 1e-9, which the open loop magnifies ten times; torques of 100 N m
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-7, nan_ok=True)
@@ -99,7 +99,7 @@ def test_controllers_with_encoders_can_be_stiff(monkeypatch):
     switched = simulate(vsa_3r(), trajectory, **conditions)
     assert methods(switched) == ["DOP853", "Radau"]
     assert np.array_equal(switched.history.time, explicit.history.time)
-    assert switched.history.q_actual == pytest.approx(explicit.history.q_actual, abs=1e-7)
+    assert switched.history.q == pytest.approx(explicit.history.q, abs=1e-7)
 
 
 @pytest.mark.parametrize("what", ["slack", slow("singular")])
@@ -134,7 +134,7 @@ def test_what_was_integrated_when_the_budget_is_used_up_is_kept():
     assert 300 <= report.evaluations < 600  # a step of either method, with a Jacobian of 25 columns
     kept = len(cut.history.time) - 1
     assert 2 < kept < len(whole.history.time)
-    assert cut.history.q_actual[:kept] == pytest.approx(whole.history.q_actual[:kept], abs=1e-8)
+    assert cut.history.q[:kept] == pytest.approx(whole.history.q[:kept], abs=1e-8)
     assert simulate(vsa_3r(), short_motion(3), budget=300).report == report
     assert not report.joints[0].samples_over_limit
 
@@ -143,7 +143,7 @@ def test_a_run_that_ends_within_its_budget_does_not_depend_on_it():
     free = simulate(vsa_3r(), short_motion(3))
     enough = simulate(vsa_3r(), short_motion(3), budget=4 * free.report.evaluations)
     assert methods(enough) == ["DOP853"]
-    assert np.array_equal(enough.history.q_actual, free.history.q_actual)
+    assert np.array_equal(enough.history.q, free.history.q)
     assert free.report.budget == 200_000  # more than 100 for each of 161 steps
     assert simulate(rigid_joint(2.0), step_of(1.0, rate=3000)).report.budget == 300_100
 

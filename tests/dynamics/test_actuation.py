@@ -30,7 +30,7 @@ COMPARED = {
     "theta": "theta",
     "dtheta": "dtheta",
     "ddtheta": "ddtheta",
-    "tau_spring": "tau_spring",
+    "tau_transmission": "tau_transmission",
     "tau_motor": "tau_motor",
     "det_A": "det_a",
 }
@@ -109,7 +109,7 @@ def test_motors_do_what_a_scalar_recomputation_says(case: str):
                 getattr(result, name)[steps, index], values, rtol=0, atol=AGREEMENT * peak, err_msg=name
             )
         lower = [sample.lower for sample in expected]
-        np.testing.assert_allclose(result.stiffness_lower[steps, index], lower, rtol=AGREEMENT)
+        np.testing.assert_allclose(result.stiffness_min[steps, index], lower, rtol=AGREEMENT)
 
 
 def test_branch_selects_the_side_that_is_stretched():
@@ -127,7 +127,7 @@ def test_opposite_branch_of_alike_sides_swaps_the_motors():
     )
     result = inverse_dynamics(robot, trajectory)
     turned = inverse_dynamics(dataclasses.replace(robot, joints=joints), trajectory)
-    for name in ("phi", "theta", "tau_spring", "tau_motor"):
+    for name in ("phi", "theta", "tau_transmission", "tau_motor"):
         # The determinant changes its sign, nothing else.
         np.testing.assert_array_equal(getattr(turned, name), getattr(result, name)[:, :, ::-1])
     np.testing.assert_array_equal(turned.det_A, -result.det_A)
@@ -157,7 +157,7 @@ def test_a_link_without_mass_asks_for_no_torque(shipped: tuple[str, str], engine
     )
     light = dataclasses.replace(robot, joints=(*robot.joints[:-1], bare), tool=Pose())
     result = inverse_dynamics(light, trajectory, engine=engine)
-    tau_1, tau_2 = result.tau_spring[:, -1].T
+    tau_1, tau_2 = result.tau_transmission[:, -1].T
     assert not result.tau_e[:, -1].any()
     assert np.all(tau_1 > 0)
     np.testing.assert_allclose(tau_1, -tau_2, rtol=1e-9)  # eps over the margin, as for all deflections

@@ -27,9 +27,9 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 NAN = np.nan
-OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "motor_power")
+OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "motor_power")
 OF_STIFFNESS = ("stiffness", "dstiffness", "ddstiffness")
-OF_CORRIDOR = ("det_A", "stiffness_lower", "stiffness_upper")
+OF_CORRIDOR = ("det_A", "stiffness_min", "stiffness_max")
 
 
 def computed(robot: Robot, motion: MotionArrays, stiffness: float = NAN) -> Block:
@@ -75,7 +75,7 @@ def test_an_elastic_pendulum_is_its_closed_form() -> None:
     tau_e = about_axis * ddq + damping * dq + weight * np.cos(q)
     dtau_e = about_axis * d3q + damping * ddq - weight * np.sin(q) * dq
     ddtau_e = about_axis * d4q + damping * d3q - weight * (np.cos(q) * dq**2 + np.sin(q) * ddq)
-    expected = {"phi": tau_e / 300, "dphi": dtau_e / 300, "tau_spring": tau_e}
+    expected = {"phi": tau_e / 300, "dphi": dtau_e / 300, "tau_transmission": tau_e}
     expected |= {"theta": q + tau_e / 300, "dtheta": dq + dtau_e / 300, "ddtheta": ddq + ddtau_e / 300}
     expected["tau_motor"] = 1.5 * expected["ddtheta"] + 0.2 * expected["dtheta"] + tau_e
     for name, values in expected.items():
@@ -95,7 +95,7 @@ def test_a_rigid_chain_is_the_one_of_pinocchio_with_rotors(types: str) -> None:
     assert_near(block.tau_motor[..., 0], np.array(rows) + damping * dq)  # both recursions round alike
     np.testing.assert_array_equal(block.phi[..., 0], 0)
     np.testing.assert_array_equal(block.dphi[..., 0], 0)
-    np.testing.assert_array_equal(block.tau_spring[..., 0], block.tau_e)
+    np.testing.assert_array_equal(block.tau_transmission[..., 0], block.tau_e)
     for motor, joint in zip(("theta", "dtheta", "ddtheta"), (q, dq, ddq), strict=True):
         np.testing.assert_array_equal(getattr(block, motor)[..., 0], joint)
 

@@ -207,8 +207,8 @@ def test_simulation_follows(name: str) -> None:
     robot, trajectory = pendulum(name), swing(name)
     past, expected = simulate(robot, trajectory).history, inverse_dynamics(robot, trajectory)
     assert np.abs(past.q_error).max() < 1e-8  # the integrator's tolerance
-    np.testing.assert_allclose(past.tau_damper_actual, expected.tau_damper, atol=1e-5)
-    np.testing.assert_allclose(past.tau_e_actual, expected.tau_e, atol=1e-5)
+    np.testing.assert_allclose(past.tau_damper, expected.tau_damper, atol=1e-5)
+    np.testing.assert_allclose(past.tau_e, expected.tau_e, atol=1e-5)
 
 
 def test_it_starts_where_the_robot_says() -> None:
@@ -314,5 +314,5 @@ def test_simulation_knows_how_fast_it_settles() -> None:
     robot = pendulum("elastic")
     past, expected = simulate(robot, trajectory).history, inverse_dynamics(robot, trajectory)
     peak = np.nanmax(np.abs(expected.tau_motor))
-    np.testing.assert_allclose(past.tau_motor, expected.tau_motor, rtol=0, atol=1e-9 * peak)
+    np.testing.assert_allclose(past.tau_motor_cmd, expected.tau_motor, rtol=0, atol=1e-9 * peak)
     assert np.abs(past.q_error).max() < 1e-8

@@ -127,7 +127,7 @@ def test_elastic_energy_is_that_of_every_spring_of_the_joint():
     assert (result.elastic_energy[:, 0] == 0).all()
     expected = result.tau_e[:, 1] ** 2 / (2 * stiffness)
     np.testing.assert_allclose(result.elastic_energy[:, 1], expected, rtol=1e-12)  # rounding
-    power = (result.tau_spring * result.dphi)[:, 2].sum(axis=1)
+    power = (result.tau_transmission * result.dphi)[:, 2].sum(axis=1)
     change = result.elastic_energy[:, 2] - result.elastic_energy[0, 2]
     peak = result.elastic_energy[:, 2].max()
     np.testing.assert_allclose(change, integral(result.time, power), rtol=0, atol=ROUNDING * peak)
@@ -203,8 +203,8 @@ def test_holding_still_costs_torque_but_no_work():
 def test_squared_torques_split_into_load_and_co_contraction():
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     result = inverse_dynamics(robot, trajectory)
-    squared = integral(result.time, (result.tau_spring**2).sum(axis=2))[-1]
-    between = integral(result.time, np.diff(result.tau_spring, axis=2)[..., 0] ** 2 / 2)[-1]
+    squared = integral(result.time, (result.tau_transmission**2).sum(axis=2))[-1]
+    between = integral(result.time, np.diff(result.tau_transmission, axis=2)[..., 0] ** 2 / 2)[-1]
     for index, joint in enumerate(result.report.joints):
         split = 2 * trajectory.duration * (joint.energy.co_contraction**2 + joint.energy.load**2)
         assert split == pytest.approx(squared[index], rel=1e-6)  # the trapezoidal rule at 1 kHz

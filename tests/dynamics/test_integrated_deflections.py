@@ -81,7 +81,7 @@ def test_integration_stays_at_the_root(case: str):
 def test_corridor_is_that_of_the_root():
     crossing = inverse_dynamics(ARM, softening(), deflection_solver=softened())
     root = inverse_dynamics(ARM, softening())
-    for name in ("stiffness_lower", "stiffness_upper", "tau_e"):
+    for name in ("stiffness_min", "stiffness_max", "tau_e"):
         np.testing.assert_array_equal(getattr(crossing, name), getattr(root, name))
 
 

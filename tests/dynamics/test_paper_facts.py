@@ -87,7 +87,7 @@ def test_unloaded_joint_and_the_largest_load_it_could_carry(
     rest = drive(joint_with(), command(stiffness=stiffness))
     # Half the last digit given.
     assert rest["phi"][:, 0] == pytest.approx([deflection, -deflection], abs=5e-7)
-    assert rest["tau_spring"][:, 0] == pytest.approx([torque, -torque], abs=5e-5)
+    assert rest["tau_transmission"][:, 0] == pytest.approx([torque, -torque], abs=5e-5)
     pair = make_pair(ALIKE, ALIKE)
 
     def lack(tau_e: float) -> float:
@@ -146,7 +146,7 @@ def base_margin_and_torque(duration: float) -> tuple[float, float]:
     """Smallest margin and largest motor torque of joint 1, sampled finely enough for either."""
     trajectory = motion(duration=duration)
     block = compute_block(ARM, trajectory.at(np.linspace(0, duration, 10_001)))
-    margin: FloatArray = 1 - block.stiffness_lower[:, 0] / block.stiffness[:, 0]
+    margin: FloatArray = 1 - block.stiffness_min[:, 0] / block.stiffness[:, 0]
     return float(margin.min()), float(np.nanmax(np.abs(block.tau_motor[:, 0])))
 
 

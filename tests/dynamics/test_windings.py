@@ -75,7 +75,7 @@ def test_limits_are_flagged_in_simulations():
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     past = simulate(with_windings(robot, max_current=20), trajectory).history
     flagged = (past.flags[:, 0] & Flag.CURRENT_LIMIT) != 0
-    np.testing.assert_array_equal(flagged, (np.abs(past.current_actual[:, 0]) > 20).any(axis=1))
+    np.testing.assert_array_equal(flagged, (np.abs(past.current[:, 0]) > 20).any(axis=1))
     assert flagged.any()
 
 

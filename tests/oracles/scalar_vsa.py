@@ -57,7 +57,7 @@ class Actuation:
     theta: Sequence[float]
     dtheta: Sequence[float]
     ddtheta: Sequence[float]
-    tau_spring: Sequence[float]
+    tau_transmission: Sequence[float]
     tau_motor: Sequence[float]
     det_a: float
 
@@ -141,9 +141,9 @@ def actuation(
     beta_2 -= sides[0].eta() * dphi[0] ** 2 + sides[1].eta() * dphi[1] ** 2
     ddtheta = np.linalg.solve(matrix, [beta_1, beta_2])
 
-    tau_spring = [side.tau(deflection) for side, deflection in zip(sides, phi, strict=True)]
+    tau_transmission = [side.tau(deflection) for side, deflection in zip(sides, phi, strict=True)]
     tau_motor = [
-        side.inertia * ddtheta[k] + side.damping * (dphi[k] + dq) + tau_spring[k]
+        side.inertia * ddtheta[k] + side.damping * (dphi[k] + dq) + tau_transmission[k]
         for k, side in enumerate(sides)
     ]
     return Actuation(
@@ -153,7 +153,7 @@ def actuation(
         theta=[deflection + q for deflection in phi],
         dtheta=dphi + dq,
         ddtheta=ddtheta,
-        tau_spring=tau_spring,
+        tau_transmission=tau_transmission,
         tau_motor=tau_motor,
         det_a=sigma[0] * zeta[1] - sigma[1] * zeta[0],
     )

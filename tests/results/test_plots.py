@@ -224,7 +224,7 @@ def test_stiffness_lies_in_its_shaded_corridor() -> None:
     axes = panels(plot_stored(result)["motion"])[2]
     (area,) = (collection for collection in axes.collections if not collection.get_label().startswith("inf"))
     vertices = area.get_paths()[0].vertices
-    lower, top = result.read("stiffness_lower")[:, 1], axes.get_ylim()[1]
+    lower, top = result.read("stiffness_min")[:, 1], axes.get_ylim()[1]
     assert vertices[:, 1].max() == pytest.approx(top)  # the upper end is infinite
     assert vertices[:, 1].min() == pytest.approx(lower.min())
     edge = next(line for line in axes.lines if line.get_linewidth() < 1)
@@ -234,7 +234,7 @@ def test_stiffness_lies_in_its_shaded_corridor() -> None:
 
 def test_the_corridor_has_a_gap_where_the_load_cannot_be_carried() -> None:
     result = rest_to_rest(401)
-    for bound in ("stiffness_lower", "stiffness_upper"):
+    for bound in ("stiffness_min", "stiffness_max"):
         result.read(bound)[100:200, 0] = NAN
     area = panels(plot_stored(result)["motion"])[1].collections[0]
     extents = [path.get_extents() for path in area.get_paths()]
@@ -275,7 +275,7 @@ def test_figures_without_their_variables_are_left_out_with_a_reason() -> None:
 
 
 def test_corridor_and_bands_are_drawn_only_if_stored() -> None:
-    figure = plot_stored(without(rest_to_rest(sigma=(850, 790)), "stiffness_upper", "flags"))["motion"]
+    figure = plot_stored(without(rest_to_rest(sigma=(850, 790)), "stiffness_max", "flags"))["motion"]
     assert legend_labels(figure) == ["base", "shoulder", "elbow"]
     assert not any(axes.collections for axes in panels(figure))
 

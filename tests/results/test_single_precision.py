@@ -41,7 +41,7 @@ def test_double_precision_is_not_marked(tmp_path: Path) -> None:
 
 def test_what_single_precision_does_not_hold_is_refused(tmp_path: Path) -> None:
     block = random_block(20, 2)
-    block.stiffness_upper[...] = np.inf  # an infinity stays one
+    block.stiffness_max[...] = np.inf  # an infinity stays one
     block.dtheta[:, :, 0] = 1e-50  # which becomes zero
     write_result(tmp_path / "kept.h5", block, precision="single")
     block.ddtheta[7, 1, 0] = -3.5e38
@@ -53,7 +53,7 @@ def test_what_single_precision_does_not_hold_is_refused(tmp_path: Path) -> None:
         write_result(tmp_path / "r.h5", block, precision="single")
     assert [path.name for path in tmp_path.iterdir()] == ["kept.h5"]
     with StoredResult.open(tmp_path / "kept.h5") as result:
-        assert np.isposinf(result.read("stiffness_upper")).all()
+        assert np.isposinf(result.read("stiffness_max")).all()
         assert not result.read("dtheta")[:, :, 0].any()
 
 
@@ -78,8 +78,8 @@ def test_verdicts_near_thresholds_do_not_depend_on_it(tmp_path: Path) -> None:
     assert judged.verdict == "infeasible"
     assert again.as_json() == judged.as_json() == found.report.as_json()
     np.testing.assert_array_equal(single["flags"], double["flags"])
-    assert double["stiffness"][-1, 0] < double["stiffness_lower"][-1, 0]
-    assert single["stiffness"][-1, 0] == single["stiffness_lower"][-1, 0]
+    assert double["stiffness"][-1, 0] < double["stiffness_min"][-1, 0]
+    assert single["stiffness"][-1, 0] == single["stiffness_min"][-1, 0]
 
 
 @pytest.fixture

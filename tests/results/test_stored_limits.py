@@ -10,8 +10,9 @@ from samples.command_line import REPOSITORY
 from samples.marks import slow_but
 from samples.results import PlannedTrajectory, writing
 
+from vsacli.base.simulation_variables import SIMULATED_NAMES
 from vsacli.dynamics.limits import limit_checks
-from vsacli.results.store.reader import ACHIEVED, StoredResult
+from vsacli.results.store.reader import StoredResult
 from vsacli.robot.file import load_robot
 
 ROBOTS = sorted((REPOSITORY / "robots").rglob("*.yaml"))
@@ -40,4 +41,4 @@ def test_bounds_of_a_file_are_those_that_steps_are_checked_against(path: Path, t
 
 
 def test_what_a_simulation_achieves_is_bounded_as_what_it_was_asked_for() -> None:
-    assert ACHIEVED["tau_motor_actual"] == ACHIEVED["tau_motor_measured"] == "tau_motor"
+    assert SIMULATED_NAMES["tau_motor_cmd"] == SIMULATED_NAMES["tau_motor_measured"] == "tau_motor"

@@ -52,8 +52,8 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
     shape = (samples, len(robot.joints))
     drawn = {name: rng.uniform(-scale, scale, shape) for name, scale in SCALES.items()}
     block = compute_block(robot, motion_of({**drawn, "stiffness": np.ones(shape)}))
-    lower = np.nan_to_num(block.stiffness_lower)
-    upper = np.minimum(np.nan_to_num(block.stiffness_upper), 4 * lower)
+    lower = np.nan_to_num(block.stiffness_min)
+    upper = np.minimum(np.nan_to_num(block.stiffness_max), 4 * lower)
     stiffness = lower + rng.uniform(-0.2, 1.2, shape) * (upper - lower)
     stiffness[:2] = lower[:2]
     stiffness[2:4] = upper[2:4]
@@ -77,7 +77,7 @@ def expected_of(block: Block, name: str) -> FloatArray:
     """What the tool computes of an array that the generated code gives."""
     if name == "margin":
         with np.errstate(invalid="ignore"):
-            return margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+            return margin(block.stiffness, block.stiffness_min, block.stiffness_max)
     return np.asarray(getattr(block, name))
 
 

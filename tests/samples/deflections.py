@@ -25,7 +25,7 @@ DRIFT = 1e-11
 COARSE = 1e-8
 """Tolerance where only the course of things matters, to save time."""
 
-MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
+MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 
 
 def motion(

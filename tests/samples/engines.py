@@ -33,8 +33,8 @@ def demands(robot: Robot, samples: int, seed: int = 1, wrench: Wrench | None = N
     reach = compute_block(
         robot, Motion(time, *motion, by_name(np.ones_like(motion[0]), *rates), wrench=wrench)
     )
-    lower = np.nan_to_num(reach.stiffness_lower, nan=1.0)
-    upper = np.minimum(np.nan_to_num(reach.stiffness_upper, nan=2.0), 5 * lower)
+    lower = np.nan_to_num(reach.stiffness_min, nan=1.0)
+    upper = np.minimum(np.nan_to_num(reach.stiffness_max, nan=2.0), 5 * lower)
     share = rng.choice([0.2, 0.5, 0.9, 0.0, -0.1, 1e-6], lower.shape, p=[0.3, 0.3, 0.1, 0.1, 0.1, 0.1])
     return Motion(time, *motion, by_name(lower + share * (upper - lower), *rates), wrench=wrench)
 
@@ -48,7 +48,7 @@ def assert_agree(found: Block, expected: Block, tolerances: Mapping[str, float] 
     allowed = {**dict.fromkeys(COMPUTED, AGREEMENT), **(tolerances or {})}
     np.testing.assert_array_equal(found.flags, expected.flags)
     margin = np.minimum(
-        expected.stiffness - expected.stiffness_lower, expected.stiffness_upper - expected.stiffness
+        expected.stiffness - expected.stiffness_min, expected.stiffness_max - expected.stiffness
     )
     clear = ~(margin < CLEAR * expected.stiffness)  # NaN, of a joint without a margin, counts
     for name in COMPUTED:

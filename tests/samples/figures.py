@@ -77,8 +77,8 @@ def rest_to_rest(
         "stiffness": stiffness,
         "tau_e": tau_e,
         "tau_motor": tau_motor,
-        "stiffness_lower": lower,
-        "stiffness_upper": np.full_like(lower, np.inf),
+        "stiffness_min": lower,
+        "stiffness_max": np.full_like(lower, np.inf),
         "flags": infeasible.astype(np.uint32),
     }
     return Result(time, types, **{**values, **options})

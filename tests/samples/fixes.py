@@ -111,7 +111,7 @@ def accepted(robot: Robot, trajectory: Trajectory, min_margin: float = 0.01) -> 
 
 
 def _accepted(block: Block, min_margin: float) -> bool:
-    room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
+    room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
     narrow = np.any(room / block.stiffness < min_margin)  # NaN where a joint has no corridor
     return not narrow and not np.any(block.flags & ~np.uint32(Flag.NEAR_SINGULAR))
 

@@ -95,7 +95,7 @@ def linearized_run(
     integrator = Integrator(equations, Tolerances(), lambda _: None)
     integrated = continuous(loop, integrator, times, start)
     past = history(robot, loop, integrated, 0.0)
-    return past, State(past.q_actual, past.dq_actual, past.theta_actual, past.dtheta_actual)
+    return past, State(past.q, past.dq, past.theta, past.dtheta)
 
 
 def error_course(

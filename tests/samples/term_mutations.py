@@ -133,7 +133,7 @@ MUTATIONS = (
         "for motor in actuator.motors]) * (1.01 * ddtheta)",
     ),
     Mutation("D_m,k theta_k' (73)-(74)", "pair", TORQUES, "damping * dtheta", "1.01 * damping * dtheta"),
-    Mutation("tau_k (73)-(74)", "pair", TORQUES, "+ tau_spring", "+ 1.01 * tau_spring"),
+    Mutation("tau_k (73)-(74)", "pair", TORQUES, "+ tau_transmission", "+ 1.01 * tau_transmission"),
     Mutation(
         "B_12 theta_k''", "serial", "dynamics.drive:_rotor_torques", "own + coupling", "own + 1.01 * coupling"
     ),
@@ -205,7 +205,7 @@ MUTATIONS = (
     Mutation(
         "torque against motor 2",
         "serial",
-        f"{STATE}.tau_spring",
+        f"{STATE}.tau_transmission",
         "self._partials.setting",
         "1.01 * self._partials.setting",
     ),
@@ -238,15 +238,15 @@ MUTATIONS = (
         "tau_e, linear spring",
         "spring",
         f"{ELASTIC}._linear",
-        "tau_spring=command",
-        "tau_spring=1.01 * command",
+        "tau_transmission=command",
+        "tau_transmission=1.01 * command",
     ),
     Mutation(
         "tau_e, rigid",
         "spring",
         "actuators.rigid:Rigid.transmit",
-        "tau_spring=command",
-        "tau_spring=1.01 * command",
+        "tau_transmission=command",
+        "tau_transmission=1.01 * command",
     ),
     Mutation(
         "q'', rigid",

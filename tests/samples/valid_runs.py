@@ -51,7 +51,7 @@ def _trajectory(
 def _reachable(rng: np.random.Generator, robot: Robot, q: float) -> Run:
     """A motion whose stiffness lies above the smallest that each joint has under its load."""
     trial = _trajectory(rng, robot, q, 1e9)
-    least = inverse_dynamics(robot, trial).stiffness_lower.max(axis=0)
+    least = inverse_dynamics(robot, trial).stiffness_min.max(axis=0)
     stiffness = least * rng.uniform(1.2, 8, len(least))
     time = np.linspace(0, trial.duration, SAMPLES)
     return robot, Trajectory.from_samples(

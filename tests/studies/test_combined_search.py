@@ -46,7 +46,7 @@ def test_smallest_combination_is_that_of_a_dense_scan():
     sizes = []
     for factor in np.arange(1.0, 1.5, 0.005).tolist():
         (block,) = Run(vsa_3r(), FAST.stretched(factor), block_samples=10_000)
-        needed = np.max(block.stiffness_lower, axis=0) / 0.99 - 850.0
+        needed = np.max(block.stiffness_min, axis=0) / 0.99 - 850.0
         sizes.append(math.hypot(factor - 1, *np.maximum(needed, 0.0) / 850.0))
     assert found.size == pytest.approx(min(sizes), rel=2e-3)  # flat at its minimum; strides of 0.5 %
     assert found.size < min(sizes[0], smallest_slow_down_of(FAST) - 1)
@@ -116,7 +116,7 @@ def unlike():
     robot = vsa_3r().replace("joints.elbow.actuator.spring", springs)
     lowest = {
         branch: max(
-            float(block.stiffness_lower[:, 2].max())
+            float(block.stiffness_min[:, 2].max())
             for block in Run(robot.replace("joints.elbow.actuator.branch", branch), rest_to_rest(4.0))
         )
         for branch in ("positive", "negative")

@@ -1,4 +1,4 @@
-"""Recordings of simulations: measured and actual columns stand for what the robot did."""
+"""Recordings of simulations: measured and simulated columns stand for what the robot did."""
 
 from __future__ import annotations
 
@@ -33,36 +33,48 @@ def test_a_default_export_is_compared_with_its_plan(simulated):
     assert simulated("export", "lab.h5", "-o", "m.csv").code == 0
     signals, _ = compared(simulated, "plan.h5", "m.csv")
     assert {column.partition(".")[2].rstrip("_12"): each["variable"] for column, each in signals.items()} == {
-        "q_actual": "q",
-        "stiffness_actual": "stiffness",
-        "tau_motor_actual": "tau_motor",
+        "q": "q",
+        "stiffness": "stiffness",
+        "tau_motor": "tau_motor",
     }
-    assert signals["shoulder.q_actual"]["rms"] > OFF
+    assert signals["shoulder.q"]["rms"] > OFF
 
 
-@pytest.mark.parametrize(("result", "variable"), [("plan.h5", "q"), ("lab.h5", "q_actual")])
-def test_what_sensors_read_goes_before_the_command(simulated, result, variable):
-    assert simulated("export", "lab.h5", "--variables", "q,q_actual,q_measured", "-o", "m.csv").code == 0
+@pytest.mark.parametrize("result", ["plan.h5", "lab.h5"])
+def test_what_sensors_read_goes_before_the_simulated_value_and_the_command(simulated, result):
+    names = "q,q_ref,q_measured,tau_motor_cmd"
+    assert simulated("export", "lab.h5", "--variables", names, "-o", "m.csv").code == 0
     signals, notes = compared(simulated, result, "m.csv")
     assert {column: each["variable"] for column, each in signals.items()} == {
-        "shoulder.q_measured": variable,
-        "elbow.q_measured": variable,
+        "shoulder.q_measured": "q",
+        "elbow.q_measured": "q",
     }
-    assert (
-        "not compared, as other columns say what the robot did: shoulder.q, elbow.q, shoulder.q_actual"
-        in notes[-1]
+    torques = ", ".join(
+        f"{joint}.tau_motor_cmd_{motor}" for joint in ("shoulder", "elbow") for motor in (1, 2)
     )
+    commands = f"shoulder.q_ref, elbow.q_ref, {torques}"
+    assert notes[-2:] == [
+        "not compared, as other columns say what the robot did: shoulder.q, elbow.q",
+        f"not compared, as these are commands, not what the robot did: {commands}",
+    ]
+
+
+def test_commands_alone_are_nothing_to_compare(simulated):
+    assert simulated("export", "lab.h5", "--variables", "q_ref", "-o", "m.csv").code == 0
+    outcome = simulated("compare", "plan.h5", "m.csv")
+    assert outcome.code == 2
+    assert "no column is a variable of the result" in outcome.err
 
 
 def test_a_simulation_says_what_happened_not_what_was_commanded(simulated):
     """A recorded q of the plan is off by as much as the simulated arm was, and that of the arm is not."""
-    for variable in ("q", "q_actual"):
-        assert simulated("export", "lab.h5", "--variables", variable, "-o", f"{variable}.csv").code == 0
-    command, _ = compared(simulated, "lab.h5", "q.csv")
-    arm, _ = compared(simulated, "lab.h5", "q_actual.csv")
-    assert command["shoulder.q"]["variable"] == arm["shoulder.q_actual"]["variable"] == "q_actual"
-    assert command["shoulder.q"]["rms"] > OFF
-    assert arm["shoulder.q_actual"]["rms"] < 1e-12  # numbers are printed with all digits
+    for file in ("plan", "lab"):
+        assert simulated("export", f"{file}.h5", "--variables", "q", "-o", f"{file}.csv").code == 0
+    plan, _ = compared(simulated, "lab.h5", "plan.csv")
+    arm, _ = compared(simulated, "lab.h5", "lab.csv")
+    assert plan["shoulder.q"]["variable"] == arm["shoulder.q"]["variable"] == "q"
+    assert plan["shoulder.q"]["rms"] > OFF
+    assert arm["shoulder.q"]["rms"] < 1e-12  # numbers are printed with all digits
 
 
 def test_the_report_names_the_variable(simulated):

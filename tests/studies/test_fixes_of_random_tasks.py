@@ -55,7 +55,7 @@ QUICK = (0,)
 def fine_joints(robot, motion):
     """Whether each joint has margin and limits all the time, from the corridor and the flags of a block."""
     block = compute_block(robot, motion)
-    room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
+    room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
     narrow = room / block.stiffness < MARGIN - ROUNDING
     bad = narrow | ((block.flags & ~np.uint32(Flag.NEAR_SINGULAR)) != 0)
     return ~np.any(bad, axis=0)

@@ -29,7 +29,7 @@ def motion(arm, tmp_path_factory):
 
 def run(robot, motion):
     block = compute_block(robot, motion.block(0, motion.samples))
-    return block, margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+    return block, margin(block.stiffness, block.stiffness_min, block.stiffness_max)
 
 
 def test_the_ranking_is_what_changes_do(arm, motion):

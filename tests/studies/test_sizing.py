@@ -104,7 +104,7 @@ def test_of_a_motor_that_stands_still_any_gear_from_some_on_does(tmp_path):
     )
     motor = {"name": "m", "inertia": 1e-4, "continuous_torque": 0.1, "max_velocity": 300}
     sizing = size_drives(robot, [held], write(tmp_path / "m.csv", [motor]))
-    load = abs(inverse_dynamics(robot, held).tau_spring[0, 0, 0])
+    load = abs(inverse_dynamics(robot, held).tau_transmission[0, 0, 0])
     best = sizing.motors[0].best
     assert (best.low, best.high) == (pytest.approx(load / 0.1, rel=1e-12), math.inf)
     assert best.ratio == pytest.approx(load / 0.1, rel=1e-3)

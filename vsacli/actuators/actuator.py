@@ -65,14 +65,14 @@ class Carried(NamedTuple):
         stiffness: Stiffness of the joint.
         stiffness_size: Size of the terms of the stiffness; rounding of the deflections changes the stiffness
             by eps times this.
-        tau_spring: Torque against each motor, (motors, samples).
+        tau_transmission: Torque against each motor, (motors, samples).
     """
 
     tau_e: FloatArray
     size: FloatArray
     stiffness: FloatArray
     stiffness_size: FloatArray
-    tau_spring: FloatArray
+    tau_transmission: FloatArray
 
 
 class SpringLoad(NamedTuple):
@@ -210,7 +210,7 @@ class Actuator(ABC):
 
         Returns:
             The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `ddtheta`,
-            `tau_spring`, `elastic_energy`, `det_A`, `stiffness_lower`, `stiffness_upper` and `flags`; NaN
+            `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and `flags`; NaN
             for those that the actuator lacks, such as a second motor's.
         """
 
@@ -220,13 +220,13 @@ class Actuator(ABC):
 
     @abstractmethod
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return the rate of tau_spring at each motor, (motors, samples), from variables of the joint."""
+        """Return the rates of tau_transmission, (motors, samples), from variables of the joint."""
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
         """Return the loads of the springs from variables of the joint; those behind motor 1 as one."""
         if not self.sprung:
             return ()
-        loaded = of_joint["phi"][0], of_joint["tau_spring"][0], of_joint["elastic_energy"]
+        loaded = of_joint["phi"][0], of_joint["tau_transmission"][0], of_joint["elastic_energy"]
         return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     def carried(self, of_joint: OfJoint) -> Carried:

@@ -149,7 +149,7 @@ class Antagonistic(Actuator):
             return moved
         return {
             **moved,
-            "tau_spring": moved["tau_spring"] + _between(self.coupling, phi),
+            "tau_transmission": moved["tau_transmission"] + _between(self.coupling, phi),
             "elastic_energy": moved["elastic_energy"] + self.coupling.energy(phi[0] - phi[1]),
         }
 
@@ -174,11 +174,11 @@ class Antagonistic(Actuator):
             "phi": phi,
             "dphi": np.stack(dphi),
             "ddtheta": np.stack(ddtheta),
-            "tau_spring": np.stack((one.tau, two.tau)),
+            "tau_transmission": np.stack((one.tau, two.tau)),
             "elastic_energy": energy_1 + energy_2,
             "det_A": det_a,
-            "stiffness_lower": solution.lower,
-            "stiffness_upper": solution.upper,
+            "stiffness_min": solution.lower,
+            "stiffness_max": solution.upper,
             "flags": reached.flags,
         }
 

@@ -187,11 +187,11 @@ class DampedSprings:
             "phi": of_motors(phi),
             "dphi": of_motors(self._elasticity.deflections(command.dq[:, None], _columns(dtheta))[:, 0].T),
             "ddtheta": of_motors(ddtheta),
-            "tau_spring": of_motors(springs.state.tau_spring[:, 0].T),
+            "tau_transmission": of_motors(springs.state.tau_transmission[:, 0].T),
             "elastic_energy": np.where(reached.infeasible, np.nan, energy),
             "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant()[..., 0]),
-            "stiffness_lower": lower,
-            "stiffness_upper": upper,
+            "stiffness_min": lower,
+            "stiffness_max": upper,
             "flags": reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
         }
 

@@ -177,7 +177,7 @@ class Drivetrain:
         parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
         return Torques(
             self.by_joint([part.tau_e for part in parts], q),
-            self.of_springs([part.tau_spring for part in parts], theta),
+            self.of_springs([part.tau_transmission for part in parts], theta),
         )
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -273,9 +273,9 @@ class DrivetrainState:
         return self._drivetrain.by_joint([part.stiffness_rate(rates) for part, rates in self._parts], self._q)
 
     @property
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        return self._drivetrain.of_springs([part.tau_spring for part, _ in self._parts], self._theta)
+        return self._drivetrain.of_springs([part.tau_transmission for part, _ in self._parts], self._theta)
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray

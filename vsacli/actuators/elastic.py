@@ -128,7 +128,7 @@ class Elastic(Actuator):
             phi=phi,
             dphi=command.dtau_e / stiffness,
             ddtheta=command.ddq + command.ddtau_e / stiffness,
-            tau_spring=command.tau_e,
+            tau_transmission=command.tau_e,
             elastic_energy=phi * command.tau_e / 2,
             flags=np.zeros(command.q.shape, dtype=np.uint32),
         )
@@ -159,7 +159,7 @@ class Elastic(Actuator):
             phi=phi,
             dphi=dphi,
             ddtheta=command.ddq + ddphi,
-            tau_spring=spring.tau,
+            tau_transmission=spring.tau,
             elastic_energy=energy,
             flags=reached.flags,
         )

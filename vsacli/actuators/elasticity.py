@@ -18,7 +18,7 @@ class Torques(NamedTuple):
     """Torques of springs: on the link of each joint (6), and against each motor (62)."""
 
     tau_e: FloatArray
-    tau_spring: FloatArray
+    tau_transmission: FloatArray
 
 
 class Elasticity(ABC):
@@ -68,7 +68,7 @@ class ElasticState(ABC):
 
     @property
     @abstractmethod
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62), (..., joints, motors)."""
 
     @abstractmethod

@@ -53,7 +53,7 @@ class Rigid(Actuator):
             phi=still,
             dphi=still,
             ddtheta=command.ddq,
-            tau_spring=command.tau_e,
+            tau_transmission=command.tau_e,
             elastic_energy=still * command.tau_e / 2,
             flags=np.zeros(still.shape, dtype=np.uint32),
         )

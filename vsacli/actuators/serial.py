@@ -162,11 +162,11 @@ class Serial(Actuator):
             "phi": phi,
             "dphi": rates[..., :2].T,
             "ddtheta": state.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness).T,
-            "tau_spring": state.tau_spring.T,
+            "tau_transmission": state.tau_transmission.T,
             "elastic_energy": state.energy,
             "det_A": state.determinant(),
-            "stiffness_lower": solution.lower,
-            "stiffness_upper": solution.upper,
+            "stiffness_min": solution.lower,
+            "stiffness_max": solution.upper,
             "flags": reached.flags,
         }
 
@@ -186,7 +186,7 @@ class Serial(Actuator):
         turned = np.abs(rows.stiffness_1 * of_joint["phi"][0]) + np.abs(
             rows.stiffness_2 * of_joint["theta"][1]
         )
-        return Carried(state.tau_e, size, state.stiffness, state.stiffness + turned, state.tau_spring.T)
+        return Carried(state.tau_e, size, state.stiffness, state.stiffness + turned, state.tau_transmission.T)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
@@ -244,7 +244,7 @@ class _Springs(Elasticity):
     def torques(self, coordinates: FloatArray) -> Torques:
         """Return the derivatives of the potential."""
         state = self._mechanism.state(coordinates)
-        return Torques(state.tau_e, state.tau_spring)
+        return Torques(state.tau_e, state.tau_transmission)
 
     def energy(self, coordinates: FloatArray) -> FloatArray:
         """Return the potential."""

@@ -71,7 +71,7 @@ class _State(ElasticState):
         return self._one.sigma
 
     @property
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """Torque of the spring."""
         return self._springs.tau
 

@@ -58,7 +58,7 @@ def single_motor(**variables: AnyArray) -> OfJoint:
     """Return the result of `Actuator.transmit` for one motor without a commanded stiffness.
 
     Args:
-        variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_spring`,
+        variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_transmission`,
             `elastic_energy` and `flags`, each (samples,).
     """
     none = np.full_like(variables["phi"], np.nan)
@@ -66,4 +66,4 @@ def single_motor(**variables: AnyArray) -> OfJoint:
         name: np.stack((values, none)) if "motor" in VARIABLES[name].dims else values
         for name, values in variables.items()
     }
-    return {**transmitted, "det_A": none, "stiffness_lower": none, "stiffness_upper": none}
+    return {**transmitted, "det_A": none, "stiffness_min": none, "stiffness_max": none}

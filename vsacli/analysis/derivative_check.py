@@ -231,7 +231,7 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
     motion has features as short as the distance to the end of the attainable range.
     """
     troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
-    gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper).reshape(*shape, -1)
+    gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
     hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
     smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)
     return smooth

@@ -122,13 +122,13 @@ class JointReport(Stored):
         margin: Smallest margin, relative to the stiffness; NaN if a torque cannot be carried.
         margin_time: Time of the smallest margin, s.
         attainable: Attainable range of the stiffness at that time.
-        stiffness_min: Smallest commanded stiffness.
-        stiffness_max: Largest commanded stiffness.
+        commanded_min: Smallest commanded stiffness.
+        commanded_max: Largest commanded stiffness.
         peak_tau_e: Largest |tau_e|.
         peak_tau_motor: Largest |tau_motor| of motors 1 and 2, over the samples at which it exists.
         start_theta: Initial motor positions.
-        torque_discontinuity: |tau_motor - tau_spring| at the first sample, of motors that rest before the
-            start; NaN at a rigid joint, where tau_e may jump as well.
+        torque_discontinuity: |tau_motor - tau_transmission| at the first sample, of motors that rest before
+            the start; NaN at a rigid joint, where tau_e may jump as well.
         other_branch: Whether every infeasible sample is feasible on the opposite branch.
         energy: Work of the motors, elastic energy, co-contraction.
         start_dtheta: Initial motor velocities.
@@ -150,8 +150,8 @@ class JointReport(Stored):
     margin: float
     margin_time: float
     attainable: tuple[float, float]
-    stiffness_min: float
-    stiffness_max: float
+    commanded_min: float
+    commanded_max: float
     peak_tau_e: float
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
@@ -169,7 +169,7 @@ class JointReport(Stored):
     shape: ClassVar = {
         **named("name", "type", "actuator", "samples", "first_time", "worst"),
         "margin": {"min": "margin", "time": "margin_time", "attainable": "attainable"},
-        "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
+        "stiffness": {"min": "commanded_min", "max": "commanded_max"},
         "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
         "start": {
             "theta": "start_theta",

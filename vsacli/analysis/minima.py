@@ -55,7 +55,7 @@ class Bounded(NamedTuple):
         """
         if self.limit is not None:
             return np.fmin(self.limit.clearance(of_joint), np.inf)  # fmin replaces NaN by inf
-        gap = margin(of_joint["stiffness"], of_joint["stiffness_lower"], of_joint["stiffness_upper"])
+        gap = margin(of_joint["stiffness"], of_joint["stiffness_min"], of_joint["stiffness_max"])
         return np.fmax(gap, -np.inf)
 
     def at(self, block: Block, step: int) -> Worst:
@@ -64,7 +64,7 @@ class Bounded(NamedTuple):
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
             values = of_joint["stiffness"]
-            ends = of_joint["stiffness_lower"][step], of_joint["stiffness_upper"][step]
+            ends = of_joint["stiffness_min"][step], of_joint["stiffness_max"][step]
         else:
             kind, motor, unit = limit.flag.label, limit.motor, limit.unit(self.joint.type)
             values, ends = limit.values(of_joint), limit.range

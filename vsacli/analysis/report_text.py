@@ -87,7 +87,7 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         joint.name,
         number(joint.peak_tau_e),
         " / ".join(number(peak) for peak in of_motors(joint, joint.peak_tau_motor)),
-        _span(joint.stiffness_min, joint.stiffness_max),
+        _span(joint.commanded_min, joint.commanded_max),
         *(
             (_attainable(*joint.attainable), percent(joint.margin).removesuffix(" %"))
             if "stiffness" in kind_of(joint).commanded

@@ -11,6 +11,7 @@ from vsacli.analysis.report import Report
 from vsacli.analysis.report_text import joint_rows
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError, check_path
+from vsacli.base.renamed import now_called
 from vsacli.base.tables import aligned, html_table
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.results.store.reader import StoredResult, open_one_of
@@ -151,7 +152,8 @@ class ResultFile(Shown, StoredResult):
     def __getattr__(self, name: str) -> Any:
         """Read a variable, once."""
         if name not in VARIABLES:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            hint = now_called(name, VARIABLES)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
         try:
             values = self.read(name)
         except InputError as error:

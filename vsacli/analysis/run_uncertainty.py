@@ -105,7 +105,7 @@ class RunUncertainty:
 
     def _count_steps(self, block: Block, deviations: FloatArray) -> None:
         """Count samples that the uncertainty of the margin could make feasible, or regular."""
-        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
         near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
         for kind, bit in WITHIN.items():
             for steps, found in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):

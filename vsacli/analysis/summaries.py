@@ -79,7 +79,7 @@ class JointSummary:
         """Merge margins and attainable range."""
         index = self._index
         stiffness = block.stiffness[:, index]
-        corridor = block.stiffness_lower[:, index], block.stiffness_upper[:, index]
+        corridor = block.stiffness_min[:, index], block.stiffness_max[:, index]
         # A sample whose torque cannot be carried at all is worse than any margin.
         gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
@@ -120,8 +120,8 @@ class JointSummary:
             margin=least if math.isfinite(least) else math.nan,
             margin_time=time,
             attainable=attainable,
-            stiffness_min=float(self._stiffness[0]),
-            stiffness_max=float(self._stiffness[1]),
+            commanded_min=float(self._stiffness[0]),
+            commanded_max=float(self._stiffness[1]),
             peak_tau_e=float(self._peaks[0]),
             peak_tau_motor=_pair(self._peaks[1:3]),
             start_theta=start_theta,
@@ -163,7 +163,7 @@ class JointSummary:
             for step in _worst_step(hit, -gap):
                 value, lower, upper = (
                     float(getattr(block, name)[step, self._index])
-                    for name in ("stiffness", "stiffness_lower", "stiffness_upper")
+                    for name in ("stiffness", "stiffness_min", "stiffness_max")
                 )
                 bound = nearer_end(value, lower, upper)
                 unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
@@ -211,7 +211,7 @@ class JointSummary:
         """Return the initial torque discontinuity of motors with springs, whose torques are continuous."""
         if not self._joint.actuator.sprung:
             return np.full(len(MOTORS), np.nan)
-        step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
+        step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_transmission[0, self._index])
         return step
 
     def _keep(self, badness: float, worst: Worst) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from vsacli.base.renamed import successor
+from vsacli.base.renamed import now_called
 
 MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
@@ -19,8 +19,8 @@ def nearest(word: str, valid: Iterable[str]) -> str | None:
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
     """Return a clause to append to an error: `; it is now 'x'`, `; did you mean 'x'?`, or all valid words."""
     options = list(valid)
-    if new := successor(word, options):
-        return f"; it is now {new!r}"
+    if hint := now_called(word, options):
+        return hint
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
         return f"; did you mean {' or '.join(map(repr, near))}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""

@@ -12,6 +12,7 @@ from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.renamed import now_called
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
@@ -86,7 +87,7 @@ _COMPUTED = (
         "(72)",
         geared=1,
     ),
-    Variable("tau_spring", _MOTOR, units.TORQUE, "torque of each transmission", "(62)"),
+    Variable("tau_transmission", _MOTOR, units.TORQUE, "flexible torque of each transmission", "(62)"),
     Variable(
         "tau_motor", _MOTOR, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
     ),
@@ -150,18 +151,18 @@ _COMPUTED = (
         STIFFNESS.key,
     ),
     Variable(
-        "stiffness_lower",
+        "stiffness_min",
         _JOINT,
         units.STIFFNESS,
-        "smallest stiffness reachable at this elastic torque on the joint's branch",
+        "minimum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
         STIFFNESS.key,
     ),
     Variable(
-        "stiffness_upper",
+        "stiffness_max",
         _JOINT,
         units.STIFFNESS,
-        "largest stiffness reachable at this elastic torque on the joint's branch",
+        "maximum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
         STIFFNESS.key,
     ),
@@ -228,7 +229,8 @@ class Block:
     def __getattr__(self, name: str) -> Any:
         if name in self.declared:
             return None
-        raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
+        hint = now_called(name, self.declared)
+        raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}{hint}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
         """Return the variables of one joint by name: (samples,), or (2, samples) for its motors."""

@@ -69,9 +69,9 @@ def compare(
     them, elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor's side of its gear; a unit in
     brackets may follow. Others are left out, unless --columns says what they stand for.
 
-    Columns such as q_measured or q_actual stand for what the robot did, and go before q; of a simulation they
-    are compared with q_actual. The report gives, for each signal, the error, and gain and offset of measured
-    over computed values and the lag behind the others, each with its standard error.
+    A column such as q_measured, a sensor's reading, goes before q. Commands, such as q_ref, are left out. The
+    report gives, for each signal, the error, and gain and offset of measured over computed values and the lag
+    behind the others, each with its standard error.
     """
     check_plotted(folder)
     from vsacli.base.outputs import Outputs

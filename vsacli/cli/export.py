@@ -57,8 +57,8 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
     "MJCF, the XML of MuJoCo. By default what the name of the output ends with, else CSV.",
 )
 @variables_option(
-    "tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual; of a joint-trajectory what it "
-    "has fields for, q, dq, ddq, tau_e"
+    "tau_motor, of a simulation q, stiffness, tau_motor; of a joint-trajectory what it has fields for, q, "
+    "dq, ddq, tau_e"
 )
 @click.option(
     "--rate",
@@ -94,8 +94,8 @@ def export(
 ) -> int:
     """Write variables of a result or a simulation, or a robot, for other programs.
 
-    By default these are the motor torques to send; of a simulation, motion, stiffness and motor torques as
-    they were.
+    By default these are the motor torques to send; of a simulation, its motion, stiffness and motor
+    torques.
 
     Refuses samples that have no value (infeasible or singular steps) or an infinite one with exit code 3 and
     writes nothing, unless --allow-nan.

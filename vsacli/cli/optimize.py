@@ -175,7 +175,7 @@ def _moved(result: Result, place: FloatArray, index: int) -> Moved:
     from vsacli.results.charts.optimum import Moved
 
     stiffness, lower, upper = (
-        row[:, index] for row in (result.stiffness, result.stiffness_lower, result.stiffness_upper)
+        row[:, index] for row in (result.stiffness, result.stiffness_min, result.stiffness_max)
     )
     return Moved(place, stiffness, lower, upper, result.tau_motor[:, index].T)
 

@@ -171,7 +171,7 @@ def simulate(
 ) -> int:
     """Integrate the full dynamics of ROBOT while a controller makes it follow TRAJECTORY.
 
-    Writes an HDF5 file with commanded and actual motion, and prints a report of the errors. Motors give at
+    Writes an HDF5 file with simulated and commanded motion, and prints a report of the errors. Motors give at
     most their max_torque. A run ends early where a decoupling matrix becomes singular or a spring leaves the
     range of its law.
     """

@@ -84,7 +84,7 @@ class Decoupling:
         ddtau_e = add(ddtau_e, dampers.ddtau)
         ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
         of_rotors = drivetrain.rotors.torques(ddtheta)
-        torque = of_rotors + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
+        torque = of_rotors + drivetrain.damping * dtheta + springs.tau_transmission  # (73)-(74)
         friction = drivetrain.friction
         return torque if friction is None else torque + friction.torque(dtheta, slip)
 

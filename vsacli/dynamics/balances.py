@@ -42,26 +42,28 @@ Residual = tuple[FloatArray, FloatArray]
 """Residual of a balance, and the size of its terms."""
 
 
-def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular: BoolArray) -> FloatArray:
+def shaft_error(
+    joint: Joint, of_joint: OfJoint, tau_transmission: FloatArray, regular: BoolArray
+) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
         joint: Joint.
         of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
-        tau_spring: Torque of the springs against each motor by their laws, (motors, samples).
+        tau_transmission: Torque of the springs against each motor by their laws, (motors, samples).
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
         np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
-        for missing, size in _residuals(joint, of_joint, tau_spring)
+        for missing, size in _residuals(joint, of_joint, tau_transmission)
     ]
     return reduce(np.maximum, errors)
 
 
-def _residuals(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray) -> Iterator[Residual]:
+def _residuals(joint: Joint, of_joint: OfJoint, tau_transmission: FloatArray) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
         own = {name: of_joint[name][index] for name in ("tau_motor", "dtheta", "motor_power")}
-        yield _torque_residual(joint, index, of_joint, tau_spring[index])
+        yield _torque_residual(joint, index, of_joint, tau_transmission[index])
         yield _residual(own["motor_power"], own["tau_motor"] * own["dtheta"])
         if motor.torque_constant is not None:
             electrical = {name: of_joint[name][index] for name in ELECTRICAL if name in of_joint}
@@ -81,10 +83,10 @@ def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
     return given - reduce(np.add, terms, np.zeros_like(given)), size
 
 
-def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_spring: FloatArray) -> Residual:
+def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_transmission: FloatArray) -> Residual:
     """Return the residual of a shaft, without the effect of rounded positions on the springs."""
     motor, dtheta = joint.actuator.motors[index], of_joint["dtheta"][index]
-    terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_spring]
+    terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_transmission]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
     damped = _damper_velocities(joint, of_joint).get(index)
     if damped is not None:
@@ -276,7 +278,7 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
     carried = joint.actuator.carried(of_joint)
-    of_shafts = shaft_error(joint, of_joint, carried.tau_spring, regular)
+    of_shafts = shaft_error(joint, of_joint, carried.tau_transmission, regular)
     of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, carried.stiffness_size, 1.0)
     of_stiffness = np.where(regular, of_stiffness, 0.0)
     size = np.maximum(carried.size, np.finfo(float).tiny)
@@ -304,7 +306,7 @@ def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArra
     dtheta, ddtheta = of_joint["dtheta"], of_joint["ddtheta"]
     motors = [motor.damping for motor in joint.actuator.motors]
     damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
-    torque = damping * dtheta + of_joint["tau_spring"]
+    torque = damping * dtheta + of_joint["tau_transmission"]
     rate = damping * ddtheta
     own = joint.actuator.spring_rates(of_joint)
     rate = rate + (own if len(own) == SIDES else np.concatenate((own, np.full_like(own, np.nan))))

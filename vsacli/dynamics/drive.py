@@ -29,8 +29,17 @@ if TYPE_CHECKING:
 
 
 ACTUATED = (
-    *("stiffness", "dstiffness", "ddstiffness", "phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring"),
-    *("tau_motor", "elastic_energy", "motor_power", "det_A", "stiffness_lower", "stiffness_upper", "flags"),
+    *("stiffness", "dstiffness", "ddstiffness", "phi", "dphi", "theta", "dtheta", "ddtheta"),
+    *(
+        "tau_transmission",
+        "tau_motor",
+        "elastic_energy",
+        "motor_power",
+        "det_A",
+        "stiffness_min",
+        "stiffness_max",
+        "flags",
+    ),
 )
 """Result variables of the actuation of every joint, in the order of their rows."""
 
@@ -83,7 +92,7 @@ def driven_by(
 
         found = dict(DampedSprings(actuator).transmit(command, internal, min_margin))
     dtheta = actuator.motor_positions(found["dphi"], command.dq)  # (69)
-    tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_spring"])
+    tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_transmission"])
     tau_damper, beside = _damper_torques(joint, command, found["dphi"])
     if tau_damper is not None:
         found["tau_damper"] = tau_damper
@@ -100,11 +109,11 @@ def driven_by(
 
 
 def motor_torques(
-    actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_spring: FloatArray
+    actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_transmission: FloatArray
 ) -> FloatArray:
     """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples)."""
     damping = _by_motor([motor.damping for motor in actuator.motors])
-    torques = _rotor_torques(actuator, ddtheta) + damping * dtheta + tau_spring
+    torques = _rotor_torques(actuator, ddtheta) + damping * dtheta + tau_transmission
     friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
     if friction is not None:
         torques = torques + friction.with_axis_behind().torque(dtheta)
@@ -139,12 +148,12 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
     """
     # Three variables suffice: by (69) and (73)-(74) every variable of a motor enters its position or its
     # power. Singular samples have no power.
-    theta, tau_spring, power = (
+    theta, tau_transmission, power = (
         finite(of_joint[name][: joint.actuator.motor_count])
-        for name in ("theta", "tau_spring", "motor_power")
+        for name in ("theta", "tau_transmission", "motor_power")
     )
     infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
-    explained = infeasible | (theta & tau_spring & (singular | power))
+    explained = infeasible | (theta & tau_transmission & (singular | power))
     demand = finite([of_joint["tau_e"], *(of_joint[key] for key in joint.commanded)])
     return ~(demand & explained)
 

@@ -177,7 +177,7 @@ def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
     return np.sqrt(integral / duration) if duration else np.full_like(integral, np.nan)
 
 
-AT_STEPS = ("dtheta", "motor_power", "tau_spring", "passed_power", "passed_rate")
+AT_STEPS = ("dtheta", "motor_power", "tau_transmission", "passed_power", "passed_rate")
 """Variables from which the work of motors in an interval follows, at both its ends."""
 
 
@@ -253,7 +253,7 @@ def _joint_flow(
         works = [work + rubbed for work, rubbed in zip(works, friction, strict=True)]
     powers = (end["motor_power"] for end in ends)
     spent = [positive_work(interval, *of_motor) for of_motor in zip(*powers, works, strict=True)]
-    return works, spent, efforts(interval, *(end["tau_spring"] for end in ends))
+    return works, spent, efforts(interval, *(end["tau_transmission"] for end in ends))
 
 
 def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:

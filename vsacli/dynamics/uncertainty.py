@@ -231,7 +231,7 @@ def _uncertain(block: Block) -> dict[str, AnyArray]:
     """Return the variables of a block that follow from signals."""
     given = orders_of_derivation()
     computed = {name: getattr(block, name) for name in COMPUTED if name in UNCERTAIN and name not in given}
-    return {**computed, MARGIN: margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)}
+    return {**computed, MARGIN: margin(block.stiffness, block.stiffness_min, block.stiffness_max)}
 
 
 def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:

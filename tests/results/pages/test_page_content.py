@@ -19,13 +19,13 @@ from samples.marks import slow_but
 from samples.pages import Page
 from samples.wicked import TEXTS, clean
 
-from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
 from vsacli.cli.main import run
 from vsacli.results.charts.reduction import FULL_DETAIL
 from vsacli.results.charts.stored import BOUNDS
 from vsacli.results.pages.result_page import sections_of
-from vsacli.results.store.reader import ACHIEVED, StoredResult
+from vsacli.results.store.reader import StoredResult
 from vsacli.robot.file import load_robot
 from vsacli.robot.kinematics import forward_kinematics
 
@@ -78,7 +78,7 @@ def test_every_variable_has_a_place_on_pages() -> None:
     for declared in (VARIABLES, SIMULATION_VARIABLES):
         names = [name for section in sections_of(list(declared)) for name in section.names]
         assert len(names) == len(set(names))
-        own = {ACHIEVED.get(name, name) for name in declared if not name.endswith("_std")}
+        own = {SIMULATED_NAMES.get(name, name) for name in declared if not name.endswith("_std")}
         assert set(names) == own - {"flags", *BOUNDS}
 
 
@@ -87,7 +87,7 @@ def test_stiffness_is_drawn_inside_what_can_be_reached(page: Page, feasible_resu
     [series] = chart["series"]
     lower, upper = map(page.array, series["band"])
     with h5py.File(feasible_result) as file:
-        np.testing.assert_allclose(lower, file["stiffness_lower"][:, 2], rtol=SINGLE)
+        np.testing.assert_allclose(lower, file["stiffness_min"][:, 2], rtol=SINGLE)
     bottom, top = chart["shown"]
     assert np.all(upper > top)  # cubic springs become as stiff as one likes
     assert bottom < 800 < 1275 < top

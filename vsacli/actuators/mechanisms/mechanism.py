@@ -114,7 +114,7 @@ class DeflectionState(MechanismState):
         return self._partials.T_p
 
     @property
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """T against motor 1, which carries the load; U_s against motor 2."""
         return np.stack((self._partials.T, self._partials.setting_torque), axis=-1)
 

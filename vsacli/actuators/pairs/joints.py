@@ -86,8 +86,8 @@ class CoupledPairs(PairElasticity):
 
     def torques(self, phi: FloatArray) -> Torques:
         """Return the torques with those of the coupling, which act on the motors in opposite directions."""
-        tau_e, tau_spring = super().torques(phi)
-        return Torques(tau_e, tau_spring + self._between(phi))
+        tau_e, tau_transmission = super().torques(phi)
+        return Torques(tau_e, tau_transmission + self._between(phi))
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the sum over all three springs."""
@@ -121,7 +121,7 @@ class _PairStates(ElasticState):
         return self._one.sigma + self._two.sigma
 
     @property
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """Torque of each spring, and of the coupling."""
         return self._springs.tau if self._coupling is None else self._springs.tau + self._coupling
 

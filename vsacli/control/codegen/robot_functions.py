@@ -23,8 +23,8 @@ DRIVE_NAMES = (
     "dtheta",
     "ddtheta",
     "tau_motor",
-    "stiffness_lower",
-    "stiffness_upper",
+    "stiffness_min",
+    "stiffness_max",
 )
 """Variables that the generated inverse dynamics returns, in addition to margins and flags."""
 
@@ -104,7 +104,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
         values[INTERNAL[0]] = [deflections[SIDES * index + side] for index in damped for side in range(SIDES)]
         computed = kernel.results.unpack(kernel(kernel.arguments.pack(values)))
         drive = [row for name in DRIVE_NAMES for row in computed[name]]
-        corridor = (values["stiffness"], computed["stiffness_lower"], computed["stiffness_upper"])
+        corridor = (values["stiffness"], computed["stiffness_min"], computed["stiffness_max"])
         drive += [*map(margin, *corridor), *computed["flags"]]
         if inside is None:
             return drive

@@ -125,8 +125,8 @@ class Reference:
             low, high = np.array([damper.range if damper else (0.0, 0.0) for damper in dampers]).T
             drawn[DAMPING.key] = low + self._rng.uniform(0.2, 0.8, (CASES, len(dampers))) * (high - low)
         block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
-        lower = np.nan_to_num(block.stiffness_lower)
-        upper = np.minimum(np.nan_to_num(block.stiffness_upper, nan=0.0), 4 * lower)
+        lower = np.nan_to_num(block.stiffness_min)
+        upper = np.minimum(np.nan_to_num(block.stiffness_max, nan=0.0), 4 * lower)
         stiffness = lower + self._rng.uniform(0.2, 0.8, lower.shape) * (upper - lower)
         stiffness[-1] = lower[-1] / 2
         return {**drawn, "stiffness": stiffness}
@@ -185,7 +185,7 @@ TOLERANCE = {"double": 1e-9, "float": 2e-3}
 """Largest difference from NumPy, relative to the largest value of an array; rounding grows with the condition
 number of the mass matrix, and near singularities."""
 
-BOUNDED, BOUND = "stiffness_upper", 100.0
+BOUNDED, BOUND = "stiffness_max", 100.0
 """Result that is compared only up to this multiple of the largest commanded stiffness: values beyond have no
 effect on feasibility, and are inaccurate where a linkage is nearly stretched."""
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
-from vsacli.base.simulation_variables import ERRORS, SIMULATION_VARIABLES, TRACKED, actual, error
+from vsacli.base.simulation_variables import COMMANDS, ERRORS, SIMULATION_VARIABLES, TRACKED, error
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import add
 from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
@@ -121,7 +121,7 @@ def history(
     """Evaluate every variable along a run; `first` is the stamp of its time zero, s."""
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
-    found = _actual(loop, integrated)
+    found = _simulated(loop, integrated)
     if robot.has(VARIABLES["dissipated_power"]):
         of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
@@ -135,16 +135,15 @@ def history(
         read = readings.variables(states, loop.applied(integrated.demand))
     return History(
         time=first + integrated.time,
-        **commanded,
-        tau_motor=demand,
-        **{actual(name): values for name, values in found.items()},
+        **found,
+        **{COMMANDS[name]: values for name, values in {**commanded, "tau_motor": demand}.items()},
         **{error(name): found[name] - commanded[name] for name in ERRORS},
         **read,
         flags=_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
     )
 
 
-def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArray]:
+def _simulated(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
     phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
     ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
@@ -167,7 +166,7 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "dphi": np.where(deflected, drivetrain.merged(dphi, still), np.nan),
         "theta": theta,
         "dtheta": dtheta,
-        "tau_spring": drivetrain.merged(springs.tau_spring, tau_e),
+        "tau_transmission": drivetrain.merged(springs.tau_transmission, tau_e),
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray, by_joint, of_joint
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, has
 from vsacli.base.json_records import Stored, named
-from vsacli.base.simulation_variables import actual
+from vsacli.base.simulation_variables import COMMANDS
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
@@ -73,7 +73,7 @@ STIFFNESS_SHARE = 0.01
 
 @dataclass(frozen=True)
 class Deviation(Stored):
-    """Deviation of an actual value from the command: peak magnitude, its time (s), last; NaN if undefined."""
+    """Deviation of a simulated value from its command: largest, its time (s), last; NaN if undefined."""
 
     peak: float
     time: float
@@ -137,14 +137,14 @@ def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tupl
 
 
 def _energies(robot: Robot, history: History) -> list[JointEnergy]:
-    time, work, power, tau_spring, elastic_energy = (
+    time, work, power, tau_transmission, elastic_energy = (
         _led(getattr(history, name))
-        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
+        for name in ("time", "motor_energy", "motor_power", "tau_transmission", "elastic_energy")
     )
-    lost = history.dissipated_power_actual, history.copper_loss_actual
+    lost = history.dissipated_power, history.copper_loss
     intervals, done = np.diff(time), np.diff(work)
     losses = (None if taken is None else trapezoids(intervals, _led(taken)) for taken in lost)
-    torques = np.moveaxis(tau_spring, 1, 0)
+    torques = np.moveaxis(tau_transmission, 1, 0)
     exerted = efforts(intervals, torques[..., :-1], torques[..., 1:])
     meter = EnergyMeter()
     meter.add_stored(elastic_energy)
@@ -162,7 +162,7 @@ def _tracking(
     joint: Joint, index: int, history: History, energy: JointEnergy, goal: GoalTolerance
 ) -> JointTracking:
     flags = history.flags[:, index]
-    first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
+    first, second = np.fmax.reduce(np.abs(history.tau_motor[:, index]), axis=0).tolist()
     return JointTracking(
         name=joint.name,
         type=joint.type,
@@ -172,7 +172,7 @@ def _tracking(
         samples_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
         energy=energy,
-        tolerance=goal.of(float(np.ptp(history.q[:, index]))),
+        tolerance=goal.of(float(np.ptp(history.q_ref[:, index]))),
     )
 
 
@@ -193,8 +193,8 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
 
 
 def _checked(variable: str) -> str:
-    """Return the variable that a limit bounds: the commanded torque, else the actual value."""
-    return variable if variable == "tau_motor" else actual(variable)
+    """Return the variable that a limit bounds: the commanded torque, else the simulated value."""
+    return COMMANDS[variable] if variable == "tau_motor" else variable
 
 
 def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
@@ -235,11 +235,11 @@ def end_sentence(joint: JointTracking) -> str:
 def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
     """Yield a warning for each joint whose stiffness at the end differs from the command."""
     errors = history.stiffness_error[-1]
-    allowed = STIFFNESS_SHARE * history.stiffness.max(axis=0)
+    allowed = STIFFNESS_SHARE * history.stiffness_ref.max(axis=0)
     for index in np.flatnonzero(np.abs(errors) > allowed):  # False for rigid joints, whose error is NaN
         joint = robot.joints[index]
         unit = STIFFNESS.unit(joint.type)
         yield (
             f"{joint.name}: the stiffness ends {errors[index]:.3g} {unit} from the command "
-            f"of {history.stiffness[-1, index]:.4g} {unit}"
+            f"of {history.stiffness_ref[-1, index]:.4g} {unit}"
         )

@@ -70,7 +70,7 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
 
     def of_springs(_time: float, vectors: FloatArray) -> FloatArray:
         phase = loop.packing.unpack(vectors)
-        return drivetrain.torques(phase.q, phase.theta).tau_spring
+        return drivetrain.torques(phase.q, phase.theta).tau_transmission
 
     drivetrain, bound = loop.plant.drivetrain, max(LARGEST_SHARE * peak, SMALLEST_TORQUE)
     for torques, joints, fault, advice in (

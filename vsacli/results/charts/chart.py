@@ -60,7 +60,7 @@ class Line(NamedTuple):
         color: number of the color on pages.
         joint: number of the joint, from 0; None if the curve belongs to no joint.
         file: number of the file, from 0.
-        role: "computed", "commanded", "actual" or "measured".
+        role: "computed", "commanded", "simulated" or "measured".
         band: area around the curve, if there is one.
         rms: root mean square of a difference; None for other curves.
     """

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.simulation_variables import SIMULATION_VARIABLES, actual
+from vsacli.base.simulation_variables import COMMANDS, SIMULATION_VARIABLES
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet, folding
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
@@ -37,7 +37,7 @@ MOTION_HEIGHT, MOTION_ROWS = 1.7, 7
 FEASIBILITY = "feasibility"
 """Name of the figure of `check-feasibility`, whose file is called `<stem>-feasibility`."""
 
-FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
+FEASIBILITY_VARIABLES = ("stiffness", "stiffness_min", "stiffness_max", "flags")
 """Variables needed for that figure."""
 
 Part: TypeAlias = tuple[str, str]
@@ -179,16 +179,13 @@ _PARTS: dict[str, tuple[Part, ...]] = {
 _OF_SIMULATIONS: dict[str, Part] = {
     "position-error": ("q_error", "position error $q - q_d$"),
     "stiffness-error": ("stiffness_error", r"stiffness error $\sigma - \sigma_d$"),
-    **{
-        name: (actual(_PARTS[name][0][0]), _PARTS[name][0][1])
-        for name in ("motor-torque", "losses", "motor-current", "motor-voltage")
-    },
+    **{name: _PARTS[name][0] for name in ("motor-torque", "losses", "motor-current", "motor-voltage")},
 }
 
 _FOLLOWED = {"q": "$q$", "stiffness": r"$\sigma$"}
-"""Commanded variables of simulations, with axis label; each has a column of panels."""
+"""Variables of simulations with a command, a column of panels each, with the axis label."""
 
-_ROLES = {"commanded": 0, "actual": 1}
+_ROLES = {"commanded": 0, "simulated": 1}
 
 
 def _energy(charts: StoredCharts) -> Sheet:
@@ -198,12 +195,12 @@ def _energy(charts: StoredCharts) -> Sheet:
 
 
 def _simulated_motion(charts: StoredCharts) -> Sheet:
-    """Return a row of panels for each joint: position and stiffness, commanded and actual."""
+    """Return a row of panels for each joint: position and stiffness, commanded and simulated."""
     first = charts.first
     there = np.array([charts.existing(first.declared[name])[:, 0] for name in _FOLLOWED]).T
     there = there[:, there.any(axis=0)]
     names = list(_FOLLOWED)[: there.shape[1]]
-    signals = {name: charts.signals({name: "commanded", actual(name): "actual"}) for name in names}
+    signals = {name: charts.signals({COMMANDS[name]: "commanded", name: "simulated"}) for name in names}
 
     def panel(joint: int, name: str) -> Chart:
         chart = charts.chart(name, signals[name], 0, [joint], "role")
@@ -244,7 +241,7 @@ def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
 def simulation_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
     """Return the figures of a simulation whose variables at least one joint has."""
     return {
-        "motion": Drawing((*_FOLLOWED, *map(actual, _FOLLOWED)), _simulated_motion),
+        "motion": Drawing((*map(COMMANDS.__getitem__, _FOLLOWED), *_FOLLOWED), _simulated_motion),
         **{
             name: _of_parts(part)
             for name, part in _OF_SIMULATIONS.items()

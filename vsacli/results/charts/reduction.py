@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray, IndexArray, by_joint
-from vsacli.base.simulation_variables import actual
+from vsacli.base.simulation_variables import COMMANDS
 
 COLUMNS = 1200
 """Time intervals into which a long run is divided: one pixel column each of a 4 inch panel at 300 dpi."""
@@ -276,7 +276,7 @@ _OF_MOTORS = (
     *("dphi", "dtheta", "ddtheta", "tau_motor", "motor_power"),
     *("dissipated_power", "current", "voltage", "copper_loss"),
 )
-GROWING = frozenset({*_OF_MOTORS, *map(actual, _OF_MOTORS)})
+GROWING = frozenset({*_OF_MOTORS, COMMANDS["tau_motor"]})
 """Variables that grow without bound near a singular sample, and are undefined at it: deflection rates follow
 from the inverse of the decoupling matrix, and motion and torque of motors from these."""
 

@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.simulation_variables import actual, measured
+from vsacli.base.simulation_variables import COMMANDS, SIMULATED, measured
 from vsacli.base.units import WrenchQuantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, deviation
 from vsacli.base.wrench import WRENCH_AXES
@@ -24,7 +24,7 @@ from vsacli.results.charts.reduction import BLOCK, GROWING, Sampled, calm_range,
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.joint import existing
 
-BOUNDS = ("stiffness_lower", "stiffness_upper")
+BOUNDS = ("stiffness_min", "stiffness_max")
 
 By: TypeAlias = Literal["joint", "file", "role"]
 """Property that the looks of the lines of a chart distinguish."""
@@ -167,7 +167,7 @@ class StoredCharts:
         """Return the chart of a curve of some joints, all of one type, without title."""
         lines = signals.lines(column, joints, by)
         shown = self.calm(lines) if name in GROWING else None
-        unit = self._variable(name).quantity.unit(self.first.joint_types[joints[0]])
+        unit = self.first.declared[name].quantity.unit(self.first.joint_types[joints[0]])
         limits = self._limits(name, column, joints)
         return Chart("", unit, lines, name=name, limits=limits, shown=shown, cut_off=shown is not None)
 
@@ -210,10 +210,6 @@ class StoredCharts:
                 band=REACHABLE,
             )
 
-    def _variable(self, name: str) -> Variable:
-        declared = self.first.declared
-        return declared[name] if name in declared else declared[actual(name)]
-
     def _limits(self, name: str, column: int, joints: Sequence[int]) -> list[Limit]:
         limits = self.first.limits(name)
         bounds = limits[:, column % limits.shape[1]]
@@ -225,8 +221,8 @@ class StoredCharts:
         ]
 
     def charts_of(self, name: str) -> list[Chart]:
-        """Return all charts of a variable, by motor and type of joint; in simulations with actual values."""
-        variable = self._variable(name)
+        """Return all charts of a variable: by motor and type of joint, of simulations with the command."""
+        variable = self.first.declared[name]
         if "joint" not in variable.dims:
             return list(self._of_wrench(variable))
         columns = list(self._columns(variable))
@@ -248,22 +244,17 @@ class StoredCharts:
         return charts
 
     def _roles(self, name: str) -> dict[str, str]:
-        """Return the roles of a variable by its stored names; for several files only that of the outcome."""
-        simulated = actual(name) in self.common
-        roles = {name: "commanded" if simulated else "computed"}
-        roles |= {actual(name): "actual", measured(name): "measured"}
-        there = {stored: role for stored, role in roles.items() if stored in self.common}
-        if len(self.files) > 1:
-            outcome = actual(name) if simulated else name
-            return {outcome: there[outcome]} if outcome in there else {}
-        return there
+        """Return the roles of a variable by its stored names; of several files only its own."""
+        simulated = self.first.kind == "simulation" and name in SIMULATED
+        roles = {COMMANDS[name]: "commanded"} if simulated and name in COMMANDS else {}
+        roles |= {name: "simulated" if simulated else "computed", measured(name): "measured"}
+        wanted = roles if len(self.files) == 1 else (name,)
+        return {stored: roles[stored] for stored in wanted if stored in self.common}
 
     def _columns(self, variable: Variable) -> Iterator[tuple[int, str, list[int]]]:
         """Yield each column of a variable and type of joint, with a title and the joints that have it."""
         there, types = self.existing(variable), self.first.joint_types
         words = variable.long_name
-        if actual(variable.name) in self.common:  # one chart of command and outcome
-            words = VARIABLES[variable.name].long_name.replace("commanded ", "")
         for column in range(there.shape[1]):
             motor = f", motor {MOTORS[column]}" if "motor" in variable.dims else ""
             for joint_type in dict.fromkeys(types):

@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
-from vsacli.base.simulation_variables import actual
 from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.exports.result_format import ResultFormat
@@ -199,13 +198,13 @@ LONGEST = 2**31 - 1
 
 def check_fields(selection: Selection) -> None:
     """Refuse variables without a field, a selection without positions, and times that are too long."""
-    names, fields = {each.name for each in selection.chosen}, _fields(selection)
-    strange = sorted(names - set(fields.values()))
+    names = {each.name for each in selection.chosen}
+    strange = sorted(names - set(FIELDS.values()))
     if strange:
-        places = ", ".join(f"{variable} ({field})" for field, variable in fields.items())
+        places = ", ".join(f"{variable} ({field})" for field, variable in FIELDS.items())
         raise InputError.one(f"a JointTrajectory has no place for {', '.join(strange)}, only for {places}")
-    if fields["positions"] not in names:
-        raise InputError.one(f"a JointTrajectory needs positions: add {fields['positions']} to --variables")
+    if FIELDS["positions"] not in names:
+        raise InputError.one(f"a JointTrajectory needs positions: add {FIELDS['positions']} to --variables")
     if selection.time.size and selection.time[-1] - selection.time[0] > LONGEST:
         lasts = f"lasts {selection.time[-1] - selection.time[0]:.4g} s"
         raise InputError.one(
@@ -227,15 +226,9 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
     stream.write("\n]}\n")
 
 
-def _fields(selection: Selection) -> dict[str, str]:
-    """Return the variable for each field, according to the kind of the file."""
-    simulated = selection.result.kind == "simulation"
-    return {field: actual(name) if simulated else name for field, name in FIELDS.items()}
-
-
 def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
-    fields, values = _fields(selection), block.values
-    present = {field: values[name].tolist() for field, name in fields.items() if name in values}
+    values = block.values
+    present = {field: values[name].tolist() for field, name in FIELDS.items() if name in values}
     since = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()
     for time, *point in zip(since, *present.values(), strict=True):
         seconds, nanoseconds = divmod(time, NANOSECONDS)
@@ -245,7 +238,7 @@ def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
 
 JOINT_TRAJECTORY = ResultFormat(
     write_joint_trajectory,
-    variables={"result": tuple(FIELDS.values()), "simulation": tuple(map(actual, FIELDS.values()))},
+    variables=dict.fromkeys(("result", "simulation"), tuple(FIELDS.values())),
     check=check_fields,
 )
 

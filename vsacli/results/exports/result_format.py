@@ -15,7 +15,7 @@ from vsacli.base.units import time_text
 from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, Chosen, Selection, Side
 from vsacli.results.store.reader import StoredResult
 
-TORQUES = {"result": ("tau_motor",), "simulation": ("q_actual", "stiffness_actual", "tau_motor_actual")}
+TORQUES = {"result": ("tau_motor",), "simulation": ("q", "stiffness", "tau_motor")}
 """Default variables by the kind of the file: the torques to send, or the simulated motion."""
 
 

@@ -16,7 +16,7 @@ from vsacli.base.arrays import evenly
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.simulation_variables import ERRORS, actual, error
+from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
 from vsacli.base.variables import deviation
@@ -35,7 +35,7 @@ from vsacli.results.pages.document import (
 )
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.damage import reporting_damage
-from vsacli.results.store.reader import ACHIEVED, StoredResult
+from vsacli.results.store.reader import StoredResult
 from vsacli.robot.kinematics import frames_in_base
 
 MOST_FRAMES = 1000
@@ -59,7 +59,7 @@ class Section(NamedTuple):
 
     Attributes:
         heading: heading of the section.
-        names: names of the variables; for simulations those of the commanded ones.
+        names: names of the variables; for simulations the simulated ones.
         shown: whether the section is open initially, like the figures of `plot`.
     """
 
@@ -73,7 +73,7 @@ SECTIONS = (
     Section("Position and stiffness", ("q", "stiffness"), shown=True),
     Section("Motor torque", ("tau_motor",), shown=True),
     Section("Elastic torque", ("tau_e",), shown=True),
-    Section("Springs", ("phi", "tau_spring", "elastic_energy", "det_A")),
+    Section("Springs", ("phi", "tau_transmission", "elastic_energy", "det_A")),
     Section("Motion of the motors", ("theta", "dtheta", "ddtheta", "dphi")),
     Section("Power, work and losses", ("motor_power", "motor_energy", "dissipated_power", "copper_loss")),
     Section("Current and voltage", ("current", "voltage")),
@@ -138,7 +138,7 @@ def sections_of(variables: Collection[str]) -> Iterator[Section]:
     Standard deviations and bounds of the stiffness are drawn with their variable, flags as time intervals.
     """
     with_others = {"flags", *BOUNDS, *map(deviation, variables)}
-    own = dict.fromkeys(ACHIEVED.get(name, name) for name in variables if name not in with_others)
+    own = dict.fromkeys(SIMULATED_NAMES.get(name, name) for name in variables if name not in with_others)
     for section in SECTIONS:
         names = tuple(name for name in section.names if name in own)
         if names:
@@ -227,12 +227,11 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
             frame;
         `axes`, unit vectors along the axes of the joints, (instants, joints, 3).
     """
-    name = next((each for each in (actual("q"), "q") if each in result.variables), None)
-    if name is None:
+    if "q" not in result.variables:
         return None
     steps = evenly(result.samples, MOST_FRAMES)
     geometry = result.geometry()
-    positions = np.asarray(result.read(name), dtype=np.float64)[steps]
+    positions = np.asarray(result.read("q"), dtype=np.float64)[steps]
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         frames = list(frames_in_base(geometry, positions))
     origins = np.stack([frame.origin for frame in frames], axis=1)

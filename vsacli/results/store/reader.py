@@ -19,7 +19,7 @@ import numpy as np
 
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.simulation_variables import ACTUAL, MEASURED, SIMULATION_VARIABLES, actual, measured
+from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
@@ -77,9 +77,6 @@ SIZES = {
     "voltage": "actuator_motor_max_voltage",
 }
 """Datasets with the largest magnitude of motor variables, by variable."""
-
-ACHIEVED = {**{actual(name): name for name in ACTUAL}, **{measured(name): name for name in MEASURED}}
-"""Variables that only simulations have, with the commanded variables whose bounds apply."""
 
 DH = ("a", "alpha", "d", "theta")
 """Parameters of a Denavit-Hartenberg row, in the order of its fields."""
@@ -250,7 +247,7 @@ class StoredResult(StoredFile):
         Raises:
             InputError: the file is damaged.
         """
-        name = ACHIEVED.get(name, name)
+        name = SIMULATED_NAMES.get(name, name)
         with reporting_damage(self.path):
             if name in SIZES:
                 largest = self._of_motors(SIZES[name])

@@ -161,5 +161,5 @@ def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
     """Return the torques of the springs of a joint from its elasticity, if they have no spring elements."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))
-    against = (torques.tau_spring[..., side] for side in range(len(joint.actuator.motors)))
+    against = (torques.tau_transmission[..., side] for side in range(len(joint.actuator.motors)))
     return [torques.tau_e, *(-each for each in against)]

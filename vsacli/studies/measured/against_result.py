@@ -11,9 +11,10 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.simulation_variables import actual, measured
-from vsacli.base.variables import Variable
+from vsacli.base.simulation_variables import COMMANDS, measured
+from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.columns_file import load_columns
+from vsacli.documents.csv_file import split_heading
 from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
@@ -82,7 +83,7 @@ def compare(
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, _gear_ratios(recorded, result)),
-        *_left_out(recorded, behind),
+        *_left_out(result, recorded, behind),
     )
     return Comparison(
         result=str(result.path),
@@ -99,12 +100,12 @@ def compare(
 
 
 def _variables(result: StoredResult) -> dict[str, Variable]:
-    """Return the variables by plain name; for a simulation, actual values instead of commanded ones."""
+    """Return the variables by plain name; for a simulation the simulated ones instead of the commands."""
     found: dict[str, Variable] = {}
     for name in result.variables:
-        plain = name.removesuffix(measured("")).removesuffix(actual(""))
-        happened = next(each for each in (actual(plain), plain, name) if each in result.variables)
-        found[plain] = result.declared[happened]
+        plain = name.removesuffix(measured(""))
+        if name not in COMMANDS.values():
+            found[plain] = result.declared[plain if plain in result.variables else name]
     return found
 
 
@@ -267,8 +268,13 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
     ]
 
 
-def _left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+def _left_out(result: StoredResult, recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+    commands = known_columns(result, ((COMMANDS[name], 0, VARIABLES[name]) for name in COMMANDS))
+    commanded = [column for column in recorded.others if split_heading(column)[0] in commands]
+    unknown = [column for column in recorded.others if column not in commanded]
     if behind:
         yield f"not compared, as other columns say what the robot did: {', '.join(behind)}"
-    if recorded.others:
-        yield f"not compared, as the result has none of that name: {', '.join(recorded.others)}"
+    if commanded:
+        yield f"not compared, as these are commands, not what the robot did: {', '.join(commanded)}"
+    if unknown:
+        yield f"not compared, as the result has none of that name: {', '.join(unknown)}"

@@ -12,7 +12,8 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.simulation_variables import actual, measured
+from vsacli.base.renamed import successor
+from vsacli.base.simulation_variables import measured
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
@@ -146,14 +147,13 @@ def read_recording(
 def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:
     """Yield possible names of columns, each with its rank and the variable that it stands for.
 
-    Sensor readings, `q_measured`, take precedence over actual values of a simulation, `q_actual`, and these
-    over the plain name, which may be the command.
+    Sensor readings, `q_measured`, take precedence over the plain name.
 
     Args:
         variables: variables by plain name.
     """
     for plain, variable in variables.items():
-        for rank, name in enumerate((plain, actual(plain), measured(plain))):
+        for rank, name in enumerate((plain, measured(plain))):
             yield name, rank, variable
 
 
@@ -202,7 +202,10 @@ def _unusable(
     if TIME not in names:
         yield f"there is no column {TIME!r}{did_you_mean(TIME, strangers)}; --columns says which it is"
     found = [name for name in names if name in places]
-    if not found:
+    renamed = {name: new for name in strangers if (new := successor(split_heading(name)[0], places))}
+    for name, new in renamed.items():
+        yield f"column {name!r} is now called {new!r}; rename it, or say in --columns what it stands for"
+    if not found and not renamed:
         hint = next((hint for name in strangers if (hint := did_you_mean(name, places))), "")
         examples = ", ".join(list(places)[:3])
         say = "; `vsacli info` shows what the file has, and --columns says what it stands for"

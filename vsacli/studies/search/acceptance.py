@@ -175,7 +175,7 @@ class Acceptance:
         return {**load.command.arrays(), **drive(joint, load.command, self.min_margin)}
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
-        short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])
+        short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
         flags = values["flags"]
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, values, instants)
@@ -192,7 +192,7 @@ class Acceptance:
 
     def _reach_trouble(self, joint: Joint, load: Load, values: OfJoint) -> Trouble | None:
         asked = load.command.commanded["stiffness"]
-        lower, upper = values["stiffness_lower"], values["stiffness_upper"]
+        lower, upper = values["stiffness_min"], values["stiffness_max"]
         gap = margin(asked, lower, upper)
         gap[np.isnan(gap)] = np.inf
         gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf

@@ -243,10 +243,10 @@ class PacedJoint:
     def _corridor(self, driven: OfJoint) -> Iterator[Any]:
         if self._chosen:
             min_margin = self._min_margin
-            yield driven["stiffness_lower"] / ((1 - min_margin) * driven["stiffness"]) - 1 + CLEARANCE
-            unbounded = np.isinf(driven["stiffness_upper"])
+            yield driven["stiffness_min"] / ((1 - min_margin) * driven["stiffness"]) - 1 + CLEARANCE
+            unbounded = np.isinf(driven["stiffness_max"])
             required = (1 + min_margin) * driven["stiffness"]
-            upper = np.where(unbounded, 1.0, driven["stiffness_upper"]) / required
+            upper = np.where(unbounded, 1.0, driven["stiffness_max"]) / required
             yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
 
 

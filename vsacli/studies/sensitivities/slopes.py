@@ -188,7 +188,7 @@ class Derivatives:
     @property
     def margin(self) -> FloatArray:
         """Relative margin of the stiffness, (samples, joints)."""
-        return margin(self.block.stiffness, self.block.stiffness_lower, self.block.stiffness_upper)
+        return margin(self.block.stiffness, self.block.stiffness_min, self.block.stiffness_max)
 
     def over_time(self, name: str) -> FloatArray:
         """Return derivatives of a variable by all parameters, (samples, parameters, joints[, 2])."""

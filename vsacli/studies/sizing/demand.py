@@ -252,7 +252,7 @@ def _distinguished(names: Sequence[str]) -> Iterator[str]:
 
 def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     """Return motion, loads and torques of the motors in a block, (samples, joints, 2)."""
-    load = block.tau_spring.copy()
+    load = block.tau_transmission.copy()
     for index, joint in enumerate(robot.joints):
         if joint.damper_at("transmission"):
             load[:, index] += motor_torques(joint, block.of_joint(index))[0].T

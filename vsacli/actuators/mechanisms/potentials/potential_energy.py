@@ -158,7 +158,7 @@ class PotentialState(MechanismState):
         return self._all(0, 0)
 
     @property
-    def tau_spring(self) -> FloatArray:
+    def tau_transmission(self) -> FloatArray:
         """Derivatives of U over theta_1 and theta_2."""
         return np.stack((self._first(1), self._first(2)), axis=-1)
 
