@@ -61,7 +61,7 @@ def _declared() -> Iterator[Variable]:
         )
     for name in MEASURED:
         yield VARIABLES[name]._replace(
-            name=measured(name), long_name=f"{words[name]}, as measured", equation=f"{name}, read"
+            name=measured(name), long_name=f"{words[name]}, as measured", equation=f"sensor reading of {name}"
         )
     yield VARIABLES["flags"]._replace(equation="state")
 
