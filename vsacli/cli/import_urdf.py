@@ -110,7 +110,7 @@ def import_urdf(
     """Make a robot file with standard Denavit-Hartenberg rows from a serial chain of a URDF.
 
     Links behind fixed joints, and side branches, which stand still, are lumped with the link they hang on.
-    Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
+    Prints the rows, what was left out or changed, and how far the kinematics deviate from the URDF's. A URDF
     says nothing about motors and springs: these are placeholders, marked in the file and sized to what each
     joint carries.
     """
