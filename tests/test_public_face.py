@@ -74,7 +74,7 @@ def test_robots_trajectories_and_results_show_what_they_are_in_a_few_lines(
     assert repr(trajectory) == "Trajectory rest-to-rest: 3 joints, 4001 samples, 0 to 4 s"
     shown = repr(result).splitlines()
     assert shown[0] == "Result of vsa-3r, rest-to-rest: 4001 samples, 4 s, ok"
-    assert [line.split()[0] for line in shown[1:]] == ["joint", "base", "shoulder", "elbow"]
+    assert [line.split()[0] for line in shown[1:]] == ["joint", "N", "base", "shoulder", "elbow"]
 
 
 def test_a_simulation_shows_its_report() -> None:

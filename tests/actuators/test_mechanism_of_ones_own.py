@@ -128,7 +128,7 @@ def test_feasibility_names_the_corridor(arm, tmp_path):
     (tmp_path / "soft.yaml").write_text(TRAJECTORY.replace("start: 500", "start: 60"))
     refused = arm("check-feasibility", "arm.yaml", "soft.yaml")
     assert refused.code == 3
-    assert "below the 80" in refused.out
+    assert "below the minimum of 80" in refused.out
 
 
 @pytest.mark.slow

@@ -129,7 +129,7 @@ def test_limits_that_no_step_exceeds(name: str, letter: str, rate: float) -> Non
     nearest = int(np.abs(result.time - found.time).argmin())
     assert result.flags[nearest, 0] & LIMITED[name]
     assert f"joint_1: {LIMITED[name].quantity}" in str(result.report)
-    assert "between the steps" in str(result.report)
+    assert "between two samples" in str(result.report)
 
 
 @pytest.mark.parametrize(("letter", "rate"), CASES)

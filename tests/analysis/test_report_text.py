@@ -12,7 +12,8 @@ import pytest
 from vsacli.analysis.derivative_check import SelfCheck
 from vsacli.analysis.joint_report import COUNTED, JointReport, Worst
 from vsacli.analysis.report import Report
-from vsacli.analysis.trouble_text import findings
+from vsacli.analysis.trouble_text import counts, findings
+from vsacli.base.fitted_text import fitted
 from vsacli.dynamics.energy import JointEnergy
 
 NAN = math.nan
@@ -106,10 +107,10 @@ def test_whole_report_of_a_run_without_trouble():
     assert render(report(QUIET, slide)).splitlines() == [
         "OK  vsa-3r, rest-to-rest: 4001 samples, 4 s",
         "",
-        "joint   peak tau_e   peak motor 1 / 2       stiffness       attainable   margin",
-        "           N m | N            N m | N   N m/rad | N/m    N m/rad | N/m        %",
-        "elbow         7.55        98.9 / 91.6        850-1275       from 801.1     5.76",
-        "slide         7.55        98.9 / 91.6            9000   8009.5-20000.0    11.00",
+        "joint   peak tau_e   peak motor 1 / 2       stiffness      attainable   margin",
+        "           N m | N            N m | N   N m/rad | N/m   N m/rad | N/m        %",
+        "elbow         7.55        98.9 / 91.6        850-1275      from 801.1     5.76",
+        "slide         7.55        98.9 / 91.6            9000      8010-20000    11.00",
         "",
         "initial motor positions: elbow +0.07276 -0.05513 rad, slide +0.0317 +0.00602 m",
         "initial torque discontinuity: 0.42 N m (elbow)",
@@ -149,6 +150,12 @@ def test_the_first_line_counts_the_joints_that_fail():
     text = render(report(too_soft(790, 803.1), QUIET, limit))
     expected = "INFEASIBLE  vsa-3r, rest-to-rest: 4001 samples, 4 s; 1 of 3 joints infeasible, 1 over a limit"
     assert text.splitlines()[0] == expected
+
+
+def test_nothing_is_counted_without_failures_or_of_one_joint():
+    assert counts([QUIET, QUIET]) == ""
+    assert counts([too_soft(790, 803.1)]) == ""
+    assert counts([too_soft(790, 803.1)] * 2) == "2 of 2 joints infeasible"
 
 
 @pytest.mark.parametrize(
@@ -252,7 +259,7 @@ def test_singular_step_says_what_is_undefined():
 def test_near_singular_step_is_a_warning():
     text = sentence(troubled(Worst("near_singular", 1.25, 800.5, 800.1, "N m/rad")))
     assert text == (
-        "elbow: warning: stiffness 800.5 N m/rad at t = 1.250 s is 0.05 % from singular, "
+        "elbow: warning: stiffness 800.5 N m/rad at t = 1.250 s is 0.05 % from the singularity, "
         "where motor torques grow without bound (412 samples, from 3.588 s)"
     )
 
@@ -282,7 +289,14 @@ def test_times_between_milliseconds_are_told_apart():
 
 @pytest.mark.parametrize(
     ("margin", "shown"),
-    [(0.2, "20.00"), (-0.0272, "-2.72"), (-6.8e-6, "-0.0007"), (0.0, "0.00"), (1.2e-10, "1e-08")],
+    [
+        (0.2, "20.00"),
+        (-0.0272, "-2.72"),
+        (-15.0896, "-1509"),
+        (-6.8e-6, "-0.0007"),
+        (0.0, "0.00"),
+        (1.2e-10, "1e-08"),
+    ],
 )
 def test_small_margins_do_not_round_to_zero(margin, shown):
     row = line(render(report(replace(QUIET, margin=margin))), "elbow ")
@@ -359,6 +373,22 @@ def test_warnings_and_notes_about_the_inputs_follow_the_findings():
     assert lines[1:3] == ["warning: its mass is zero", "note: the rate is 8 per second"]
 
 
+def test_a_question_about_an_input_comes_before_what_may_follow_from_it():
+    warnings = ("its mass is zero", "stiffness = 14.8 N m/rad is low; did you mean 14.8 N m/deg?")
+    found = report(too_soft(790, 803.1), warnings=warnings).as_text().findings
+    assert [line.partition(":")[0] for line in found] == ["warning", "elbow", "warning"]
+    assert found[0] == f"warning: {warnings[1]}"
+
+
+def test_a_problem_of_the_motors_is_listed_with_its_samples():
+    worst = Worst("not_finite", 1.0, NAN, NAN, "N m")
+    joints = [troubled(worst, samples=7) for _ in range(5)]
+    counted = [replace(each, samples={**each.samples, "infeasible": 7}) for each in joints]
+    dated = [replace(each, name=f"j{at}", first_time={"infeasible": 1.0}) for at, each in enumerate(counted)]
+    *_, rest = findings(dated, 4001)
+    assert rest == "also not finite: j3 (7 samples, from 1.000 s), j4 (7 samples, from 1.000 s)"
+
+
 def test_failed_self_check_warns_against_the_torques():
     text = render(report(self_check=SelfCheck(spring_residual=1e-15, ladder=3.3e-3, shaft_residual=2e-2)))
     assert text.splitlines()[0].startswith("SELF CHECK FAILED  ")
@@ -383,7 +413,7 @@ def test_what_lacks_what_every_report_has_is_none(key):
 
 
 def many(worst: Worst, samples: list[int]) -> list[JointReport]:
-    return [replace(troubled(worst, samples=each), name=f"j{number}") for number, each in enumerate(samples)]
+    return [replace(troubled(worst, each), name=f"j{number}") for number, each in enumerate(samples)]
 
 
 def test_four_joints_with_a_problem_have_a_sentence_each():
@@ -408,7 +438,7 @@ def test_of_many_limits_those_farthest_exceeded_come_first():
     ]
     *full, rest = findings(joints, 4001)
     assert [sentence.partition(":")[0] for sentence in full] == ["j5", "j4", "j3"]
-    assert rest == "also over the velocity limit: j1 (4 rad/s, limit 3), j2 (5 rad/s, limit 3)"
+    assert rest == "also beyond the velocity limit (rad/s): j1 4 > 3, j2 5 > 3"
 
 
 def test_of_many_joints_equal_ones_are_named_together():
@@ -418,6 +448,70 @@ def test_of_many_joints_equal_ones_are_named_together():
         "also infeasible: j0 to j2, j7, j8 (2 samples, from 3.588 s);",
         "                 j6 (1 sample)",
     ]
+
+
+def test_where_sentences_are_many_only_the_worst_joint_of_each_kind_has_one():
+    joints = many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [1, 3, 2, 1])
+    limits = {
+        f"{name}_limit": Worst(f"{name}_limit", 1.0, 4.0, 3.0, "rad")
+        for name in ("position", "velocity", "deflection")
+    }
+    three = [replace(joint, worst={**joint.worst, **limits}) for joint in joints[:3]]
+    dated = [replace(joint, first_time={**joint.first_time, **dict.fromkeys(limits, 0.5)}) for joint in three]
+    assert len(list(findings([*dated, joints[3]], 4001))) == 4 + 3 * 3 - 5  # 13 would be too many
+    few = [*dated[:2], replace(dated[2], worst=joints[2].worst), joints[3]]
+    assert len(list(findings(few, 4001))) == 4 + 3 * 2
+
+
+def test_limits_of_both_types_of_joints_keep_their_units():
+    units = ("m/s", "rad/s", "m/s", "rad/s", "rad/s")
+    excesses = [Worst("velocity_limit", 1.0, 4.0 + at, 3.0, unit) for at, unit in enumerate(units)]
+    *_, rest = findings([replace(troubled(each), name=f"j{at}") for at, each in enumerate(excesses)], 4001)
+    assert rest == "also beyond the velocity limit: j0 4 > 3 m/s, j1 5 > 3 rad/s"
+
+
+LONG_NAMES = (
+    *("shoulder_yaw", "shoulder_pitch", "arm_roll", "elbow"),
+    *("forearm_roll", "wrist_pitch", "flange"),
+)
+
+
+@pytest.mark.parametrize("warned", [False, True], ids=["infeasible and over limits", "near-singular, too"])
+def test_the_longest_report_of_seven_joints_fits_on_a_page(warned):
+    """Every joint fails in every way that an antagonistic joint can, by other amounts at other times."""
+    limits = ["position", "velocity", "stiffness", "deflection", "motor_velocity", "motor_torque"]
+    limits += ["current", "voltage"]
+    joints = []
+    for at, name in enumerate(LONG_NAMES):
+        worst = {"infeasible": Worst("infeasible", 0.123456, 1234.5 + at, 1603.2 + at, "N m/rad")}
+        if warned:
+            worst["near_singular"] = Worst("near_singular", 0.765, 1605.5 + at, 1603.2 + at, "N m/rad")
+        for number, kind in enumerate(f"{limit}_limit" for limit in limits):
+            worst[kind] = Worst(kind, 1.234 + at, -12.345 - at, -0.0123, "N m/rad", 2 if number > 2 else None)
+        joints.append(
+            replace(
+                QUIET,
+                name=name,
+                worst=worst,
+                samples={
+                    **QUIET.samples,
+                    "infeasible": 712 + at,
+                    "near_singular": 51 + at,
+                    "over_limit": 900,
+                },
+                first_time=dict.fromkeys(worst, 0.123 + at),
+                margin=-15.0896,
+                peak_tau_motor=(21581.7, 10695.8),
+                stiffness_max=2400.0,
+                start_theta=(NAN, NAN),
+                end_theta=(0.968 + at, -0.6028 - at),
+                end_dtheta=(0.0123 + at, -0.0123 - at),
+            )
+        )
+    hint = "to list fixes: vsacli check-feasibility robots/lwr_7r_vsa.yaml trajectories/lwr_7r.yaml --fixes"
+    lines = fitted(str(report(*joints).as_text(hint)), 80).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 80
 
 
 def test_motors_of_many_joints_that_start_equal_are_named_together():

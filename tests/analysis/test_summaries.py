@@ -244,8 +244,8 @@ def test_json_holds_plain_finite_values():
         assert plain["joints"][0]["margin"]["attainable"][1] is None
 
 
-def verdict_of(report: Report, **steps: int) -> str:
-    joints = (dataclasses.replace(report.joints[0], steps=steps), *report.joints[1:])
+def verdict_of(report: Report, **samples: int) -> str:
+    joints = (dataclasses.replace(report.joints[0], samples=samples), *report.joints[1:])
     return dataclasses.replace(report, joints=joints).verdict
 
 
@@ -280,6 +280,6 @@ def test_what_is_not_finite_counts_as_infeasible_and_is_named():
     of_elastic = result.report.joints[robot.joint_names.index(kinds["elastic"])]
     assert of_elastic.samples["infeasible"] == 6
     assert of_elastic.first_time["not_finite"] == of_elastic.worst["not_finite"].time == 0.375
-    assert f"{kinds['elastic']}: a number of its motors is not finite at t = 0.375 s" in str(result.report)
+    assert f"{kinds['elastic']}: a motor variable is not finite at t = 0.375 s" in str(result.report)
     stored = Report.from_json(json.loads(json.dumps(result.report.as_json())))
     assert str(stored) == str(result.report)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +18,7 @@ ROWS = [
     ("shoulder", "32.7 N m", "-", "3.60 %"),
 ]
 TABLE = "\n".join(aligned(ROWS))
-HEADLINE = "vsa-3r, rest-to-rest: 4001 steps, 4 s          INFEASIBLE (3 of 3 joints)"
+HEADLINE = "INFEASIBLE  vsa-3r, rest-to-rest: 4001 samples, 4 s; 3 of 3 joints infeasible"
 
 
 def test_what_fits_is_left_alone() -> None:
@@ -35,10 +38,28 @@ def test_a_wide_table_follows_in_parts_with_its_first_column() -> None:
     ]
 
 
-def test_a_verdict_gets_a_line_of_its_own_at_the_right() -> None:
-    assert fitted(HEADLINE, 40).splitlines() == [
-        "vsa-3r, rest-to-rest: 4001 steps, 4 s",
-        "              INFEASIBLE (3 of 3 joints)",
+def test_the_first_line_goes_on_with_a_small_indent() -> None:
+    assert fitted(HEADLINE, 69).splitlines() == [
+        "INFEASIBLE  vsa-3r, rest-to-rest: 4001 samples, 4 s; 3 of 3 joints",
+        "  infeasible",
+    ]
+
+
+def test_a_command_can_be_copied_into_a_shell() -> None:
+    command = "vsacli check-feasibility arm.yaml move.yaml --set 'name=my own arm' --fixes"
+    label, *lines = fitted(f"title\nto list fixes: {command}", 50).splitlines()
+    assert (label, max(map(len, lines)) <= 50, len(lines)) == ("title", True, 3)
+    assert "'name=my own arm'" in lines[1]
+    typed = "\n".join(lines).removeprefix("to list fixes: ")
+    shell = subprocess.run(["sh", "-c", f"printf '%s|' {typed}"], capture_output=True, text=True, check=True)
+    assert shell.stdout.split("|")[:-1] == shlex.split(command)
+
+
+def test_a_comparison_stays_with_its_joint() -> None:
+    text = "title\nalso beyond the velocity limit (rad/s): base 4 > 3, elbow -5 < -3"
+    assert fitted(text, 56).splitlines()[1:] == [
+        "also beyond the velocity limit (rad/s): base 4 > 3,",
+        "  elbow -5 < -3",
     ]
 
 
@@ -53,10 +74,10 @@ def test_sentences_go_on_below_their_label_and_keep_numbers_with_their_units() -
 
 
 def test_lists_below_a_label_are_broken_anew() -> None:
-    text = "title\nstart motors at: base +1 rad, shoulder +2 rad,\n                 elbow +3 rad"
+    text = "title\nmotor positions: base +1 rad, shoulder +2 rad,\n                 elbow +3 rad"
     assert fitted(text, 45).splitlines() == [
         "title",
-        "start motors at: base +1 rad,",
+        "motor positions: base +1 rad,",
         "  shoulder +2 rad, elbow +3 rad",
     ]
 

@@ -14,7 +14,7 @@ from vsacli import Flag, open_result
 def test_installed_command_says_yes(tmp_path, motion):
     done = installed("check-feasibility", ROBOT, motion, folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[0].endswith(" OK")
+    assert done.stdout.startswith("OK  vsa-3r, rest-to-rest: ")
     assert contents(tmp_path).keys() == {"move.yaml"}
 
 
@@ -24,6 +24,27 @@ def test_report_and_exit_code_are_those_of_invdyn(vsacli, too_soft, options):
     computed = vsacli("invdyn", ROBOT, too_soft, *options)
     assert (checked.code, checked.out) == (3, computed.out)
     assert checked.err == ""
+
+
+@pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
+def test_a_report_says_how_to_list_fixes_of_the_same_task(vsacli, motion, command):
+    wrong = "stiffness.end=[790, 1275, 1275]"
+    out = vsacli(command, ROBOT, motion, "--set", wrong).out
+    assert out.count("\nto list fixes: ") == 1
+    assert f"\nto list fixes: vsacli check-feasibility {ROBOT} {motion} --set '{wrong}' --fixes\n\n" in out
+    more = [
+        part
+        for change in (wrong, "rate=50", "duration=4", "stiffness.start=850")
+        for part in ("--set", change)
+    ]
+    out = vsacli(command, ROBOT, motion, *more, *(["--overwrite"] if command == "invdyn" else [])).out
+    others = "to list fixes, with the same --set options"
+    assert f"\n{others}: vsacli check-feasibility {ROBOT} {motion} --fixes\n" in out
+
+
+@pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
+def test_a_feasible_task_needs_no_fixes(vsacli, motion, command):
+    assert "list fixes" not in vsacli(command, ROBOT, motion).out
 
 
 def test_nothing_is_written(vsacli, tmp_path, too_soft):
@@ -71,8 +92,8 @@ def test_what_lies_between_the_steps_counts(vsacli, tmp_path):
         assert result.report.as_json() == report
         assert np.isfinite(result.tau_motor).all(), "every step by itself can be done"
     assert shoulder["samples"]["infeasible"] == np.count_nonzero(infeasible) > 0
-    assert "load allows, raise it" in (text := vsacli("check-feasibility", *task).out)
-    assert "between the steps" in text
+    assert "at this load; increase it" in (text := vsacli("check-feasibility", *task).out)
+    assert ", between two samples is below the minimum" in text
     stopped = json.loads(vsacli("check-feasibility", *task, "--json", "--stop-on-infeasible").out)
     assert stopped["samples"] == int(infeasible.argmax()) + 1
     assert stopped["verdict"] == "infeasible"

@@ -24,7 +24,7 @@ def test_the_default_is_the_root(vsacli, motion, command):
 def test_drift_is_reported(vsacli, motion, command):
     done = vsacli(command, ROBOT, motion, "--deflection-solver", "ode")
     assert done.code == 0
-    (line,) = [line for line in done.out.splitlines() if line.startswith("drift of the integration: base ")]
+    (line,) = [line for line in done.out.splitlines() if line.startswith("integration drift: base ")]
     assert line.count(" rad at ") == 3
 
 
@@ -33,7 +33,7 @@ def test_end_of_the_way_is_reported(vsacli, too_soft):
     done = vsacli("invdyn", ROBOT, too_soft, "--deflection-solver", "ode")
     assert done.code == 3
     for joint in ("base", "shoulder", "elbow"):
-        assert f"\n{joint}: its deflections cannot be followed beyond t = " in done.out
+        assert f"\n{joint}: deflections cannot be integrated beyond t = " in done.out
 
 
 def test_result_file_and_json_hold_the_drift(vsacli, motion, tmp_path):

@@ -250,7 +250,7 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
     done = installed("check-feasibility", "r.yaml", motion, folder=tmp_path, env=environment)
     assert done.returncode == 0
-    assert done.stdout.startswith("\\u03c6-arm, rest-to-rest: 401 steps")
+    assert done.stdout.startswith("OK  \\u03c6-arm, rest-to-rest: 401 samples")
 
 
 @pytest.mark.parametrize(

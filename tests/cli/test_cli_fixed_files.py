@@ -245,4 +245,4 @@ def test_all_joints_that_fail_something_are_counted(tmp_path, vsacli):
     robot = robot_with(tmp_path, elbow=2)
     (tmp_path / "fast.yaml").write_text(FAST)
     done = vsacli("check-feasibility", robot, "fast.yaml")
-    assert done.out.splitlines()[0].endswith("INFEASIBLE (3 of 3 joints)")
+    assert done.out.splitlines()[0].endswith("; 2 of 3 joints infeasible, 1 over a limit")

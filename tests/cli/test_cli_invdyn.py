@@ -41,8 +41,8 @@ def test_installed_command_does_the_shipped_example(tmp_path):
     assert done.returncode == 0
     assert done.stderr == "wrote vsa_3r-rest_to_rest.h5\n"
     headline, *lines = done.stdout.splitlines()
-    assert " ".join(headline.split()) == "vsa-3r, rest-to-rest: 4001 steps, 4 s OK"
-    assert [line.split()[0] for line in lines[:4]] == ["joint", "base", "shoulder", "elbow"]
+    assert headline == "OK  vsa-3r, rest-to-rest: 4001 samples, 4 s"
+    assert [line.split()[0] for line in lines[1:6]] == ["joint", "N", "base", "shoulder", "elbow"]
     assert lines[-1].startswith("self-check passed")
     attributes = root_attributes(tmp_path / "vsa_3r-rest_to_rest.h5")
     assert attributes["verdict"] == "ok"
@@ -64,11 +64,13 @@ def test_default_name_comes_from_the_file_names(vsacli, tmp_path, motion):
 def test_stiffness_below_reach_is_named_with_joint_time_and_what_is_reachable(vsacli, tmp_path, too_soft):
     done = vsacli("invdyn", ROBOT, too_soft)
     assert done.code == 3
-    assert "INFEASIBLE (3 of 3 joints)" in done.out
+    assert done.out.startswith(
+        "INFEASIBLE  vsa-3r, rest-to-rest: 401 samples, 4 s; 3 of 3 joints infeasible\n"
+    )
     # At the end the arm rests, the base without load: its bound is 2K exactly.
-    assert "base: stiffness 790 N m/rad at t = 4.000 s is below the 800 its load allows" in done.out
+    assert "base: stiffness 790 N m/rad at t = 4.000 s is below the minimum of 800 N m/rad" in done.out
     bound = lowest_stiffness(static_shoulder_torque())
-    assert f"shoulder: stiffness 790 N m/rad at t = 4.000 s is below the {bound:.4g} its" in done.out
+    assert f"shoulder: stiffness 790 N m/rad at t = 4.000 s is below the minimum of {bound:.4g} N" in done.out
     with h5py.File(tmp_path / "vsa_3r-soft.h5") as file:
         infeasible = (file["flags"][:] & 1) != 0
         assert np.isnan(file["tau_motor"][:]).any(axis=-1).tolist() == infeasible.tolist()
@@ -76,13 +78,13 @@ def test_stiffness_below_reach_is_named_with_joint_time_and_what_is_reachable(vs
         assert file.attrs["verdict"] == "infeasible"
         first = file["time"][infeasible[:, 0].argmax()]
     count = infeasible[:, 0].sum()
-    assert f"raise it ({count} steps, from {first:.3f} s)" in done.out
+    assert f"increase it ({count} samples, from {first:.3f} s)" in done.out
 
 
 def test_installed_command_exits_with_3_where_a_step_is_infeasible(tmp_path, too_soft):
     done = installed("invdyn", ROBOT, too_soft, folder=tmp_path)
     assert done.returncode == 3
-    assert "is below the 800 its load allows" in done.stdout
+    assert "is below the minimum of 800 N m/rad at this load" in done.stdout
     assert done.stderr == "wrote vsa_3r-soft.h5\n"
 
 
@@ -95,7 +97,7 @@ def test_stop_on_infeasible_ends_with_the_first_one(vsacli, tmp_path, too_soft):
         assert file.attrs["complete"] == 0
     assert infeasible[-1]
     assert not infeasible[:-1].any()
-    assert f": {len(infeasible)} steps, 4 s planned" in done.out
+    assert f": {len(infeasible)} samples, stopped early, 4 s; " in done.out
 
 
 def test_json_is_all_there_is_on_stdout(vsacli, tmp_path, too_soft):

@@ -82,7 +82,7 @@ def test_what_is_read_is_the_changed_file(own_folder: Path, motion: Path, case: 
 @pytest.mark.parametrize(
     ("command", "told"),
     [
-        ("check-feasibility", "rest-to-rest: 31 steps, 0.3 s"),
+        ("check-feasibility", "rest-to-rest: 31 samples, 0.3 s"),
         slow("simulate", "rest-to-rest: feedforward, 0.3 s"),
         ("sensitivity --json", '"path": "joints.elbow.link.mass",\n   "value": 5.25,'),
     ],

@@ -116,7 +116,7 @@ def test_a_tendon_that_would_push_says_so(joint, tmp_path):
     (tmp_path / "over.yaml").write_text(MOVE.replace("60 deg", "100 deg"))
     refused = vsacli("check-feasibility", "elbow.yaml", "over.yaml", "--fixes")
     assert refused.code == 3
-    assert "is below the 0 that its spring carries" in refused.out
+    assert "is below the minimum of 0 N m that its spring carries" in refused.out
     assert "a tendon goes slack at" in refused.out
     assert "branch" not in refused.out
     assert "no stiffness to choose" in refused.out

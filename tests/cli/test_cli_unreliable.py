@@ -37,7 +37,8 @@ def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
     done = vsacli("invdyn", ROBOT, noisy("lsq"), "-o", "r.h5", "--plot", "figures")
     assert done.code == 0
     assert any(
-        line.startswith("motor torque, random noise only: base +- 0.0") for line in done.out.splitlines()
+        line.startswith("standard deviation of motor torque, random noise only: base +- 0.0")
+        for line in done.out.splitlines()
     )
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["tau_motor_std"].shape == (401, 3, 2)
@@ -56,8 +57,8 @@ def test_a_fit_that_follows_the_noise_is_used_and_unreliable(vsacli, tmp_path, n
     done = vsacli("invdyn", ROBOT, noisy("interpolate"), "-o", "r.h5")
     assert done.code == 3
     headline, *_ = done.out.splitlines()
-    assert headline.endswith("UNRELIABLE (3 of 3 joints)")
-    assert "base: tau_motor is not determined by the record" in done.out
+    assert headline == "UNRELIABLE  vsa-3r, interpolate: 401 samples, 2 s; 3 of 3 joints unreliable"
+    assert "base: tau_motor is not determined by the recording" in done.out
     with h5py.File(tmp_path / "r.h5") as file:
         assert file.attrs["verdict"] == "unreliable"
     shown = vsacli("info", "r.h5")

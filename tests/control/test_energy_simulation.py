@@ -75,4 +75,4 @@ def test_feedforward_spends_what_the_inverse_dynamics_says():
         found, expected = (astuple(each.energy)[:5] for each in (was, planned))  # without losses
         assert found == pytest.approx(expected, rel=1e-5, nan_ok=True)
     [energy] = [line for line in str(simulation.report).splitlines() if line.startswith("energy: ")]
-    assert f"springs hold up to {max(past.elastic_energy.max(axis=0)):.1f} J" in energy
+    assert f"springs store up to {max(past.elastic_energy.max(axis=0)):.1f} J" in energy

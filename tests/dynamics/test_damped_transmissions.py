@@ -238,7 +238,7 @@ def test_beyond_the_largest_torque_it_is_unstable() -> None:
     report = result.report
     assert report.verdict == "singular"
     assert 0 < report.joints[0].samples["singular"] < 100
-    said = "what moves inside its transmission is unstable from t = 0.000 s on: its damper carries -"
+    said = "the motion inside its damped transmission is unstable from t = 0.000 s on: its damper carries -"
     assert said in str(report)
 
 

@@ -73,8 +73,8 @@ def test_other_joint_goes_on(touching: Result):
 def test_report_says_when_and_why(touching: Result):
     text = str(touching.report)
     assert (
-        "base: its deflections cannot be followed beyond t = 1.299885 s: "
-        "its decoupling matrix becomes singular (infeasible: 71 steps)"
+        "base: deflections cannot be integrated beyond t = 1.299885 s: "
+        "its decoupling matrix becomes singular (infeasible: 71 samples)"
     ) in text.splitlines()
     assert touching.report.verdict == "infeasible"
     assert touching.report.joints[0].samples["infeasible"] == 71
@@ -84,7 +84,7 @@ def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Resu
     base = touching.report.joints[0]
     assert base.worst.keys() == {"singular", "near_singular"}
     assert not base.other_branch
-    assert "its load allows" not in str(touching.report)
+    assert "at this load" not in str(touching.report)
 
 
 def test_crossing_the_fold_ends_where_the_corridor_does():
@@ -140,7 +140,7 @@ def test_start_out_of_reach_is_not_followed():
     assert np.isnan(result.phi[:, 1]).all()
     assert np.isfinite(result.phi[:, 0]).all()
     assert shoulder.as_json()["stopped"] == {"time": 0.0, "reason": REASONS[UNREACHABLE]}
-    assert "shoulder none (no step followed)" in str(result.report)
+    assert "shoulder none (no sample integrated)" in str(result.report)
 
 
 def test_robot_that_nobody_can_follow_ends_at_once():

@@ -50,7 +50,7 @@ def test_they_follow_from_torque_and_velocity_on_the_shaft():
     assert base.energy.copper_loss == pytest.approx(heat, rel=1e-12)
     assert [joint.energy.copper_loss for joint in others] == [None, None]
     assert "copper_loss" not in others[0].energy.as_json()
-    assert f"the windings turn {heat:.1f} J into heat" in str(result.report)
+    assert f"losses: motor windings {heat:.0f} J" in str(result.report)
 
 
 @pytest.mark.parametrize("engine", ["numpy", "c"])

@@ -27,6 +27,11 @@ class Outcome:
     err: str
 
 
+def without_hint(printed: str) -> str:
+    """A printed report without the line that says how to list fixes."""
+    return "".join(line for line in printed.splitlines(True) if not line.startswith("to list fixes"))
+
+
 def edited(source: Path, target: Path, *changes: tuple[str, str]) -> Path:
     """A copy of a file with texts replaced, each of which must stand in it."""
     content = source.read_text()

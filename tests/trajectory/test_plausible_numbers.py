@@ -98,7 +98,7 @@ def test_warnings_come_before_the_advice_that_follows_from_the_number(vsacli):
         REST_TO_REST, Path("move.yaml"), ("start: 850 ", "start: 14.8 "), ("end: 1275", "end: 22.3")
     )
     out = vsacli("check-feasibility", ROBOT, soft).out
-    assert out.index("did you mean 14.8 N m/deg") < out.index("raise it")
+    assert out.index("did you mean 14.8 N m/deg") < out.index("increase it")
 
 
 @pytest.mark.parametrize("end", ["6*pi", "(3*360) deg", "18.85", "-12.566370614"])

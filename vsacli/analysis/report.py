@@ -10,7 +10,7 @@ from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfChec
 from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import counts, findings, uncertainty_lines
+from vsacli.analysis.trouble_text import counts, findings, spread_lines, uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText, headline
 
@@ -75,13 +75,17 @@ class Report(Stored):
         Args:
             hint: a line below the findings, such as the command that lists fixes; none if empty.
         """
+        # A question asks whether an input is meant, as in another unit: the findings may follow from it.
+        asked = [warning for warning in self.warnings if "?" in warning]
+        others = [warning for warning in self.warnings if "?" not in warning]
         found = [
             *self._failed_check(),
+            *text.warnings_and_notes(asked, ()),
             *findings(self.joints, self.samples),
             *text.stops(self.joints, self.drifts),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *text.warnings_and_notes(self.warnings, self.notes),
+            *text.warnings_and_notes(others, self.notes),
         ]
         lines = [
             *text.start(self.joints),
@@ -90,6 +94,7 @@ class Report(Stored):
                 [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
             ),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+            *spread_lines(self.joints),
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
         ]

@@ -50,6 +50,9 @@ MOST_APART = 7
 """Largest number of joints that are described one by one."""
 
 
+WHOLE = 1e3
+"""Number from which on no decimals are shown."""
+
 HUGE = 1e8
 """Torque or stiffness from which on an exponent is shown, as next to a singular sample."""
 
@@ -120,14 +123,20 @@ def _span(low: float, high: float) -> str:
 
 
 def number(value: float) -> str:
-    """Format with one decimal for large numbers, and three digits for small and for enormous ones."""
-    return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
+    """Return a number with three or four digits, or all those before the point."""
+    if math.isnan(value):
+        return "-"
+    if not 10 <= abs(value) < HUGE:
+        return f"{value:.3g}"
+    return f"{value:.1f}" if abs(value) < WHOLE else f"{value:.0f}"
 
 
 def percent(share: float) -> str:
-    """Format a percentage with two decimals, or one digit of a smaller one."""
+    """Return a share in percent with two decimals; with none if it is large, with one digit if tiny."""
     if math.isnan(share):
         return "none"
+    if abs(share) >= 1:
+        return f"{100 * share:.0f} %"
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
 
 

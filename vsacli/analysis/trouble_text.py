@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread, Worst
 from vsacli.analysis.report_text import apart, by_joint, count, kind_of, number, of_joints, of_motors, percent
@@ -18,11 +19,16 @@ DIFFERENT_PEAK = 1.1
 
 
 def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Yield the uncertainty of motor torques of recorded motions, and its consequences."""
-    found = [(joint, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
-    for joint, uncertainty in found:
-        yield from (f"{joint.name}: {sentence}" for sentence in _sentences(joint, uncertainty))
-    torques = [(joint.name, each.variables[JUDGED]) for joint, each in found if JUDGED in each.variables]
+    """Yield what the uncertainty of recorded motions leaves undetermined or undecided."""
+    for joint in joints:
+        if joint.uncertainty is not None:
+            yield from (f"{joint.name}: {sentence}" for sentence in _sentences(joint, joint.uncertainty))
+
+
+def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
+    """Yield the standard deviations of motor torques of recorded motions."""
+    found = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
+    torques = [(name, each.variables[JUDGED]) for name, each in found if JUDGED in each.variables]
     if torques:
         yield by_joint(
             "standard deviation of motor torque, random noise only: ",
@@ -69,6 +75,12 @@ def undetermined_text(spread: Spread) -> str:
 MOST_IN_FULL = 3
 """Joints with a full sentence on a kind of problem, where more than one more have it."""
 
+MOST_SENTENCES = 12
+"""Full sentences of a report; where there would be more, only the worst joint of each kind has one."""
+
+MOST_LISTS = 8
+"""Kinds of problems of a report whose lists of joints have values; where there are more, only names."""
+
 FAILURES = {
     "infeasible": "infeasible",
     "singular": "singular",
@@ -77,40 +89,116 @@ FAILURES = {
 }
 """Verdicts that joints are counted for in the first line of a report, and their words there."""
 
-GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular")
+GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", "off_target")
 """Kinds of problems that come first; limits follow, and warnings come last."""
+
+COUNTED_AS = {"not_finite": "infeasible", "internal_instability": "singular"}
+"""Kinds of problems whose samples are counted under another name."""
+
+
+class Problem(NamedTuple):
+    """One kind of problem at one joint.
+
+    Attributes:
+        kind: its name, as in `JointReport.worst`.
+        joint: number of the joint, from 0 at the base.
+        size: larger values are worse among problems of the same kind.
+        sentence: value, bound, time and what to do.
+        brief: the same in a few words, for a list.
+        unit: unit of the values in `brief`; empty if these are no values.
+    """
+
+    kind: str
+    joint: int
+    size: tuple[float, int]
+    sentence: str
+    brief: str
+    unit: str = ""
 
 
 def counts(joints: Sequence[JointReport]) -> str:
     """Return how many joints fail which requirement; empty if none does, or there is only one."""
     failing = {words: sum(joint.shows(verdict) for joint in joints) for verdict, words in FAILURES.items()}
+    return of_all_joints(failing, len(joints))
+
+
+def of_all_joints(failing: Mapping[str, int], total: int) -> str:
+    """Return numbers of joints and what they fail; empty if none does, or there is only one joint."""
     failed = [(words, number) for words, number in failing.items() if number]
-    if len(joints) == 1 or not failed:
+    if total == 1 or not failed:
         return ""
     (words, first), *others = failed
-    return ", ".join(
-        [f"{first} of {len(joints)} joints {words}", *(f"{number} {words}" for words, number in others)]
-    )
+    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in others)])
 
 
 def findings(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
-    """Yield a sentence for each kind of problem of a joint, the most critical first.
-
-    Where many joints have a kind, those beyond `MOST_IN_FULL` follow in a few words each.
+    """Yield the problems of a run, the most critical first.
 
     Args:
         joints: reports of the joints, base to tip.
         samples: number of samples of the run.
     """
-    kinds = sorted(dict.fromkeys(kind for joint in joints for kind in joint.worst), key=_rank)
-    for kind in kinds:
-        numbered = [(number, joint) for number, joint in enumerate(joints) if kind in joint.worst]
-        numbered.sort(key=lambda each: _size(each[1], kind), reverse=True)
-        in_full = len(numbered) if len(numbered) <= MOST_IN_FULL + 1 else MOST_IN_FULL
-        for _, joint in numbered[:in_full]:
-            yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, joint.worst[kind], samples)}"
-        if others := {number: _briefly(joint, kind, samples) for number, joint in sorted(numbered[in_full:])}:
-            yield of_joints(f"also {_words(kind)}: ", others, [joint.name for joint in joints])
+    problems = [
+        _problem(number, joint, worst, samples)
+        for number, joint in enumerate(joints)
+        for worst in joint.worst.values()
+    ]
+    yield from grouped(problems, [joint.name for joint in joints])
+
+
+def _problem(number: int, joint: JointReport, worst: Worst, samples: int) -> Problem:
+    counted = COUNTED_AS.get(worst.kind, worst.kind)
+    if counted not in joint.samples:
+        return limit_problem(number, worst, _limit(joint, worst))
+    size = _share_beyond(worst), joint.samples[counted]
+    sentence = _SENTENCES[worst.kind](joint, worst, samples)
+    return Problem(worst.kind, number, size, sentence, f"({_when(joint, counted, samples)})")
+
+
+def limit_problem(number: int, worst: Worst, sentence: str) -> Problem:
+    """Return that a joint exceeds a limit, as the sentence says."""
+    value, bound = apart(worst.value, worst.bound)
+    brief = f"{value} {'<' if worst.value < worst.bound else '>'} {bound}"
+    return Problem(worst.kind, number, (_share_beyond(worst), 0), sentence, brief, worst.unit)
+
+
+def grouped(problems: Iterable[Problem], names: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence for each kind of problem of a joint, the most critical first.
+
+    Where many joints have a kind, those beyond the first few follow in a few words each. The report of seven
+    joints that fail in every way stays on one page: it then has fewer sentences, and lists of names alone.
+
+    Args:
+        problems: problems of all joints, in any order.
+        names: names of the joints, base to tip.
+    """
+    kinds: dict[str, list[Problem]] = {}
+    for problem in problems:
+        kinds.setdefault(problem.kind, []).append(problem)
+    in_full = {
+        kind: len(found) if len(found) <= MOST_IN_FULL + 1 else MOST_IN_FULL for kind, found in kinds.items()
+    }
+    if sum(in_full.values()) > MOST_SENTENCES:
+        in_full = dict.fromkeys(kinds, 1)
+    for kind in sorted(kinds, key=_rank):
+        found = sorted(kinds[kind], key=lambda problem: problem.size, reverse=True)
+        yield from (f"{names[each.joint]}: {each.sentence}" for each in found[: in_full[kind]])
+        others = sorted(found[in_full[kind] :], key=lambda problem: problem.joint)
+        if others and len(kinds) > MOST_LISTS:
+            yield f"also {_words(kind)}: {', '.join(names[each.joint] for each in others)}"
+        elif others:
+            yield _also(kind, others, names)
+
+
+def _also(kind: str, problems: Sequence[Problem], names: Sequence[str]) -> str:
+    """Return problems of one kind in a list, with their unit once if it is the same."""
+    units = {problem.unit for problem in problems}
+    unit = f" ({problems[0].unit})" if len(units) == 1 and problems[0].unit else ""
+    said = {
+        problem.joint: problem.brief if len(units) == 1 else f"{problem.brief} {problem.unit}"
+        for problem in problems
+    }
+    return of_joints(f"also {_words(kind)}{unit}: ", said, names)
 
 
 def _rank(kind: str) -> tuple[int, int]:
@@ -118,11 +206,6 @@ def _rank(kind: str) -> tuple[int, int]:
     if kind in GRAVEST:
         return 0, GRAVEST.index(kind)
     return (2, 0) if kind == "near_singular" else (1, Flag.labeled(kind).value)
-
-
-def _size(joint: JointReport, kind: str) -> tuple[float, int]:
-    """Return how large a problem is: by which share the bound is missed, then in how many samples."""
-    return _share_beyond(joint.worst[kind]), joint.samples.get(kind, 0)
 
 
 def _share_beyond(worst: Worst) -> float:
@@ -133,15 +216,7 @@ def _share_beyond(worst: Worst) -> float:
 
 def _words(kind: str) -> str:
     words = kind.replace("_", " ")
-    return f"over the {words}" if kind.endswith("limit") else words
-
-
-def _briefly(joint: JointReport, kind: str, samples: int) -> str:
-    if kind in joint.samples:
-        return f"({_when(joint, kind, samples)})"
-    worst = joint.worst[kind]
-    value, bound = apart(worst.value, worst.bound)
-    return f"({value} {worst.unit}, limit {bound})"
+    return f"beyond the {words}" if kind.endswith("limit") else words
 
 
 def _when(joint: JointReport, kind: str, samples: int) -> str:
@@ -194,10 +269,10 @@ def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
 
 
 def _near_singular(joint: JointReport, worst: Worst, samples: int) -> str:
-    gap = abs(worst.value - worst.bound) / worst.value
+    gap, when = abs(worst.value - worst.bound) / worst.value, _when(joint, "near_singular", samples)
     return (
         f"warning: stiffness {worst.value:.6g} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
-        f"from singular, where motor torques grow without bound ({_when(joint, 'near_singular', samples)})"
+        f"from the singularity, where motor torques grow without bound ({when})"
     )
 
 
@@ -216,7 +291,7 @@ def _unstable(joint: JointReport, worst: Worst, samples: int) -> str:
     )
 
 
-def _limit(joint: JointReport, worst: Worst, _samples: int) -> str:
+def _limit(joint: JointReport, worst: Worst) -> str:
     return f"{excess(worst)}{_between(joint, worst)} (first at {time_text(joint.first_time[worst.kind])})"
 
 

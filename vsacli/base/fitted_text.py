@@ -18,9 +18,20 @@ INDENT = "  "
 WIDEST_INDENT = 3
 """Inverse of the largest share of the width by which continuation lines are indented below a label."""
 
-BEFORE_UNIT = re.compile(r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)")
-"""Blanks at which a line is not broken: between a number and its unit, within newton meters, and before a
-signed number, which belongs to the joint name in front of it."""
+TOGETHER = re.compile(
+    r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)| (?=[<>] )|(?<=[<>]) | (?=[\d.e+-]+ [<>] )"
+)
+"""Blanks at which a line is not broken: between a number and its unit, within newton meters, within a
+comparison, and before it or a number with a sign, which belong to the joint before."""
+
+COMMAND = re.compile(r"[a-z ,-]+: vsacli ")
+"""Beginning of a line that ends with a command."""
+
+QUOTED = re.compile(r"'[^']*'")
+"""Argument of a command that a shell would not recognize if a line ended inside."""
+
+CONTINUED = " \\"
+"""End of each line of a command but its last, so that the lines can be copied into a shell."""
 
 HARD_BLANK = "\N{NO-BREAK SPACE}"
 """Placeholder for blanks that must not break while a text is wrapped."""
@@ -37,7 +48,9 @@ def fitted(text: str, width: int) -> str:
     if all(len(line) <= width for line in text.split("\n")):
         return text
     headline, *lines = _joined(text.split("\n"))
-    broken = _broken(headline, width)
+    broken = [headline]
+    if len(headline) > width:
+        broken = _wrapped(TOGETHER.sub(HARD_BLANK, headline), INDENT, width)
     for is_table, group in groupby(lines, key=_has_cells):
         several = list(group)
         fits = all(len(line) <= width for line in several)
@@ -67,14 +80,26 @@ def _broken(line: str, width: int) -> list[str]:
     """Return a line broken between words."""
     if len(line) <= width:
         return [line]
-    wrapped = textwrap.wrap(
-        BEFORE_UNIT.sub(HARD_BLANK, line),
+    if COMMAND.match(line):
+        *parts, last = _wrapped(QUOTED.sub(_unbroken, line), _indent(line, width), width - len(CONTINUED))
+        return [*(part + CONTINUED for part in parts), last]
+    return _wrapped(TOGETHER.sub(HARD_BLANK, line), _indent(line, width), width)
+
+
+def _wrapped(line: str, indent: str, width: int) -> list[str]:
+    """Return a line, in which some blanks are marked as hard, broken at the others."""
+    parts = textwrap.wrap(
+        line,
         width,
-        subsequent_indent=_indent(line, width),
+        subsequent_indent=indent,
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return [part.replace(HARD_BLANK, " ") for part in wrapped]
+    return [part.replace(HARD_BLANK, " ") for part in parts]
+
+
+def _unbroken(quoted: re.Match[str]) -> str:
+    return quoted[0].replace(" ", HARD_BLANK)
 
 
 def _indent(line: str, width: int) -> str:

@@ -134,7 +134,7 @@ def check_feasibility(
         if found is not None and output is not None and number is not None:
             _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)
-    return show_report(report, as_json, (robot, trajectory), found)
+    return show_report(report, as_json, (robot, trajectory), changes, found)
 
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -219,27 +219,46 @@ def result_line(result: StoredResult) -> str:
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
 
 
+MOST_CHANGES = 3
+"""Options `--set` that a command in a report repeats at most."""
+
 FIXABLE = ("infeasible", "singular", "over_limit")
 """Verdicts for which fixes are searched."""
 
 
-def show_report(report: Report, as_json: bool, files: tuple[str, str], fixes: Fixes | None = None) -> Exit:
+def show_report(
+    report: Report,
+    as_json: bool,
+    files: tuple[str, str],
+    changes: Sequence[str],
+    fixes: Fixes | None = None,
+) -> Exit:
     """Print the report, with fixes if there are any; the exit code follows from the verdict.
 
-    Without fixes, the report says by which command the `files` of robot and trajectory get them.
+    Without fixes, the report says which command lists them.
+
+    Args:
+        report: the report.
+        as_json: whether to print it as JSON.
+        files: paths of robot and trajectory.
+        changes: changes to these, as `--set` gave them.
+        fixes: fixes, if they were searched.
     """
     if as_json:
         extra = {} if fixes is None else {"fixes": fixes.as_json()}
         say_json({**report.as_json(), **extra})
     else:
-        hint = _hint(report, files) if fixes is None else ""
-        texts = [str(report.as_text(hint)), *([] if fixes is None else [str(fixes)])]
-        say_text("\n".join(texts), report.verdict)
+        hint = _hint(report, files, changes) if fixes is None else ""
+        texts = [report.as_text(hint), *([] if fixes is None else [fixes])]
+        say_text("\n\n".join(map(str, texts)), report.verdict)
     return EXIT_OF_VERDICT[report.verdict]
 
 
-def _hint(report: Report, files: tuple[str, str]) -> str:
+def _hint(report: Report, files: tuple[str, str], changes: Sequence[str]) -> str:
     """Return how to list fixes of a motion that cannot be executed; empty if it can."""
     if report.verdict not in FIXABLE or STANDARD in files:
-        return ""
-    return f"to list fixes: vsacli check-feasibility {shlex.join(files)} --fixes"
+        return ""  # standard input has been read, and cannot be read again
+    shown = changes if len(changes) <= MOST_CHANGES else ()
+    words = [*files, *(word for change in shown for word in ("--set", change)), "--fixes"]
+    others = "" if shown == changes else ", with the same --set options"
+    return f"to list fixes{others}: vsacli check-feasibility {shlex.join(words)}"

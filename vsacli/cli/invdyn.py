@@ -127,7 +127,7 @@ def invdyn(
             draw_staged(file, figures, talk)
             if inputs.trajectory.estimates:
                 figures.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
-    code = show_report(report, as_json, (robot, trajectory))
+    code = show_report(report, as_json, (robot, trajectory), changes)
     talk.wrote(outputs)
     return code
 

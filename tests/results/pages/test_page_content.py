@@ -52,6 +52,15 @@ def test_a_page_says_verdict_and_report_before_anything_else(page: Page) -> None
     assert body.index("self-check passed") < body.index("Inputs and provenance")
 
 
+def test_findings_come_before_the_table_and_values_after_it(vsacli: Any, too_soft: Path) -> None:
+    assert vsacli("invdyn", ROBOT, too_soft, "-o", "soft.h5").code == 3
+    page = page_of(vsacli, "soft.h5")
+    classes = [attributes.get("class") for _, attributes in page.tags]
+    assert classes.index("findings") < classes.index("joints") < classes.index("lines")
+    finding, table = page.text.index("is below the minimum of"), page.text.index("peak tau_e")
+    assert finding < table < page.text.index("initial torque discontinuity: ")
+
+
 def test_every_curve_of_a_page_is_that_of_the_file(page: Page, feasible_result: Path) -> None:
     """Runs of so few steps are drawn as they are."""
     drawn = set()
@@ -198,8 +207,11 @@ def test_no_text_of_a_file_acts(vsacli: Any, page: Page, feasible_result: Path, 
         report["warnings"] = [text, "<img src=x onerror=alert(1)>"]
         file["report/json"][()] = json.dumps(report)
     wicked = page_of(vsacli, "wicked.h5")
-    line = ("p", {"class": "line"})
-    assert [tag for tag in wicked.tags if tag != line] == [tag for tag in page.tags if tag != line]
+    of_warnings = [("p", {"class": "line"}), ("div", {"class": "findings"})]
+    assert wicked.tags.count(of_warnings[1]) == 1
+    assert [tag for tag in wicked.tags if tag not in of_warnings] == [
+        tag for tag in page.tags if tag not in of_warnings
+    ]
     assert wicked.scripts == page.scripts
     assert clean(wicked.text)
 

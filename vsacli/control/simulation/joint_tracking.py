@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,6 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.analysis.joint_report import Worst
+from vsacli.analysis.report_text import number
+from vsacli.analysis.trouble_text import Problem, excess, limit_problem
 from vsacli.base.arrays import FloatArray, by_joint, of_joint
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, has
@@ -203,32 +206,47 @@ def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
     position, stiffness, torque = (units_of(quantity, types) for quantity in (POSITION, STIFFNESS, TORQUE))
     header = (
         "joint",
-        f"q error: peak\n{position}",
-        f"end\n{position}",
-        f"stiffness error: peak\n{stiffness}",
-        f"end\n{stiffness}",
+        f"q error peak / end\n{position}",
+        f"stiffness error peak / end\n{stiffness}",
         f"peak motor 1 / 2\n{torque}",
     )
     return [header, *map(_row, joints)]
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
-    deviations = (joint.q.peak, joint.q.final, joint.stiffness.peak, joint.stiffness.final)
     motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
-    return (joint.name, *map(_number, deviations), motors)
+    return (joint.name, *map(_pair, (joint.q, joint.stiffness)), motors)
+
+
+def _pair(deviation: Deviation) -> str:
+    if math.isnan(deviation.peak):
+        return "-"
+    return f"{_number(deviation.peak)} / {_number(deviation.final)}"
 
 
 def _number(value: float) -> str:
-    """Return a number with one decimal if it is large, else with two digits."""
-    return "-" if math.isnan(value) else f"{value:.1f}" if abs(value) >= 10 else f"{value:.2g}"
+    """Return a number as reports show it, with two digits if it is small."""
+    return number(value) if abs(value) >= 10 else "-" if math.isnan(value) else f"{value:.2g}"
 
 
-def end_sentence(joint: JointTracking) -> str:
-    """Return how far off target a joint ends."""
+def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Problem]:
+    """Yield the limits that joints exceed and, of a complete run, how far off target they end."""
+    for index, joint in enumerate(joints):
+        yield from (limit_problem(index, worst, excess(worst)) for worst in joint.worst.values())
+        if complete and joint.off_course:
+            yield _off_target(index, joint)
+
+
+def _off_target(index: int, joint: JointTracking) -> Problem:
     unit = POSITION.unit(joint.type)
-    return (
-        f"{joint.name}: q ends {joint.q.final:.3g} {unit} from the command, more than the goal tolerance of "
-        f"{joint.tolerance:.3g} {unit}"
+    error, tolerance = f"{joint.q.final:.3g}", f"{joint.tolerance:.3g}"
+    return Problem(
+        kind="off_target",
+        joint=index,
+        size=(abs(joint.q.final) / max(joint.tolerance, sys.float_info.min), 0),
+        sentence=f"final q error {error} {unit} exceeds the goal tolerance of {tolerance} {unit}",
+        brief=f"{error} (tolerance {tolerance})",
+        unit=unit,
     )
 
 
@@ -240,6 +258,6 @@ def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
         joint = robot.joints[index]
         unit = STIFFNESS.unit(joint.type)
         yield (
-            f"{joint.name}: the stiffness ends {errors[index]:.3g} {unit} from the command "
-            f"of {history.stiffness_ref[-1, index]:.4g} {unit}"
+            f"{joint.name}: final stiffness error {errors[index]:.3g} {unit} "
+            f"(commanded: {history.stiffness_ref[-1, index]:.4g} {unit})"
         )

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.analysis.report_text import energy_lines, warnings_and_notes
-from vsacli.analysis.trouble_text import excess
+from vsacli.analysis.trouble_text import grouped, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
@@ -22,7 +22,7 @@ from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
     Deviation,
     JointTracking,
-    end_sentence,
+    problems,
     rows,
 )
 
@@ -127,8 +127,7 @@ class SimulationReport(Stored):
         """Return the report in its parts, as people read it."""
         found = [
             *([] if self.ending is None else [self.ending]),
-            *(f"{joint.name}: {excess(worst)}" for joint in self.joints for worst in joint.worst.values()),
-            *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
+            *grouped(problems(self.joints, self.complete), [joint.name for joint in self.joints]),
             *warnings_and_notes(self.warnings, self.notes),
         ]
         lines = [
@@ -143,11 +142,16 @@ class SimulationReport(Stored):
         return str(self.as_text())
 
     def _title(self) -> str:
-        title = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
-        if (error := self.largest_error) is None:
-            return title
-        where = f"{error.joint}, t = {time_text(error.time)}"
-        return f"{title}; largest q error {error.value:.2g} {error.unit} ({where})"
+        """Return names, controller, the largest error, and how many joints fail which requirement."""
+        parts = [f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"]
+        if (error := self.largest_error) is not None:
+            where = f"{error.joint}, t = {time_text(error.time)}"
+            parts.append(f"largest q error {error.value:.2g} {error.unit} ({where})")
+        failing = {
+            "off target": sum(self.complete and joint.off_course for joint in self.joints),
+            "over a limit": sum(bool(joint.worst) for joint in self.joints),
+        }
+        return "; ".join([*parts, *filter(None, [of_all_joints(failing, len(self.joints))])])
 
     def _loss(self) -> Iterator[str]:
         """Yield sentences on the errors with the full state, for comparison with measured positions."""
