@@ -245,7 +245,7 @@ def stiffness_cost() -> str:
             "peak motor torque",
             "co-contraction, rms",
             "spent",
-            "taken back",
+            "recovered",
             "work",
             "in the springs",
         ),

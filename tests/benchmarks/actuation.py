@@ -49,8 +49,8 @@ def actuators() -> dict[str, Actuator]:
     found: dict[str, Actuator] = {}
     motors = (Motor(inertia=0.01), Motor(inertia=0.01))
     for name, ((one, _), (other, _)) in SPRINGS.items():
-        found[f"{name}, alike"] = Antagonistic(motor=motors, spring=(one, one))
-        found[f"{name}, unlike"] = Antagonistic(motor=motors, spring=(one, other))
+        found[f"{name}, equal"] = Antagonistic(motor=motors, spring=(one, one))
+        found[f"{name}, unequal"] = Antagonistic(motor=motors, spring=(one, other))
     return found | {name: DEVICES[name].actuator for name in MECHANISMS}
 
 

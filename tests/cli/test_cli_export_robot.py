@@ -31,7 +31,7 @@ def test_forces_that_mjcf_has_no_place_for_are_beside_it(vsacli, tmp_path):
     assert done.err.endswith("a Python file with forces belongs to this model; name both with -o\n")
     done = vsacli("export", robot, "--format", "mjcf", "-o", "a.b.xml")
     assert (done.code, done.err) == (0, "wrote a.b.xml\nwrote a.b_forces.py\n")
-    assert "Beside it, passive forces: springs of elbow." in (tmp_path / "a.b.xml").read_text()
+    assert "In addition, passive forces: springs of elbow." in (tmp_path / "a.b.xml").read_text()
 
 
 USING = """

@@ -94,14 +94,14 @@ def test_the_report(vsacli):
     assert "total mass of the moving links: 5.33 kg" in lines
     exactness = "the same as the URDF's, the tip within 1.0e-12 m and 1.0e-12 rad"
     assert f"forward kinematics: {exactness}" in lines
-    assert "held at zero beside the chain, their links lumped: left_finger, right_finger" in lines
+    assert "held at zero outside the chain, their links lumped: left_finger, right_finger" in lines
     assert "dry friction left out: turn" in lines
 
 
 def test_side_branches_are_held(vsacli, tmp_path):
     done = converted(vsacli, "--hold", "left_finger=0.01 + 0.01")
     held = "left_finger at 0.02 m, right_finger at 0.02 m (follows left_finger)"
-    assert f"held beside the chain, their links lumped: {held}" in done.out.splitlines()
+    assert f"held outside the chain, their links lumped: {held}" in done.out.splitlines()
     assert (
         load_robot(tmp_path / "arm.yaml")
         == import_urdf(DESK_ARM, None, "flange", hold={"left_finger": 0.02}).robot

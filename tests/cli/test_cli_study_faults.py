@@ -210,7 +210,7 @@ SPRING = "joints.*.actuator.spring.k"
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
         ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
         ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
-        ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies by itself"),
+        ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),
         ("method: random\nsamples: 3", "vary: nothing varies that the method random could draw"),
         ("method: random\nsamples: 3\nvary: {joints.*.link.com: {normal: 5 %}}", "is zero, of which a share"),

@@ -176,8 +176,7 @@ def test_values_per_joint() -> None:
         (
             "joints.elbow.actuator.type",
             "rigid",
-            "joints.elbow.actuator.type: decides which keys stand beside it; "
-            "replace joints.elbow.actuator as a whole",
+            "joints.elbow.actuator.type: determines the other keys; replace joints.elbow.actuator as a whole",
         ),
         ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1"),
         ("joints.elbow.link.mass", "x", "joints.elbow.link.mass: expected a number in kg, found 'x'"),

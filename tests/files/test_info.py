@@ -353,7 +353,7 @@ def test_joints_are_counted_by_whatever_lists_them(vsacli, tmp_path, signals, st
 
 def test_dampers_are_named(vsacli):
     for robot, line in (
-        ("compact_1r", "dampers: elbow beside its springs, 0.5 to 12 N m s/rad"),
+        ("compact_1r", "dampers: elbow parallel to its springs, 0.5 to 12 N m s/rad"),
         ("maccepa_vd_1r", "dampers: elbow between its links, 0 to 0.00848 N m s/rad"),
     ):
         assert line in vsacli("info", REPOSITORY / "robots" / f"{robot}.yaml").out.splitlines()

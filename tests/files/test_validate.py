@@ -166,7 +166,7 @@ def test_hdf5_of_others(vsacli: Any, tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("no HDF5")
     done = vsacli("validate", "other.h5", "text.h5")
     assert (
-        "other.h5: is an HDF5 file, but its format is none of vsacli-result/2, vsacli-simulation/2"
+        "other.h5: is an HDF5 file, but its format is not one of vsacli-result/2, vsacli-simulation/2"
         in done.out
     )
     assert "text.h5: is not an HDF5 file; expected a result file, as invdyn or simulate writes it" in done.out

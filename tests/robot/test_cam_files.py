@@ -69,7 +69,7 @@ def rig(tmp_path: Path) -> Callable[..., None]:
 CONSTANTS = {
     "levers alike": (
         "{type: maccepa, b: 0.1, c: 0.1, k: 400, r: 0.01, pretension: [0, 0.02]}",
-        "c: must differ from b: levers alike have a kink at rest",
+        "c: must differ from b: equal levers have a kink at rest",
     ),
     "pretension below zero": (
         "{type: maccepa, b: 0.1, c: 0.2, k: 400, r: 0.01, pretension: 0.02}",

@@ -51,7 +51,7 @@ def test_fixed_links_and_held_branches_are_lumped(urdf):
     conversion = import_urdf(urdf(TREE), tip="hand")
     assert names(conversion) == [["torso", "head"], ["arm"], ["hand", "left", "right"]]
     assert names_of(conversion.chain.held_beside) == ["open_left", "open_right", "nod"]
-    assert any("held at zero beside the chain" in note and "nod" in note for note in conversion.notes())
+    assert any("held at zero outside the chain" in note and "nod" in note for note in conversion.notes())
 
 
 def test_joints_below_the_base_are_held(urdf):
@@ -120,7 +120,7 @@ def test_the_only_end_is_the_tip(urdf):
         ("hand", "hand", "no joint moves between 'hand' and 'hand'"),
         ("head", None, "no joint moves below 'head'"),
         (None, "right", "13: joint 'open_right' follows 'open_left' (<mimic>)"),
-        (None, "left", "13: joint 'open_right' beside the chain follows 'open_left' on it (<mimic>)"),
+        (None, "left", "13: joint 'open_right' outside the chain follows 'open_left' on it (<mimic>)"),
     ],
 )  # fmt: skip
 def test_a_chain_that_cannot_be(urdf, base, tip, problem):

@@ -74,8 +74,8 @@ def test_what_does_not_stand_at_zero_is_told(urdf):
     right, bend = "right at 0.3 rad (follows left)", "bend at 0.35 rad (follows left)"
     assert [note for note in conversion.notes() if note.startswith("held")] == [
         "held below the base: lean at -0.523599 rad",
-        "held at zero beside the chain, their links lumped: left",
-        f"held beside the chain, their links lumped: {right}, {bend}",
+        "held at zero outside the chain, their links lumped: left",
+        f"held outside the chain, their links lumped: {right}, {bend}",
     ]
     assert conversion.robot.description.endswith("to link hand, lean at -0.523599 rad")
 
@@ -120,7 +120,7 @@ def test_a_joint_whose_leader_is_missing_stands_as_if_that_stood_at_zero(urdf):
         ({"lft": 0}, "there is no joint 'lft'; did you mean 'left'?"),
         ({"wrist": 0}, "'wrist' belongs to the chain, where it moves"),
         ({"bend": 0}, "'bend' follows 'left' (<mimic>); hold that one"),
-        ({"drawer": 0}, "'drawer' is neither beside the chain nor below its base, so that it has no effect"),
+        ({"drawer": 0}, "'drawer' is neither outside the chain nor below its base, so that it has no effect"),
         ({"left": "1 deg"}, "'left': expected a number in m, found '1 deg': degrees are for angles only"),
         ({"left": "a"}, "'left': expected a number in m, found 'a': unknown word 'a'"),
         ({"left": math.nan}, "'left': expected a number in m, found 'nan': only finite numbers can be used"),
@@ -145,8 +145,8 @@ def test_what_cannot_be_held(urdf, hold, reason):
         (
             [('joint="left"', 'joint="wrist"')],
             {},
-            r"14: joint 'right' beside the chain follows 'wrist' on it .*\n"
-            r"arm.urdf:15: joint 'bend' beside the chain follows 'wrist' on it .* choose a tip before",
+            r"14: joint 'right' outside the chain follows 'wrist' on it .*\n"
+            r"arm.urdf:15: joint 'bend' outside the chain follows 'wrist' on it .* choose a tip before",
         ),
         (
             [(f' rpy="1 0 0"/><axis xyz="0 0 1"/>{LIMIT}', ' rpy="1 0 0"/><mimic joint="wrist"/>')],

@@ -52,7 +52,7 @@ def notes(tmp_path, monkeypatch):
         (
             "",
             '<gazebo reference="turn"><springStiffness>3</springStiffness></gazebo>',
-            ["spring beside the drive (<springStiffness>) left out: turn"],
+            ["spring parallel to the drive (<springStiffness>) left out: turn"],
         ),
         ("", '<gazebo reference="turn"><selfCollide>1</selfCollide></gazebo>', []),
         (LIMIT, "", ["effort limits (joint side) taken over: turn"]),

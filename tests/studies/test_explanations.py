@@ -26,7 +26,7 @@ WORDS = {
     "quadratic friction": "what is left depends on its velocity: its friction has another law",
     "Stribeck's friction": "what is left depends on its velocity: its friction has another law",
     "stiffer springs": "what is left depends on its deflection: its spring has another law",
-    "gain of a motor": r"torques that read (0.9[67]|1.0[23])\d* \+- [\d.e-]+ times what the rest",
+    "gain of a motor": r"torques that read (0.9[67]|1.0[23])\d* \+- [\d.e-]+ times the torque that the rest",
     "gain": r"the numbers found are 1.0[23]\d* \+- [\d.e-]+ times those of the file, all of them",
 }
 

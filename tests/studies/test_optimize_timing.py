@@ -105,7 +105,7 @@ def test_a_motion_rests_on_its_way_as_long_as_commanded(arm):
     assert found.timing.after < 0.4 * found.timing.uniform
     assert resting(found.trajectory) > 0.98 * resting(motion)
     bounding = {name for shares in found.timing.bounding.values() for name in shares}
-    assert bounding == {"lower end of the corridor"}
+    assert bounding == {"minimum attainable stiffness"}
     assert inverse_dynamics(arm, found.trajectory).report.verdict == "ok"
 
 

@@ -130,12 +130,12 @@ PROBLEMS = {
     "nanoseconds": (
         "time,a,b",
         "{shoulder.q: {column: a, nanoseconds: b}}",
-        ["only time has nanoseconds beside it"],
+        ["only time may have a column of nanoseconds"],
     ),
     "unit of nanoseconds": (
         "time,a,b",
         "{time: {column: time, unit: s, nanoseconds: b}}",
-        ["nanoseconds: stands beside whole seconds, which need no unit or factor"],
+        ["nanoseconds: requires whole seconds, without unit or factor"],
     ),
     "brackets": ("time,a,b", "{time: {column: time, unit: '[ms]'}}", ["is written without brackets"]),
     "zero": ("time,a,b", "{time: {column: time, factor: 0}}", ["must be finite and not zero"]),

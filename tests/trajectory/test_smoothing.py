@@ -242,7 +242,7 @@ def test_vibration_that_may_be_motion_is_kept_by_default_and_said(noise):
     )
     said = Trajectory.from_samples(time, values[:, None]).warnings
     assert any(
-        "a vibration at 15 Hz beyond a smooth motion; if it is none of it, set bandwidth: 7.5" in each
+        "a vibration at 15 Hz beyond a smooth motion; if it is noise, set bandwidth: 7.5" in each
         for each in said
     )
     without = Trajectory.from_samples(time, values[:, None], fit="smooth")

@@ -38,11 +38,13 @@ EXAMPLE_SPRING = {
 class Antagonistic(Actuator):
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
-    motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping serves both")
-    spring: tuple[SpringLaw, SpringLaw] = value(Pair(OneOf(LAWS)), "springs 1 and 2; one mapping serves both")
+    motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping applies to both")
+    spring: tuple[SpringLaw, SpringLaw] = value(
+        Pair(OneOf(LAWS)), "springs 1 and 2; one mapping applies to both"
+    )
     coupling: SpringLaw | None = value(
         OneOf(LAWS),
-        "spring between the motors, over theta_1 - theta_2; the link does not feel it",
+        "spring between the motors, over theta_1 - theta_2; it exerts no torque on the link",
         default=None,
     )
     branch: str = choice(

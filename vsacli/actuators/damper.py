@@ -17,15 +17,15 @@ LOCATIONS = ("link", "transmission")
 class Damper:
     """A damper whose damping a trajectory commands as it does a stiffness."""
 
-    location: str = choice(LOCATIONS, "between the links of the joint, or beside its springs")
+    location: str = choice(LOCATIONS, "location: between the links of the joint, or parallel to its springs")
     range: tuple[float, float] = interval(
-        units.DAMPING, "damping that it can have, from zero or above; flagged beyond", lowest=0
+        units.DAMPING, "range of the damping, not negative; commands outside it are flagged", lowest=0
     )
 
     start: float | None = number(
         units.POSITION,
-        "sum of the deflections beside it at the first step, if it lies beside springs; by default that at "
-        "which these carry the joint alone",
+        "sum of the deflections of the springs parallel to it at the first sample; by default the "
+        "one at which these carry the joint alone",
         default=None,
     )
 

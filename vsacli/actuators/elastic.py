@@ -32,11 +32,13 @@ EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 class Elastic(Actuator):
     """One motor that moves the link through a spring: a linear one, or one of any law."""
 
-    motor: Motor = value(Record(Motor), "the motor")
+    motor: Motor = value(Record(Motor), "motor")
     stiffness: float | None = number(
-        units.STIFFNESS, "stiffness of a linear spring; this or `spring`", check=POSITIVE, default=None
+        units.STIFFNESS, "stiffness of a linear spring; either this or `spring`", check=POSITIVE, default=None
     )
-    spring: SpringLaw | None = value(OneOf(LAWS), "spring of any law; this or `stiffness`", default=None)
+    spring: SpringLaw | None = value(
+        OneOf(LAWS), "spring of any law; either this or `stiffness`", default=None
+    )
 
     uncommanded: ClassVar[Mapping[str, str]] = {
         "stiffness": "its actuator is elastic, with the spring that the robot file says"

@@ -27,13 +27,13 @@ class Friction:
 
     coulomb: tuple[float, float] = value(
         Pair(Number(units.TORQUE), dim="direction"),
-        "Coulomb friction, or a list of two: while the velocity is negative, and while it is positive",
+        "Coulomb friction, or a list of two: for negative and for positive velocity",
         check=NON_NEGATIVE,
     )
-    offset: float = number(units.TORQUE, "torque that is added, whatever the velocity", default=0.0)
+    offset: float = number(units.TORQUE, "constant torque, independent of the velocity", default=0.0)
     width: float = number(
         units.VELOCITY,
-        "w of tanh(velocity/w), by which friction changes its sign; 0 for the sign function",
+        "width w of the sign change tanh(velocity/w); 0 for the sign function",
         check=NON_NEGATIVE,
         default=0.0,
     )

@@ -53,11 +53,15 @@ class JointMotor:
     max_torque: float = number(units.TORQUE, "largest |torque|, joint side of the gear")
     max_velocity: float = number(units.VELOCITY, "largest |velocity|, joint side of the gear")
     gear_ratio: float | None = number(
-        units.GEAR_RATIO, "motion of the motor's shaft over that on the joint side", default=None
+        units.GEAR_RATIO,
+        "ratio of the motion of the motor shaft to the motion on the joint side",
+        default=None,
     )
     friction: Friction | None = value(Record(Friction), "dry friction, joint side of the gear", default=None)
     torque_constant: float | None = number(
-        units.JOINT_TORQUE_CONSTANT, "torque on the joint side of the gear over the current", default=None
+        units.JOINT_TORQUE_CONSTANT,
+        "ratio of the torque on the joint side of the gear to the current",
+        default=None,
     )
     resistance: float | None = number(units.RESISTANCE, "resistance of the windings", default=None)
     max_current: float | None = number(units.CURRENT, "largest |current|", default=None)
@@ -84,34 +88,35 @@ class Motor:
     )
     gear_ratio: float | None = number(
         units.GEAR_RATIO,
-        "turns of the motor to one of the joint, negative if against it; if given, the other numbers are "
-        "those of the motor's shaft, as datasheets print them, in kg m^2, N m s/rad, N m, rad/s at any joint",
+        "turns of the motor per turn of the joint, negative if it turns in the opposite direction; "
+        "if given, the other values are those of the motor shaft, as in datasheets, in kg m^2, N m "
+        "s/rad, N m, rad/s at every joint",
         check=NON_ZERO,
         default=None,
     )
     friction: Friction | None = value(Record(Friction), f"dry friction, {_SIDE}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
-        "torque over current, and so voltage over velocity, on the motor's shaft; needs gear_ratio, "
-        "1 for a direct drive",
+        "ratio of torque to current, and so of voltage to velocity, on the motor shaft; requires "
+        "gear_ratio, 1 for a direct drive",
         check=POSITIVE,
         default=None,
     )
     resistance: float | None = number(
         units.RESISTANCE,
-        "resistance of the windings; needs torque_constant",
+        "resistance of the windings; requires torque_constant",
         check=NON_NEGATIVE,
         default=None,
     )
     max_current: float | None = number(
         units.CURRENT,
-        "largest |current|; flagged beyond; needs torque_constant",
+        "largest |current|; larger ones are flagged; requires torque_constant",
         check=POSITIVE_OR_INFINITE,
         default=None,
     )
     max_voltage: float | None = number(
         units.VOLTAGE,
-        "largest |voltage|; flagged beyond; needs torque_constant and resistance",
+        "largest |voltage|; larger ones are flagged; requires torque_constant and resistance",
         check=POSITIVE_OR_INFINITE,
         default=None,
     )

@@ -20,7 +20,7 @@ from vsacli.documents.fields import Record, check_fields, value
 class Rigid(Actuator):
     """One motor that moves the link directly."""
 
-    motor: Motor = value(Record(Motor), "the motor")
+    motor: Motor = value(Record(Motor), "motor")
 
     sprung = False
     uncommanded: ClassVar[Mapping[str, str]] = {"stiffness": "its actuator is rigid and has no stiffness"}

@@ -38,15 +38,17 @@ class Serial(Actuator):
     """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
-        Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which sets the springs"
+        Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which adjusts the springs"
     )
     coupled_inertia: float = number(
         units.MOTOR_INERTIA,
-        "inertia B_12 by which either motor feels the other's acceleration, where motor 2 rides on motor 1; "
-        "joint side of the gears; of a motor with gear_ratio, its shaft",
+        "coupling inertia B_12 between the accelerations of the motors if motor 2 is mounted on "
+        "motor 1; joint side of the gears, or, of a motor with gear_ratio, its shaft",
         default=0.0,
     )
-    mechanism: Mechanism = value(OneOf(MECHANISMS), "the springs and what motor 2 does to them")
+    mechanism: Mechanism = value(
+        OneOf(MECHANISMS), "springs, and the mechanism by which motor 2 adjusts them"
+    )
 
     motor_count = 2
     commanded = ("stiffness",)

@@ -32,14 +32,14 @@ class Flag(enum.IntFlag):
     meaning: str
     quantity: str | None
 
-    INFEASIBLE = 1, "the springs cannot carry the elastic torque, or not with this stiffness", None
+    INFEASIBLE = 1, "the springs cannot carry the elastic torque, or not at this stiffness", None
     SINGULAR = (
         2,
         "the decoupling matrix is singular: deflection rates and motor torques are undefined",
         None,
     )
     NEAR_SINGULAR = 4, "the relative margin to a singular decoupling matrix is below the threshold", None
-    SLACK = 8, "a tendon that can only pull would have to push", None
+    SLACK = 8, "a tendon, which can only pull, would have to push", None
     DEFLECTION_LIMIT = 16, "a transmission is deflected beyond its max_deflection", "deflection of spring"
     MOTOR_TORQUE_LIMIT = 32, "a motor torque exceeds max_torque", "joint-side torque of motor"
     MOTOR_VELOCITY_LIMIT = 64, "a motor velocity exceeds max_velocity", "joint-side velocity of motor"
@@ -48,7 +48,10 @@ class Flag(enum.IntFlag):
     STIFFNESS_LIMIT = 512, "the commanded stiffness leaves the joint's allowed range", "stiffness"
     INTERNAL_INSTABILITY = (
         1024,
-        "the motion inside a damped transmission is unstable: deviations from what was computed would grow",
+        (
+            "the internal motion of a damped transmission is unstable: deviations from the computed "
+            "motion would grow"
+        ),
         None,
     )
     CURRENT_LIMIT = 2048, "a motor current exceeds max_current", "current of motor"
@@ -56,7 +59,10 @@ class Flag(enum.IntFlag):
     DAMPING_LIMIT = 8192, "the commanded damping leaves the range of the damper", "damping"
     NOT_FINITE = (
         16384,
-        "something of the motors is infinite or no number, since what it follows from is, or is too large",
+        (
+            "a motor variable is infinite or undefined, because a value it is computed from is, or is "
+            "too large"
+        ),
         None,
     )
 

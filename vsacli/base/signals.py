@@ -87,7 +87,10 @@ DAMPING = Signal(
         "rate of the commanded damping",
         "second derivative of the commanded damping",
     ),
-    meaning="damping of the dampers, which adds to that of the joints; by default the least of their ranges",
+    meaning=(
+        "damping of the dampers, in addition to the damping of the joints; by default the lower "
+        "end of their ranges"
+    ),
     spline_degree=5,
     optional=True,
     device="damper",
@@ -103,7 +106,8 @@ WRENCH = Signal(
         "second derivative of the wrench",
     ),
     meaning=(
-        "what the environment exerts on the end effector: force, and moment about the tool frame's origin"
+        "wrench that the environment exerts on the end effector: force, and moment about the "
+        "origin of the tool frame"
     ),
     spline_degree=5,
     components=len(WRENCH_AXES),

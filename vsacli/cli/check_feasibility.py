@@ -45,29 +45,30 @@ if TYPE_CHECKING:
 @click.option(
     "--min-margin",
     type=SHARE,
-    help="Relative margin below which a step is near-singular, e.g. 3%; by default 1%.",
+    help="Minimum relative margin: samples below it are near-singular, and fixes keep it, e.g. 3%.",
+    show_default="1%",
 )
 @deflection_solver_option
 @click.option(
     "--plot",
     "plot_folder",
     type=FOLDER,
-    help="Also draw each stiffness inside its reachable range there, as png.",
+    help="Save figures of each stiffness within its attainable range in this folder, as PNG.",
 )
-@click.option("--fixes", "list_fixes", is_flag=True, help="Also list fixes, the smallest change first.")
+@click.option("--fixes", "list_fixes", is_flag=True, help="List fixes as well, the smallest change first.")
 @click.option(
     "--write-fix",
     "number",
     metavar="N",
     type=click.IntRange(min=1),
-    help="Write the fix with this number in the list to -o FILE; implies --fixes.",
+    help="Write fix N of the list to the file of -o; implies --fixes.",
 )
 @click.option(
     "-o",
     "--output",
     type=YAML_FILE,
-    help="Trajectory file for --write-fix N. A CSV file next to it holds signals without a formula, and"
-    " FILE-robot.yaml the robot, if its branch changes.",
+    help="Trajectory file for --write-fix. Signals without a formula go to a CSV file next to it, and "
+    "a robot whose branch changes to FILE-robot.yaml.",
 )
 @overwrite_option
 @engine_options
@@ -89,14 +90,14 @@ def check_feasibility(
     threads: int | None,
     talk: Talk,
 ) -> int:
-    """Say whether ROBOT can execute TRAJECTORY, without computing a result file.
+    """Check whether ROBOT can execute TRAJECTORY, and print the report of invdyn without a result file.
 
-    The same computation as invdyn, and the same report. Exit code 0 if every step is feasible, regular and
-    within limits, and a record, if there is one, determines that; else 3.
+    Exit code 0 if every sample is feasible, regular and within limits, and the recording, if there is one,
+    determines that reliably; else 3.
 
-    --fixes lists changes that make it executable: a slower motion, another stiffness (by a constant or as a
-    smooth profile), another branch, or several of these, so that every sample keeps --min-margin and all
-    limits. The smallest change comes first; each is confirmed by a run. --write-fix N -o FILE writes the
+    --fixes lists changes that make the motion executable: a slower motion, another stiffness (a constant or
+    a smooth profile), another branch, or several of these, so that every sample keeps --min-margin and all
+    limits. The smallest change comes first, and each is confirmed by a run. --write-fix N -o FILE writes the
     trajectory with fix N of the list.
     """
     if number is not None and output is None:

@@ -15,26 +15,27 @@ from vsacli.cli.file_names import FOLDER
     epilog=example("vsacli codegen robots/vsa_3r.yaml -o controller"),
 )
 @robot_argument
-@click.option("-o", "--output", type=FOLDER, required=True, help="Folder for the code.")
+@click.option("-o", "--output", type=FOLDER, required=True, help="Folder for the generated code.")
 @click.option(
     "--precision",
     type=click.Choice(["double", "float"]),
     default="double",
     show_default=True,
-    help="Type of all numbers; float is refused where it would spoil the results.",
+    help="Floating-point type of the code; float is refused if rounding would make results too inaccurate.",
 )
 @click.option(
     "--wrench",
     metavar="FRAME",
     type=click.Choice(["end_effector", "base"]),
-    help="Take a wrench at the end effector as input, along the axes of this frame.",
+    help="Add a wrench at the end effector as an input, in the axes of this frame.",
 )
 @click.option(
     "--parameters",
     "patterns",
     metavar="GLOB",
     multiple=True,
-    help="Take the numbers whose paths fit as inputs, e.g. 'joints.*.link.mass'; may be given several times.",
+    help="Make the robot parameters whose paths match this pattern inputs of the functions, e.g. "
+    "'joints.*.link.mass'; may be repeated.",
 )
 @click.option("--no-loops", is_flag=True, help="Refuse joints whose springs are solved by iteration.")
 @overwrite_option
@@ -49,11 +50,11 @@ def codegen(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Write C code for link torques, inverse dynamics and feedback linearization of ROBOT.
+    """Generate C code for link torques, inverse dynamics and feedback linearization of ROBOT.
 
-    C99 that needs nothing but math.h: no allocation, nothing kept between calls, a bounded number of
-    operations. A test program with reference values, a Makefile, CMake's file, a Python module that calls
-    the code, and a README come along.
+    The code is C99 and requires only math.h: no memory allocation, no state between calls, a bounded number
+    of operations. The folder also contains a test program with reference values, a Makefile, a CMake file, a
+    Python module that calls the code, and a README.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write

@@ -48,7 +48,8 @@ def variables_option(default: str) -> Callable[[Any], Any]:
         "--variables",
         metavar="NAMES",
         callback=words_of("tau_motor,flags"),
-        help=f"Only these variables, e.g. tau_motor,flags; by default {default}.",
+        help="Write only these variables, e.g. tau_motor,flags.",
+        show_default=default,
     )
 
 
@@ -72,19 +73,20 @@ def example(command: str) -> str:
 robot_argument = click.argument("robot", type=FILE)
 trajectory_argument = click.argument("trajectory", type=FILE)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+overwrite_option = click.option("--overwrite", is_flag=True, help="Replace output files that exist.")
 deflection_solver_option = click.option(
     "--deflection-solver",
     type=Words(["root", "ode"]),
     default="root",
     show_default=True,
-    help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
+    help="Method for the deflections: solve for the root at each sample, or integrate an ODE from the "
+    "first sample, which drifts.",
 )
 columns_option = click.option(
     "--columns",
     type=FILE,
-    help="What columns with other names stand for, and which to ignore; `vsacli info` of a recording makes "
-    "such a file.",
+    help="YAML file that maps the columns of the recording to signals, and lists columns to ignore; "
+    "`vsacli info RECORDING --field mapping` prints one to begin with.",
 )
 format_option = click.option(
     "--format",
@@ -92,9 +94,9 @@ format_option = click.option(
     type=click.Choice(["png", "pdf", "svg", "html"]),
     default="png",
     show_default=True,
-    help="Format of the figures; html is one page of everything.",
+    help="Format of the figures; html writes everything to one page.",
 )
-stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
+stop_option = click.option("--stop-on-infeasible", is_flag=True, help="Stop at the first infeasible sample.")
 
 
 set_option = click.option(
@@ -102,8 +104,8 @@ set_option = click.option(
     "changes",
     metavar="PATH=VALUE",
     multiple=True,
-    help="Another value in the robot or the trajectory, e.g. joints.*.link.mass=2.5 or duration=3; may be "
-    "given several times.",
+    help="Override a value of the robot or the trajectory, e.g. joints.*.link.mass=2.5 or duration=3; "
+    "may be repeated.",
 )
 
 
@@ -123,7 +125,7 @@ engine_option = click.option(
     type=click.Choice(["numpy", "c", "auto"]),
     default="auto",
     show_default=True,
-    help="What computes: NumPy, or code from a C compiler; auto takes what is faster.",
+    help="Backend of the computation: NumPy, or compiled C; auto chooses the faster one.",
 )
 
 
@@ -133,7 +135,8 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
         "--threads",
         type=click.IntRange(min=1),
         metavar="N",
-        help="Threads of compiled code; by default one a processor.",
+        help="Number of threads of the compiled code.",
+        show_default="number of CPU cores",
     )
     return engine_option(threads(command))
 

@@ -43,12 +43,14 @@ overflows."""
     "--time-offset",
     metavar="SECONDS",
     type=float,
-    help="Time in the recording at which the result begins, positive if the recording starts earlier; by "
-    "default found from the signals.",
+    help="Time in the recording at which the result begins; positive if the recording starts earlier.",
+    show_default="estimated from the signals",
 )
 @columns_option
 @json_option
-@click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and computed signals there.")
+@click.option(
+    "--plot", "folder", type=FOLDER, help="Save figures of measured and computed signals in this folder."
+)
 @format_option
 @overwrite_option
 @talk_options
@@ -63,15 +65,15 @@ def compare(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Compare a RESULT, or a simulation, with a RECORDING of the same motion, a CSV file.
+    """Compare RESULT, the file of a result or a simulation, with RECORDING, a CSV file of the same motion.
 
-    Its column `time` may begin anywhere and have steps of its own. Columns are named as `vsacli export` names
-    them, elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor's side of its gear; a unit in
-    brackets may follow. Others are left out, unless --columns says what they stand for.
+    The column `time` of the recording may start at any time and have its own sampling rate. Columns have the
+    names of `vsacli export`: elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor side of the
+    gear; a unit in brackets may follow. Other columns are ignored unless --columns maps them.
 
-    A column such as q_measured, a sensor's reading, goes before q. Commands, such as q_ref, are left out. The
-    report gives, for each signal, the error, and gain and offset of measured over computed values and the lag
-    behind the others, each with its standard error.
+    A sensor reading such as q_measured is preferred to q. Commands such as q_ref are ignored. For each
+    signal, the report gives the error, gain and offset of measured over computed values, and the lag relative
+    to the other signals, each with its standard error.
     """
     check_plotted(folder)
     from vsacli.base.outputs import Outputs

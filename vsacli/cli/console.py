@@ -50,7 +50,7 @@ class Exit(enum.IntEnum):
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
     INTERRUPTED = 130, "interrupted (Ctrl-C); the target is untouched"
-    CUT_OFF = 141, "data on standard output was cut off: its reader has gone, as `head` does"
+    CUT_OFF = 141, "standard output was closed by its reader, as `head` does"
     TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 
     def __new__(cls, code: int, meaning: str) -> Self:
@@ -241,8 +241,8 @@ class Talk:
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--quiet` and `--verbose`, passed to the command as one argument `talk`; refuse empty arguments."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="No notes and no progress bar on stderr.")
-    @click.option("-v", "--verbose", is_flag=True, help="More notes on stderr.")
+    @click.option("-q", "--quiet", is_flag=True, help="Suppress notes and the progress bar on stderr.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print more notes on stderr.")
     @wraps(command)
     def talking(*args: Any, quiet: bool, verbose: bool, **kwargs: Any) -> Any:
         _refuse_empty_texts(click.get_current_context())

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     epilog=example("vsacli examples puma_560 scara_4 --copy my-robots"),
 )
 @click.argument("names", metavar="[ROBOT]...", nargs=-1)
-@click.option("--copy", "folder", type=FOLDER, help="Copy them there instead.")
+@click.option("--copy", "folder", type=FOLDER, help="Copy the files to this folder instead of listing them.")
 @overwrite_option
 @talk_options
 def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: Talk) -> None:
-    """List the robots that come along, all or those named, each with the trajectories made for it.
+    """List the bundled robots, all or those named, each with the trajectories made for it.
 
-    With --copy, they go into robots/ and trajectories/ of a folder together with the tables they need;
-    without names, every file that comes along does. Nothing is copied if one of the files exists there,
-    unless --overwrite.
+    With --copy, write them to robots/ and trajectories/ of a folder together with the tables that they need;
+    without names, write all bundled files. Nothing is written if one of the files exists, unless --overwrite
+    is given.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.files.examples import copy_examples

@@ -48,38 +48,44 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
 @click.argument("file", type=FILE)
-@click.option("-o", "--output", type=FILE, help="File to write; by default standard output, for text.")
+@click.option(
+    "-o", "--output", type=FILE, help="File to write.", show_default="standard output, for text formats"
+)
 @click.option(
     "--format",
     "form",
     type=click.Choice((*OF_RESULTS, *OF_ROBOTS)),
-    help="Of a result: CSV, a MATLAB file, Parquet, or a JointTrajectory of ROS 2; of a robot: URDF, or "
-    "MJCF, the XML of MuJoCo. By default what the name of the output ends with, else CSV.",
+    help="Format. Results: CSV, MATLAB file, Parquet, or JointTrajectory of ROS 2. Robots: URDF, or "
+    "MJCF, the XML format of MuJoCo.",
+    show_default="extension of the output file, else csv",
 )
 @variables_option(
-    "tau_motor, of a simulation q, stiffness, tau_motor; of a joint-trajectory what it has fields for, q, "
-    "dq, ddq, tau_e"
+    "tau_motor; of a simulation q, stiffness, tau_motor; of a joint-trajectory q, dq, ddq, tau_e"
 )
 @click.option(
     "--rate",
     metavar="HZ",
     type=float,
-    help="Samples per second; a motion known at its samples alone needs a whole fraction of the stored rate.",
+    help="Sampling rate of the exported values; a motion known only at its samples requires an "
+    "integer fraction of the stored rate.",
+    show_default="all stored samples",
 )
 @click.option(
     "--side",
     type=click.Choice(["joint", "motor"]),
     default="joint",
     show_default=True,
-    help="Of the gear, on which motion and torque of the motors are given.",
+    help="Side of the gear at which motor motion and torque are given.",
 )
 @click.option(
-    "--allow-nan", is_flag=True, help="Leave values out where there are none, and export infinite ones."
+    "--allow-nan",
+    is_flag=True,
+    help="Export missing and infinite values as well; missing ones are left empty.",
 )
 @click.option(
     "--start",
     type=FILE,
-    help="Of a robot as MJCF: add a key frame, `start`, with the first step of this result.",
+    help="Result whose first sample becomes the key frame `start` of an MJCF model.",
 )
 @overwrite_option
 @talk_options
@@ -92,19 +98,19 @@ def export(
     talk: Talk,
     **of_results: Any,
 ) -> int:
-    """Write variables of a result or a simulation, or a robot, for other programs.
+    """Export variables of a result or a simulation, or a robot, for other programs.
 
-    By default these are the motor torques to send; of a simulation, its motion, stiffness and motor
+    Without --variables, a result gives its motor torques, and a simulation its motion, stiffness and motor
     torques.
 
-    Refuses samples that have no value (infeasible or singular steps) or an infinite one with exit code 3 and
-    writes nothing, unless --allow-nan.
+    Samples without a value (infeasible or singular ones) or with an infinite value are refused with exit code
+    3, and nothing is written, unless --allow-nan is given.
 
-    With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
-    every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
+    With --side motor, motion and torque of the motors are those of the motor shafts, in rad and N m at every
+    joint; every motor needs a gear_ratio in the robot file. Other variables do not change.
 
-    Of a robot, URDF holds links and joints. MJCF holds motors and springs as well; forces for which it has no
-    place go to a Python file beside it, FILE_forces.py.
+    A URDF file holds links and joints. An MJCF file holds motors and springs as well; forces that MJCF cannot
+    express are written to the Python file FILE_forces.py.
     """
     from vsacli.files.file_kinds import FileKind, recognize
 

@@ -33,45 +33,55 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
     "--fit",
     metavar="NAMES",
     callback=words_of("springs,motors"),
-    help="What to find, of springs, motors, friction, links; or paths such as "
-    "'joints.*.actuator.spring.k'. All by default.",
+    help="Parameters to identify: springs, motors, friction, links, or paths such as "
+    "'joints.*.actuator.spring.k'.",
+    show_default="all",
 )
 @click.option(
     "--bandwidth",
     metavar="HZ",
     type=click.FloatRange(min=0, min_open=True),
-    help="Of the filter that all signals pass; by default half as much again as the motion has.",
+    help="Bandwidth of the filter that is applied to all signals.",
+    show_default="1.5 times the bandwidth of the motion",
 )
 @columns_option
 @click.option(
     "--plan",
     "planned",
     is_flag=True,
-    help="Plan a trajectory to record instead, within all limits; beside one of yours, if one is given.",
+    help="Plan a trajectory to record instead, within all limits, and compare it with TRAJECTORY if given.",
 )
 @click.option(
     "--duration",
     metavar="SECONDS",
     type=float,
-    help=f"Of the planned trajectory; {USUAL_DURATION:g} s by default.",
+    help="Duration of the planned trajectory.",
+    show_default=f"{USUAL_DURATION:g}",
 )
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
     callback=numbers,
-    help="With --plan, standard deviation of measured positions, and of measured motor torques, for which "
-    "standard errors are predicted; by default 2e-5 and 0.5 % of the largest torque of each motor.",
+    help="With --plan: standard deviation of measured positions in rad and of measured motor torques "
+    "in N m, from which standard errors are predicted.",
+    show_default="2e-5 and 0.5% of the peak torque of each motor",
 )
 @click.option(
-    "--seed", metavar="N", type=click.IntRange(min=0), help="Of the search of --plan; 0 by default."
+    "--seed",
+    metavar="N",
+    type=click.IntRange(min=0),
+    help="With --plan: seed of the random search.",
+    show_default="0",
 )
 @click.option(
     "-o",
     "--output",
     type=YAML_FILE,
-    help="Write the robot file with the numbers found; with --plan, the trajectory.",
+    help="Write the robot file with the identified parameters; with --plan, the trajectory.",
 )
-@click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques there.")
+@click.option(
+    "--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques in this folder."
+)
 @format_option
 @json_option
 @overwrite_option
@@ -93,18 +103,19 @@ def identify(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Find springs, motors, friction and links of ROBOT from RECORDINGs of its motion, CSV files.
+    """Identify springs, motors, friction and links of ROBOT from RECORDINGs of its motion, CSV files.
 
-    Columns are named as `vsacli export` names them: elbow.q, elbow.theta_1, elbow.tau_motor_1, or
-    elbow.tau_motor_shaft_1 and elbow.current_1 where the robot file has gear ratio and torque constant; a
-    unit in brackets may follow, and cells may be empty where a column has no sample. --columns says what
-    columns with other names stand for.
+    Columns have the names of `vsacli export`: elbow.q, elbow.theta_1, elbow.tau_motor_1, or
+    elbow.tau_motor_shaft_1 and elbow.current_1 if the robot file has gear ratio and torque constant. A unit
+    in brackets may follow. Cells may be empty where a column has no sample. --columns maps other names.
 
-    The report gives each number with its standard error, what cannot be told apart, and what the equations
-    leave beside the noise, on parts of the records, too, that the fit did not see.
+    The report gives each parameter with its standard error, the parameters that are unidentifiable, and the
+    residuals of the equations compared with the noise, also on parts of the recordings that the fit did not
+    use.
 
-    With --plan it says instead which motion and stiffness to record so that the numbers can be told, within
-    all limits of ROBOT and from rest to rest. What follows ROBOT is then a TRAJECTORY of yours, to compare.
+    With --plan, the command plans the motion and stiffness to record, so that the parameters are
+    identifiable, within all limits of ROBOT and from rest to rest. A TRAJECTORY after ROBOT is then compared
+    with the plan.
     """
     check_plotted(folder)
     if planned:

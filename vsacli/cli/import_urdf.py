@@ -42,44 +42,60 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     epilog=example("vsacli import-urdf robots/desk_arm.urdf --tip flange -o desk_arm.yaml"),
 )
 @click.argument("urdf", type=FILE)
-@click.option("--base", metavar="LINK", help="Link that stands still; by default the root.")
-@click.option("--tip", metavar="LINK", help="Link of the end effector; needed if there is a choice.")
-@click.option("--srdf", type=FILE, help="SRDF file, a group of which says base and tip.")
-@click.option("--group", metavar="NAME", help="Which group of it; the only one by default.")
-@click.option("-o", "--output", type=YAML_FILE, help="Robot file; by default URDF.yaml in this folder.")
+@click.option(
+    "--base", metavar="LINK", help="Link that is fixed to the ground.", show_default="the root link"
+)
+@click.option(
+    "--tip", metavar="LINK", help="Link of the end effector; required if the URDF has several candidates."
+)
+@click.option("--srdf", type=FILE, help="SRDF file with a group that names base and tip.")
+@click.option(
+    "--group", metavar="NAME", help="Name of the group in the SRDF file.", show_default="the only group"
+)
+@click.option(
+    "-o",
+    "--output",
+    type=YAML_FILE,
+    help="Robot file to write.",
+    show_default="URDF.yaml in the current folder",
+)
 @click.option(
     "--actuator",
     type=click.Choice(tuple(ACTUATORS)),
     default="antagonistic",
     show_default=True,
-    help="Placeholder: what drives every joint.",
+    help="Placeholder: kind of actuator of every joint.",
 )
 @click.option(
     "--motor-inertia",
     metavar="KG_M2",
     type=float,
-    help="Placeholder: of each motor, joint side of its gear; by default half of what the joint carries.",
+    help="Placeholder: inertia of each motor in kg m^2 (kg), joint side of the gear.",
+    show_default="half the inertia that the joint carries",
 )
 @click.option(
     "--stiffness",
     metavar="NM/RAD",
     type=float,
-    help="Placeholder: of elastic joints, and in the middle of what serial ones reach; by default as stiff "
-    "as what the joint carries asks for.",
+    help="Placeholder: stiffness of elastic joints in N m/rad (N/m), and middle of the attainable "
+    "range of serial ones.",
+    show_default="from the load that the joint carries",
 )
 @click.option(
     "--spring",
     metavar="K,KC",
     callback=_spring,
-    help="Placeholder: cubic springs of antagonistic joints; by default likewise.",
+    help="Placeholder: coefficients of the cubic springs of antagonistic joints, in N m/rad and N m/rad^3.",
+    show_default="from the load that the joint carries",
 )
 @click.option(
     "--hold",
     metavar="JOINT=VALUE",
     multiple=True,
     callback=_hold,
-    help="Where a joint beside the chain stands, in rad or m, or as in elbow='30 deg'; by default at zero. "
-    "May be repeated.",
+    help="Position of a joint outside the chain, in rad or m, or with a unit as in elbow='30 deg'; "
+    "may be repeated.",
+    show_default="0",
 )
 @click.option(
     "--snap",
@@ -87,7 +103,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     type=click.FloatRange(0, 0.1),
     default=1e-4,
     show_default=True,
-    help="Make axes closer to parallel so, if their common normal is far away.",
+    help="Largest angle between axes that are made parallel if their common normal is far away.",
 )
 @overwrite_option
 @talk_options
@@ -107,12 +123,12 @@ def import_urdf(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Make a robot file with standard Denavit-Hartenberg rows from a serial chain of a URDF.
+    """Convert a serial chain of a URDF to a robot file with standard Denavit-Hartenberg rows.
 
-    Links behind fixed joints, and side branches, which stand still, are lumped with the link they hang on.
-    Prints the rows, what was left out or changed, and how far the kinematics deviate from the URDF's. A URDF
-    says nothing about motors and springs: these are placeholders, marked in the file and sized to what each
-    joint carries.
+    Links behind fixed joints, and side branches, whose joints are held, are merged with their parent links.
+    The command prints the rows, the elements that were ignored or changed, and the largest deviation from the
+    kinematics of the URDF. A URDF does not describe motors and springs: the robot file has placeholders,
+    marked as such, which are sized to the load of each joint.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.robot import urdf as conversions

@@ -21,28 +21,30 @@ from vsacli.cli.file_names import FILE, FOLDER
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
 @click.argument("file", type=FILE, required=False)
-@click.option("--robot", type=FILE, help="The robot that a trajectory is for, or a recording of.")
+@click.option("--robot", type=FILE, help="Robot of the trajectory or of the recording.")
 @click.option(
     "--rate",
     metavar="HZ",
     type=float,
-    help="Rows per second of a recording without times.",
+    help="Sampling rate of a recording without a time column.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the description as JSON.")
 @click.option(
     "--field",
     metavar="PATH",
-    help="Print one value of the JSON, e.g. reach.found; entries of lists by number, from 0, by name, "
+    help="Print one value of the JSON, e.g. reach.found; entries of lists by index from 0, by name, "
     "or all by *.",
 )
 @click.option(
     "--extract",
     "folder",
     type=FOLDER,
-    help="Write the files that a result was computed from there instead.",
+    help="Write the input files stored in a result to this folder.",
 )
-@click.option("--cache", is_flag=True, help="Show the cache of compiled code instead, and unfinished files.")
-@click.option("--clear", is_flag=True, help="With --cache: empty it first.")
+@click.option(
+    "--cache", is_flag=True, help="Show the cache of compiled code and unfinished output files instead."
+)
+@click.option("--clear", is_flag=True, help="With --cache: empty the cache first.")
 @talk_options
 def info(
     file: str | None,
@@ -55,17 +57,17 @@ def info(
     clear: bool,
     talk: Talk,
 ) -> None:
-    """Show what a FILE holds: a robot, a trajectory, a recording, a result or a simulation.
+    """Describe the content of FILE: a robot, a trajectory, a recording, a result, a simulation or a study.
 
-    Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
-    trajectory, ranges and peaks; of a recording, a CSV file of any columns, these, its rate, what a sensor or
-    a log file spoiled, and a trajectory file to begin with (--field trajectory, or --field mapping for
-    --columns of other commands); of a result or a simulation, provenance, variables and report; of the table
-    of a study, what it found, provenance and what varies.
+    Robot: Denavit-Hartenberg rows, links, actuators, reach, static load and attainable stiffness.
+    Trajectory: ranges and peaks. Recording (a CSV file with any columns): columns, sampling rate, faults of
+    sensors and logging, and a trajectory file to begin with (--field trajectory, or --field mapping for
+    --columns of other commands). Result or simulation: provenance, variables and report. Table of a study:
+    findings, provenance and varied parameters.
 
-    With --cache, show where compiled code is kept and how much of it, and what interrupted commands have
-    left, or others are still writing, in the folder FILE, by default this one, and in that for temporary
-    files.
+    With --cache, show location and size of the cache of compiled code, and the unfinished output files of
+    interrupted or running commands in the folder FILE (default: the current folder) and in the folder for
+    temporary files.
     """
     if clear and not cache:
         raise click.UsageError("--clear empties the cache; give --cache, too")

@@ -46,14 +46,15 @@ if TYPE_CHECKING:
     "--rate",
     metavar="HZ",
     type=float,
-    help="Samples per second, as --set rate=HZ: of TRAJECTORY, or of a recording without times, at which it "
-    "was made.",
+    help="Sampling rate of the trajectory, or of its recording if that has no time column; same as "
+    "--set rate=HZ.",
 )
 @click.option(
     "-o",
     "--output",
     type=HDF5_FILE,
-    help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder.",
+    help="Result file to write.",
+    show_default="ROBOT-TRAJECTORY.h5 in the current folder",
 )
 @variables_option("all")
 @click.option(
@@ -62,10 +63,13 @@ if TYPE_CHECKING:
     type=click.Choice(["double", "single"]),
     default="double",
     show_default=True,
-    help="In which values are stored: single makes half the file, with 7 digits. All is computed in double.",
+    help="Storage precision; single (7 digits) halves the file. Computation is always in double precision.",
 )
 @click.option(
-    "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
+    "--plot",
+    "plot_folder",
+    type=FOLDER,
+    help="Save the figures of `vsacli plot` in this folder as well, as PNG.",
 )
 @deflection_solver_option
 @json_option
@@ -92,7 +96,7 @@ def invdyn(
 ) -> int:
     """Compute the motor torques with which ROBOT executes TRAJECTORY.
 
-    Writes an HDF5 file with everything that was computed and prints a report: which steps are infeasible,
+    Writes an HDF5 file with all computed variables and prints a report: the samples that are infeasible,
     singular or over a limit, and by how much.
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)

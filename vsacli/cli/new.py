@@ -15,36 +15,36 @@ from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 
 _output_option = click.option(
-    "-o", "--output", type=YAML_FILE, help="File to write; by default standard output."
+    "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
 )
 
 
 @click.group(
     "new",
-    short_help="Create a robot or trajectory file to begin with.",
+    short_help="Create a commented robot or trajectory file.",
     epilog=example("vsacli new robot --joints RR"),
 )
 def new() -> None:
-    """Write a commented robot or trajectory file to begin with."""
+    """Create a commented robot or trajectory file as a starting point."""
 
 
 @new.command(
     "robot",
-    short_help="A robot with these joints.",
+    short_help="Write a robot file with given joints.",
     epilog=example("vsacli new robot --joints RRP -o arm.yaml"),
 )
 @click.option(
     "--joints",
     metavar="LETTERS",
     required=True,
-    help="A letter for each joint from the base to the tip: R (revolute) or P (prismatic).",
+    help="Type of each joint from the base to the tip: R (revolute) or P (prismatic), e.g. RRP.",
 )
 @click.option(
     "--actuator",
     type=click.Choice((*ACTUATORS, *MECHANISMS)),
     default="antagonistic",
     show_default=True,
-    help="What drives the joints: a kind of actuator, or a mechanism of serial ones.",
+    help="Kind of actuator of every joint, or mechanism of serial actuators.",
 )
 @_output_option
 @overwrite_option
@@ -52,9 +52,9 @@ def new() -> None:
 def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk: Talk) -> None:
     """Write a robot file with these joints, to be edited.
 
-    It can be computed with as it is; a profile that it names is written beside it. Each key has a comment;
-    what is optional stands commented out. Reports say that its springs and motors are made up until the key
-    `placeholder` is removed.
+    The file is complete and can be used as it is; a profile that it refers to is written next to it. Each key
+    has a comment, and optional keys are commented out. Reports mark its springs and motors as placeholders
+    until the key `placeholder` is removed.
     """
     from vsacli.files.examples import example_tables
     from vsacli.files.templates import robot_template
@@ -65,17 +65,23 @@ def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk:
 
 @new.command(
     "trajectory",
-    short_help="A trajectory, for a robot of yours or for a new one.",
+    short_help="Write a trajectory file for a robot.",
     epilog=example("vsacli new trajectory --robot robots/rp_2.yaml -o move.yaml"),
 )
-@click.option("--robot", "robot_path", type=FILE, help="The robot that is to execute it.")
+@click.option(
+    "--robot",
+    "robot_path",
+    type=FILE,
+    help="Robot that will execute the trajectory.",
+    show_default="a new robot with revolute joints",
+)
 @_output_option
 @overwrite_option
 @talk_options
 def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk: Talk) -> None:
-    """Write a trajectory file, to be edited: a motion from rest to rest whose torques start without a step.
+    """Write a trajectory file, to be edited: a motion from rest to rest with continuous motor torques.
 
-    Its numbers suit the joints, limits and springs of the robot; without one, those of a new robot with
+    Its values suit the joints, limits and springs of the robot; without --robot, those of a new robot with
     revolute joints.
     """
     from vsacli.files.templates import trajectory_template

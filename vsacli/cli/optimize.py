@@ -51,26 +51,32 @@ CHANGE, PACE = "optimum", "pace"
     type=Words(["torque", "energy", "copper_loss", "peak", "time"]),
     default="torque",
     show_default=True,
-    help="Rms of motor torques, energy that motors spend, heat of their windings, peak of torques, duration.",
+    help="Objective: rms of the motor torques, positive motor work, copper loss of the windings, peak "
+    "motor torque, or duration.",
 )
 @click.option(
     "--vary",
     type=click.Choice(["stiffness", "timing", "both"]),
-    help="What may change: by default the stiffness, for time the timing.",
+    help="Decision variables: stiffness profile, timing, or both.",
+    show_default="stiffness; timing for --minimize time",
 )
 @click.option(
     "--min-margin",
     type=SHARE,
-    help="Relative margin that every step shall keep to the ends of its corridor, e.g. 3%; by default 1%.",
+    help="Minimum relative margin of every sample to the ends of its attainable stiffness range, e.g. 3%.",
+    show_default="1%",
 )
 @click.option(
     "-o",
     "--output",
     type=YAML_FILE,
-    help="Write the best trajectory, with a CSV beside it for what is no formula.",
+    help="Write the best trajectory; signals without a formula go to a CSV file next to it.",
 )
 @click.option(
-    "--plot", "folder", type=FOLDER, help="Save figures of stiffness, torques and pace there, as png."
+    "--plot",
+    "folder",
+    type=FOLDER,
+    help="Save figures of stiffness, torques and timing in this folder, as PNG.",
 )
 @click.option(
     "--seed",
@@ -78,7 +84,7 @@ CHANGE, PACE = "optimum", "pace"
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Of the starts drawn.",
+    help="Seed of the random initial guesses.",
 )
 @json_option
 @overwrite_option
@@ -97,10 +103,10 @@ def optimize(
     overwrite: bool,
     talk: Talk,
 ) -> Exit:
-    """Find the stiffness or the pace with which ROBOT executes TRAJECTORY at the least cost, or fastest.
+    """Optimize the stiffness or the timing with which ROBOT executes TRAJECTORY.
 
-    Unless time is minimized, the motion takes as long as commanded. Every step keeps the margin and all
-    limits. What is found is a local optimum; the report says from how many starts the search came to it.
+    The duration stays as commanded unless --minimize time is given. Every sample keeps the minimum margin and
+    all limits. The result is a local optimum; the report gives the number of initial guesses that led to it.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next
     inputs = load_inputs(robot, trajectory, talk, changes)

@@ -36,24 +36,33 @@ RECORDING = "recording"
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
 @click.option(
-    "-o", "--output", "folder", type=FOLDER, default=".", help="Where to save; by default this folder."
+    "-o", "--output", "folder", type=FOLDER, default=".", help="Folder for the figures.", show_default=True
 )
 @format_option
-@click.option("--from", "start", metavar="SECONDS", type=float, help="First time to show.")
-@click.option("--to", "end", metavar="SECONDS", type=float, help="Last time to show.")
+@click.option(
+    "--from",
+    "start",
+    metavar="SECONDS",
+    type=float,
+    help="First time to draw.",
+    show_default="start of the file",
+)
+@click.option(
+    "--to", "end", metavar="SECONDS", type=float, help="Last time to draw.", show_default="end of the file"
+)
 @click.option(
     "--joints",
     metavar="NAMES",
     callback=words_of("shoulder,elbow"),
-    help="Only these joints, e.g. shoulder,elbow.",
+    help="Draw only these joints, e.g. shoulder,elbow.",
 )
 @click.option(
     "--variables",
     metavar="NAMES",
     callback=words_of("theta,dtheta"),
-    help="A figure of each of these variables instead, e.g. theta,dtheta.",
+    help="Draw one figure for each of these variables instead, e.g. theta,dtheta.",
 )
-@click.option("--robot", type=FILE, help="The robot that a recording is of.")
+@click.option("--robot", type=FILE, help="Robot of the recording, for joint names.")
 @overwrite_option
 @talk_options
 def plot(
@@ -68,29 +77,29 @@ def plot(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw the figures of a result, a simulation or a recording, or compare several results.
+    """Draw the figures of a result, a simulation, a recording or a study, or compare several results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
     <stem>-losses if the robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage
-    if its motors have what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give
-    one figure <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid
-    joint by joint, and what they differ by from the first.
+    if its motors have the constants for them; results of robots with dampers give <stem>-damper. Two or more
+    FILEs give one figure <stem>-<stem>-compare: motor torques of results, or position errors of simulations,
+    overlaid joint by joint, and their differences from the first.
 
     A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
-    signal, the spline that stands for them, the residual and the spectra of both. So does a result of one.
-    Joints have the names of the columns, or those of --robot.
+    signal, the fitted spline, the residual and the spectra of both. A result computed from a recording gives
+    it as well. Joints have the names of the columns, or of --robot.
 
     With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
 
-    The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
-    <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
-    Where runs were optimized, <stem>-cost is in place of the first two.
+    The table of a study gives <stem>-margin (margin over the varied parameters), <stem>-pareto (cost over
+    margin) and <stem>-feasibility (share of runs with at least a given margin, compared if there are several
+    tables). Where runs were optimized, <stem>-cost replaces the first two.
 
-    --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
-    plots of every variable, and the robot at the time cursor; for results that fail the fixes, as
-    check-feasibility --fixes lists them; of several FILEs their differences, too; of studies margin and cost
-    of each run. It needs the package bokeh: pip install bokeh.
+    --format html writes one page <stem>.html for a browser, without network access: the report, zoomable
+    plots of every variable, and the robot at the time cursor; for results that fail, the fixes of
+    check-feasibility --fixes; for several FILEs, their differences; for studies, margin and cost of each run.
+    It requires the package bokeh: pip install bokeh.
     """
     from vsacli.base.outputs import Outputs
 

@@ -16,7 +16,7 @@ from vsacli.cli.command_parts import example
 )
 @click.argument("kind", type=click.Choice(["robot", "trajectory", "poles", "study", "columns"]))
 def schema(kind: str) -> None:
-    """Print the JSON Schema of a YAML format, with which editors complete keys and mark mistakes."""
+    """Print the JSON Schema of a YAML format, for editors that complete keys and mark errors."""
     from vsacli.files.file_kinds import DOCUMENTS
 
     click.echo(json.dumps(DOCUMENTS[kind].schema(), indent=1))

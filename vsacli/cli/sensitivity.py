@@ -47,20 +47,22 @@ SHOWN_FROM = 20_000
     "patterns",
     metavar="GLOB",
     multiple=True,
-    help="Only numbers whose paths fit, e.g. 'joints.*.actuator.spring.*'; may be given several times.",
+    help="Include only parameters whose paths match this pattern, e.g. 'joints.*.actuator.spring.*'; "
+    "may be repeated.",
 )
 @click.option(
     "--tolerances",
     metavar="SHARE|FILE",
     type=FILE,
-    help="How uncertain the numbers are: 5%, or a YAML file such as 'joints.*.link.mass: {normal: 2 %}'.",
+    help="Uncertainty of the parameters: a share for all, e.g. 5%, or a YAML file with lines such as "
+    "'joints.*.link.mass: {normal: 2 %}'.",
 )
 @click.option(
     "--monte-carlo",
     "runs",
     metavar="N",
     type=click.IntRange(min=2),
-    help="Compute so many robots drawn from the tolerances as well.",
+    help="Number of robots drawn at random from the tolerances and computed as well.",
 )
 @click.option(
     "--seed",
@@ -68,10 +70,15 @@ SHOWN_FROM = 20_000
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of these draws.",
+    help="Seed of the random draws of --monte-carlo.",
 )
-@click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time as HDF5.")
-@click.option("--plot", "folder", type=FOLDER, help="Save figures of the ranking, and of the bands, there.")
+@click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time to this HDF5 file.")
+@click.option(
+    "--plot",
+    "folder",
+    type=FOLDER,
+    help="Save figures of the ranking and of the tolerance bands in this folder.",
+)
 @json_option
 @overwrite_option
 @talk_options
@@ -89,10 +96,10 @@ def sensitivity(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Say how much motor torques, margins and energy of TRAJECTORY depend on each number of ROBOT.
+    """Rank the parameters of ROBOT by their effect on motor torques, margins and energy of TRAJECTORY.
 
-    The table begins with the number of which a change of 1 % (1 mm, 1 degree) moves a motor torque most.
-    With --tolerances it says how far torques and margins may be off.
+    The table begins with the parameter of which a change of 1 % (1 mm, 1 degree) changes a motor torque most.
+    With --tolerances the report also gives the resulting uncertainty of torques and margins.
     """
     if runs is not None and tolerances is None:
         raise click.UsageError("--monte-carlo draws from tolerances: give --tolerances, e.g. 2%")

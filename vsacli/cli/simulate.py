@@ -77,81 +77,112 @@ class Options(NamedTuple):
     type=click.Choice(["feedforward", FEEDBACK_LINEARIZATION]),
     default="feedforward",
     show_default=True,
-    help="What sets the motor torques.",
+    help="Controller that computes the motor torques.",
 )
 @click.option(
     "--poles",
     metavar="POLES",
     type=FILE,
-    help="Poles of the position error in 1/s, e.g. -20,-21,-10+5j,-10-5j, one number for all, or a YAML "
-    "file with those of each joint; by default -20.",
+    help="Poles of the position error in 1/s, e.g. -20,-21,-10+5j,-10-5j, one number for all, or a "
+    "YAML file with the poles of each joint.",
+    show_default="-20",
 )
 @click.option(
-    "--stiffness-poles", metavar="POLES", type=FILE, help="Poles of the stiffness error; by default -20."
+    "--stiffness-poles",
+    metavar="POLES",
+    type=FILE,
+    help="Poles of the stiffness error in 1/s, in the same form.",
+    show_default="-20",
 )
 @click.option(
-    "--integral", is_flag=True, help="Add integral action, which takes one more pole of each error."
+    "--integral", is_flag=True, help="Add integral action, which requires one more pole for each error."
 )
 @click.option(
-    "--initial-error", metavar="RAD", default="0", callback=numbers, help="Of q, for all joints or for each."
+    "--initial-error",
+    metavar="RAD",
+    default="0",
+    callback=numbers,
+    help="Initial position error in rad (m), for all joints or for each.",
+    show_default=True,
 )
 @click.option(
-    "--initial-stiffness-error", metavar="NM/RAD", default="0", callback=numbers, help="Of the stiffness."
+    "--initial-stiffness-error",
+    metavar="NM/RAD",
+    default="0",
+    callback=numbers,
+    help="Initial stiffness error in N m/rad (N/m), for all joints or for each.",
+    show_default=True,
 )
 @click.option(
     "--perturb",
     type=SHARE,
     default=0.0,
     help="Largest relative error of each parameter of the controller's model, e.g. 5%.",
+    show_default="0%",
 )
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
     callback=numbers,
-    help="Standard deviation of measured positions, and of measured motor torques, e.g. 2e-5,0.5; adds "
-    "q_measured, theta_measured and tau_motor_measured to the result.",
+    help="Standard deviation of measured positions in rad and of measured motor torques in N m, e.g. "
+    "2e-5,0.5; adds q_measured, theta_measured and tau_motor_measured to the result.",
 )
 @click.option(
     "--encoder-bits",
     metavar="N",
     type=int,
-    help="Measured positions have 2^N steps in a turn of the joint, or of the motor's shaft; adds the same.",
+    help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds the "
+    "same variables.",
 )
 @click.option(
-    "--seed", metavar="N", type=int, default=0, show_default=True, help="Of errors of the model and noise."
+    "--seed",
+    metavar="N",
+    type=int,
+    default=0,
+    show_default=True,
+    help="Seed of the random model errors and sensor noise.",
 )
 @click.option(
     "--feedback",
     type=click.Choice(["state", "positions"]),
     default="state",
     show_default=True,
-    help="What the controller knows; of positions it takes samples, and filtered differences for rates.",
+    help="Feedback of the controller: the full state, or sampled positions with filtered differences "
+    "as velocities.",
 )
 @click.option(
     "--goal-tolerance",
     metavar="SHARE|RAD",
     default="1%",
     show_default=True,
-    help="How far off joints may be at the end: a share of each one's range, plus 1e-3 rad (m), or a number "
-    "in rad (m).",
+    help="Largest position error at the end: a share of the range of each joint, plus 1e-3 rad (m), "
+    "or a number in rad (m).",
 )
-@click.option("--rtol", type=float, default=1e-9, show_default=True, help="Of the integration, relative.")
-@click.option("--atol", type=float, default=1e-10, show_default=True, help="Of the integration, absolute.")
+@click.option(
+    "--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance of the integrator."
+)
+@click.option(
+    "--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance of the integrator."
+)
 @click.option(
     "--budget",
     metavar="N",
     type=int,
-    help="Evaluations of the equations of motion after which a run ends, incomplete; by default 200000, or "
-    "100 a step if that is more.",
+    help="Maximum number of evaluations of the equations of motion; a run that needs more ends incomplete.",
+    show_default="200000, or 100 per sample if larger",
 )
 @click.option(
     "-o",
     "--output",
     type=HDF5_FILE,
-    help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder.",
+    help="Simulation file to write.",
+    show_default="ROBOT-TRAJECTORY-simulation.h5 in the current folder",
 )
 @click.option(
-    "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
+    "--plot",
+    "plot_folder",
+    type=FOLDER,
+    help="Save the figures of `vsacli plot` in this folder as well, as PNG.",
 )
 @json_option
 @overwrite_option
@@ -169,10 +200,10 @@ def simulate(
     talk: Talk,
     **choices: Any,
 ) -> int:
-    """Integrate the full dynamics of ROBOT while a controller makes it follow TRAJECTORY.
+    """Simulate the full dynamics of ROBOT while a controller makes it follow TRAJECTORY.
 
-    Writes an HDF5 file with simulated and commanded motion, and prints a report of the errors. Motors give at
-    most their max_torque. A run ends early where a decoupling matrix becomes singular or a spring leaves the
+    Writes an HDF5 file with simulated and commanded motion, and prints a report of the errors. Motor torques
+    saturate at max_torque. A run ends early where a decoupling matrix becomes singular or a spring leaves the
     range of its law.
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)

@@ -28,23 +28,27 @@ if TYPE_CHECKING:
 @click.option(
     "--catalog",
     type=FILE,
-    help="Motors to choose from, a CSV file; by default the robot's own motors are held to their limits.",
+    help="CSV file of motors to choose from.",
+    show_default="the robot's own motors",
 )
 @click.option(
     "--gear",
     "gears",
     metavar="[JOINT=]RATIOS",
     multiple=True,
-    help="Gears for them, e.g. 50,80,100 or 30..160 or, for one joint, slide=500..3000; by default any.",
+    help="Gear ratios to consider, e.g. 50,80,100 or 30..160, or for one joint slide=500..3000; may "
+    "be repeated.",
+    show_default="any",
 )
 @click.option(
     "--minimize",
     type=Words(["copper_loss", "utilization", "mass"]),
-    help="What the best choice has least of: heat in its windings, the share of its limits that it uses, or "
-    "mass. By default the first if the catalog says enough for it, else the second.",
+    help="Objective of the choice: copper loss of the windings, utilization (largest share of a "
+    "limit), or mass.",
+    show_default="copper_loss if the catalog permits, else utilization",
 )
-@click.option("-o", "--output", type=YAML_FILE, help="Write the robot file with the motors chosen.")
-@click.option("--plot", "folder", type=FOLDER, help="Save a figure of torques over speeds there.")
+@click.option("-o", "--output", type=YAML_FILE, help="Write the robot file with the chosen motors.")
+@click.option("--plot", "folder", type=FOLDER, help="Save a figure of torque over speed in this folder.")
 @json_option
 @overwrite_option
 @talk_options
@@ -60,12 +64,13 @@ def size(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Say what TRAJECTORIES ask of motors, gears and springs of ROBOT, and which of a catalog would do.
+    """Compute the torque, speed and power that TRAJECTORIES require of ROBOT, and select its motors.
 
-    Peaks are the largest of all trajectories, root mean squares are over all of them, one after the other as
-    a cycle that repeats. Motors are held to their peak and continuous torque or current, speed and voltage.
+    Peaks are the largest of all trajectories. Root mean squares are over all trajectories, one after the
+    other, as a cycle that repeats. Motors are compared with their limits of peak and continuous torque or
+    current, speed and voltage.
 
-    Exit code 3 if nothing does for some motor, or if steps were left out since they cannot be done.
+    Exit code 3 if no choice meets the requirements of a motor, or if infeasible samples were ignored.
     """
     if catalog is None and output is not None:
         raise click.UsageError("--output is for the motors chosen from a catalog: give --catalog")

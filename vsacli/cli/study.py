@@ -34,32 +34,38 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
     epilog=example("vsacli study yield.yaml -o yield.h5"),
 )
 @click.argument("files", type=FILE, metavar="STUDY", nargs=-1, required=True)
-@click.option("-o", "--output", type=HDF5_FILE, help="Table; by default STUDY.h5 in this folder.")
+@click.option(
+    "-o", "--output", type=HDF5_FILE, help="Table to write.", show_default="STUDY.h5 in the current folder"
+)
 @click.option(
     "--processes",
     metavar="N",
     type=click.IntRange(min=1),
-    help="How many compute; by default one a processor. The table is the same for any number.",
+    help="Number of worker processes; the table does not depend on it.",
+    show_default="number of CPU cores",
 )
 @click.option(
     "--shard",
     metavar="K/N",
     callback=_shard,
     default="1/1",
-    help="Compute part K of N, e.g. as one job of N; by default into STUDY-K-of-N.h5.",
+    help="Compute part K of N, e.g. as one of N jobs, and write STUDY-K-of-N.h5.",
+    show_default="the whole study",
 )
 @click.option(
     "--dask",
     metavar="ADDRESS",
-    help="Compute on the workers of a Dask cluster: address of its scheduler, or local for processes here.",
+    help="Compute on the workers of a Dask cluster: address of its scheduler, or `local` for "
+    "processes on this computer.",
 )
-@click.option("--merge", is_flag=True, help="Put tables of all parts together, given in place of STUDY.")
+@click.option("--merge", is_flag=True, help="Merge tables of all parts, given in place of STUDY.")
 @click.option(
     "--engine",
     type=click.Choice(["numpy", "c", "auto"]),
     default="numpy",
     show_default=True,
-    help="What computes: NumPy, or C code, compiled for each robot; auto takes what is faster, once for all.",
+    help="Backend of the computation: NumPy, or C code compiled for each robot; auto chooses the "
+    "faster one once for all runs.",
 )
 @json_option
 @overwrite_option
@@ -76,11 +82,11 @@ def study(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Compute the runs of a STUDY file, and write a table with a row for each.
+    """Compute all runs of the file STUDY, and write a table with one row for each.
 
-    Rows that are finished are kept in FILE.journal until the table is written: after an interruption of any
-    kind, the same command goes on with what is missing. Exit code 0 if every run was computed, whatever its
-    verdict, 3 if one failed; its row says why.
+    Finished rows are kept in FILE.journal until the table is written: after an interruption of any kind, the
+    same command computes only the missing rows. Exit code 0 if every run was computed, whatever its verdict,
+    3 if one failed; its row gives the error.
     """
     if merge:
         return _merge(files, output, overwrite, as_json, talk)

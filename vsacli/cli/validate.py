@@ -23,19 +23,20 @@ if TYPE_CHECKING:
     epilog=example("vsacli validate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="Print what is found as a JSON list.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as a JSON list.")
 @click.option(
     "--recompute",
     is_flag=True,
-    help="Also compute results again from the inputs they hold; exit code 3 if one is not equal.",
+    help="Recompute results from their stored inputs as well; exit code 3 if one differs.",
 )
 @talk_options
 def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk) -> int:
-    """Report everything that is wrong with each FILE.
+    """Report every problem of each FILE.
 
-    Robots, trajectories, poles, CSV tables, URDFs and results are told apart by what they hold. A trajectory,
-    or a file of poles, must fit one of the robots among the files; without any, joint names, units and limits
-    are not checked. Warnings and notes are no problems; with --quiet, only problems are printed.
+    The kind of a file (robot, trajectory, poles, CSV table, URDF, result) is recognized by its content. A
+    trajectory or a file of poles must match one of the robots among the files; without a robot, joint names,
+    units and limits are not checked. Warnings and notes do not count as problems; with --quiet, only problems
+    are printed.
     """
     from vsacli.files.file_kinds import FileKind, recognize
     from vsacli.files.validation import check_files

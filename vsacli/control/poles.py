@@ -26,8 +26,10 @@ class JointPoles:
     """Poles of the errors of a joint."""
 
     name: str = text("name of the joint", identifier=True)
-    position: str = text("poles of the position error, 1/s; one number stands for all of them")
-    stiffness: str = text("poles of the stiffness error, 1/s, likewise", default=DEFAULT)
+    position: str = text("poles of the position error, 1/s; one number applies to all poles")
+    stiffness: str = text(
+        "poles of the stiffness error, 1/s; one number applies to all poles", default=DEFAULT
+    )
 
     def __post_init__(self) -> None:
         check_fields(self, *self._pole_problems())

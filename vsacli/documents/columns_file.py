@@ -51,20 +51,20 @@ class ColumnName(OwnKind):
 class ColumnSource(MappedColumn):
     """A column of a table, with unit and factor of its numbers."""
 
-    column: str | int = value(ColumnName(), "the column")
+    column: str | int = value(ColumnName(), "name or number of the column")
     unit: str | None = text(
-        "unit of its numbers, e.g. deg or ns; by default that in brackets in the header, else that of what it"
-        " stands for",
+        "unit of the values, e.g. deg or ns; by default the unit in brackets in the header, else "
+        "the unit of the signal",
         default=None,
     )
     factor: float = number(
         DIMENSIONLESS,
-        "what its numbers are multiplied by, e.g. -1 or 2*pi/4096",
+        "factor by which the values are multiplied, e.g. -1 or 2*pi/4096",
         check=NON_ZERO,
         default=1.0,
     )
     nanoseconds: str | int | None = value(
-        ColumnName(), "of `time` in whole seconds: the column of the nanoseconds beside it", default=None
+        ColumnName(), "column of nanoseconds that is added to a `time` in whole seconds", default=None
     )
 
     def __post_init__(self) -> None:
@@ -74,7 +74,7 @@ class ColumnSource(MappedColumn):
         if self.unit is not None and {"[", "]"} & set(self.unit):
             yield FieldProblem(("unit",), f"is written without brackets, not {self.unit!r}")
         if self.nanoseconds is not None and (self.unit or self.factor != 1):
-            yield FieldProblem(("nanoseconds",), "stands beside whole seconds, which need no unit or factor")
+            yield FieldProblem(("nanoseconds",), "requires whole seconds, without unit or factor")
 
 
 class Columns(OwnKind):
@@ -106,7 +106,7 @@ class Columns(OwnKind):
         """See `Kind.problems`; each entry has been checked on construction."""
         for name, source in content.items():
             if source.nanoseconds is not None and name != TIME:
-                yield FieldProblem((*path, name), f"only {TIME} has nanoseconds beside it")
+                yield FieldProblem((*path, name), f"only {TIME} may have a column of nanoseconds")
 
     def schema(self, refer: Refer) -> Schema:
         """See `OwnKind.schema`."""
@@ -139,13 +139,16 @@ class Ignored(OwnKind):
 
 def columns_field() -> Any:
     """Declare a field that maps columns."""
-    doc = "what columns with other names stand for, e.g. {time: __time, elbow.q: '/joint_states/position[2]'}"
+    doc = (
+        "mapping from signals to columns with other names, e.g. {time: __time, elbow.q: "
+        "'/joint_states/position[2]'}"
+    )
     return value(Columns(), doc, default=None)
 
 
 def ignore_field() -> Any:
     """Declare a field for columns to leave out."""
-    return value(Ignored(), f"columns to leave out; `{REST}`: all that have no use", default=None)
+    return value(Ignored(), f"columns to ignore; `{REST}`: all columns that are not used", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +158,7 @@ class ColumnsFile:
     columns: Mapping[str, MappedColumn] | None = columns_field()
     ignore: str | tuple[str | int, ...] | None = ignore_field()
     rate: float | None = number(
-        RATE, "rows per second of recordings without times", check=POSITIVE, default=None
+        RATE, "sampling rate of recordings without a time column", check=POSITIVE, default=None
     )
 
     def __post_init__(self) -> None:

@@ -161,7 +161,7 @@ class _Replacement(NamedTuple):
         if kind.item is not None:
             return self._in_list(kind, kind.item, content, words, place)
         if words == ["type"] and "" not in kind.records:
-            reason = f"decides which keys stand beside it; replace {_joined(place)} as a whole"
+            reason = f"determines the other keys; replace {_joined(place)} as a whole"
             raise InputError.one(f"{_joined(place)}.type: {reason}")
         if kind.records:
             return self.in_record(content, words, place)

@@ -194,7 +194,9 @@ BALANCES = {
         Variable("passed_rate", ("joint", "motor"), units.POWER, "its rate, W/s", "(73)-(74)"),
         Variable("spring_error", (), units.DIMENSIONLESS, "largest residual of springs, scaled", "(14)"),
         Variable("shaft_error", (), units.DIMENSIONLESS, "largest residual of shafts, scaled", "(73)-(74)"),
-        Variable("damped_error", ("damped",), units.TORQUE, "residual of springs beside a damper", "(14)"),
+        Variable(
+            "damped_error", ("damped",), units.TORQUE, "residual of springs parallel to a damper", "(14)"
+        ),
         Variable("damped_size", ("damped",), units.TORQUE, "size of the torques that are balanced", "(14)"),
     )
 }

@@ -122,7 +122,7 @@ def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
     for known, (_, command) in kinds.items():
         if found.startswith(known.partition("/")[0] + "/"):
             raise InputError.one(other_version(found, known, command), os.fspath(path))
-    raise InputError.one(f"is an HDF5 file, but its format is none of {', '.join(kinds)}", os.fspath(path))
+    raise InputError.one(f"is an HDF5 file, but its format is not one of {', '.join(kinds)}", os.fspath(path))
 
 
 def _document_kind(path: str | os.PathLike[str]) -> FileKind:

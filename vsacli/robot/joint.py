@@ -152,14 +152,14 @@ class Joint:
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
     type: str = choice(("revolute", "prismatic"), "kind of joint")
     dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
-    link: Link = value(Record(Link), "the link the joint moves")
+    link: Link = value(Record(Link), "link that the joint moves")
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
     friction: Friction | None = value(
         Record(Friction), "dry friction between the links, smooth: with a width", default=None
     )
-    actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
+    actuator: Actuator = value(OneOf(ACTUATORS), "actuator that drives the joint")
     damper: Damper | None = value(Record(Damper), "damper whose damping is commanded", default=None)
     limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
 

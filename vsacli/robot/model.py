@@ -32,7 +32,7 @@ OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
     "and remove `placeholder: true`"
 )
-WITHOUT_MASSES = "no link has a mass, so that hardly anything but the motors asks for torque"
+WITHOUT_MASSES = "no link has a mass, so that hardly anything but the motor inertia requires torque"
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,9 +40,9 @@ class Robot:
     """A serial chain of joints from a fixed base."""
 
     name: str = value(Name(), "name of the robot")
-    description: str = text("what the robot is and where its numbers come from", default="")
+    description: str = text("description of the robot and source of its parameters", default="")
     placeholder: bool = boolean(
-        "whether springs and motors stand in for others that are not known yet, which every report repeats",
+        "whether springs and motors are placeholders for unknown ones; every report repeats it",
         default=False,
     )
     gravity: tuple[float, float, float] = vector(

@@ -46,22 +46,22 @@ class TrajectoryFile:
     name: str = value(Name(), "name of the trajectory")
     duration: float | None = number(
         units.TIME,
-        "duration; absent if anything is recorded, required unless it follows from the times of via points"
-        " or the parts of a sequence",
+        "duration; absent if a signal is recorded; else required, unless it follows from the times "
+        "of via points or from the parts of a sequence",
         check=POSITIVE,
         default=None,
     )
     rate: float | None = number(
         units.RATE,
-        f"samples per second, {DEFAULT_RATE:g} by default; if anything is recorded, its times by default, and"
-        " with this key its fit at equally spaced times, or the rate of a recording without times",
+        f"sampling rate, {DEFAULT_RATE:g} by default; if a signal is recorded, the times of the recording by"
+        " default; with this key, equally spaced times of its fit, or the rate of a recording without times",
         check=POSITIVE,
         default=None,
     )
     slow_down: float = number(
         units.DIMENSIONLESS,
-        "factor by which everything is passed more slowly than declared and recorded here; steps of a fit at"
-        " equally spaced times keep their `rate`",
+        "factor by which the motion is slower than declared and recorded here; a fit at equally "
+        "spaced times keeps its `rate`",
         check=POSITIVE,
         default=1.0,
     )

@@ -22,10 +22,10 @@ TYPICAL: list[Slip] = [
         {"k: 400, k_c: 2000": "k: 6.98, k_c: 0.0106"}, "hardening of springs", "spring", ""),
     Slip("N m/deg as stiffness", "vsa_3r", "rest_to_rest",
         {"start: 850": "start: 14.8", "end: 1275": "end: 22.3"},
-        "stiffness beside linear parts of springs", "stiffness.start", "14.8 N m/deg"),
+        "stiffness compared with linear parts of springs", "stiffness.start", "14.8 N m/deg"),
     Slip("N/mm as stiffness", "rp_2", "rp_2",
         {"slide: 9000": "slide: 9"},
-        "stiffness beside linear parts of springs", "stiffness.start.slide", "9 N/mm"),
+        "stiffness compared with linear parts of springs", "stiffness.start.slide", "9 N/mm"),
 ]  # fmt: skip
 
 FURTHER: list[Slip] = [
@@ -50,7 +50,7 @@ FURTHER: list[Slip] = [
 REST: list[Slip] = [
     Slip("N mm as friction between links", "vsa_3r", "rest_to_rest",
         {"    actuator:\n": "    friction: {coulomb: 60e3, width: 0.05}\n    actuator:\n"},
-        "dry friction beside weight", "base.friction.coulomb", "60000 N mm"),
+        "dry friction compared with weight", "base.friction.coulomb", "60000 N mm"),
     Slip("mohm as resistance", "ur5_6r", "ur5_6r",
         {"gear_ratio: 101": "gear_ratio: 101, torque_constant: 0.1, resistance: 1200"},
         "resistances of windings", "motor.resistance", "1200 mohm"),
@@ -59,7 +59,7 @@ REST: list[Slip] = [
         "voltages at the largest velocity", "motor.torque_constant", "20 mN m/A"),
     Slip("mN m as friction of a motor", "puma_560", "puma_560",
         {"coulomb: [0.395, 0.435]": "coulomb: [395, 435]"},
-        "dry friction beside torque", "friction.coulomb.0", "395 N mm"),
+        "dry friction compared with torque", "friction.coulomb.0", "395 N mm"),
     Slip("deg/s as width of friction", "vsa_3r", "rest_to_rest",
         {"    actuator:\n": "    friction: {coulomb: 0.5, width: 5}\n    actuator:\n"},
         "widths of friction", "base.friction.width", "5 deg/s"),
@@ -67,7 +67,8 @@ REST: list[Slip] = [
         {"gear_ratio: 101": "gear_ratio: 101, torque_constant: 95"},
         "torque constants", "motor.torque_constant", "95 mN m/A"),
     Slip("N mm s/rad as damping", "ur5_6r", "ur5_6r",
-        {"damping: 0.02 ": "damping: 20 "}, "damping beside torque", "wrist_1.damping", "20 N mm s/rad"),
+        {"damping: 0.02 ": "damping: 20 "}, "damping compared with torque",
+        "wrist_1.damping", "20 N mm s/rad"),
     Slip("N mm/rad^3 as k_c", "vsa_3r", "rest_to_rest",
         {"k_c: 2000": "k_c: 2000e3"}, "early hardening of springs", "actuator.spring", ""),
     Slip("a gear ratio left out", "scara_4", "scara_4",
@@ -87,7 +88,8 @@ REST: list[Slip] = [
     Slip("rpm of a motor", "scara_4", "scara_4",
         {"max_velocity: 600": "max_velocity: 5730"}, "velocities of motors", "max_velocity", "5730 rpm"),
     Slip("kN m/rad as stiffness of tendons", "tendon_1r", "tendon_1r",
-        {"start: 40 ": "start: 0.04 "}, "stiffness beside other springs", "stiffness.start", "0.04 kN m/rad"),
+        {"start: 40 ": "start: 0.04 "}, "stiffness compared with other springs",
+        "stiffness.start", "0.04 kN m/rad"),
     Slip("N mm/rad as stiffness of measured springs", "measured_1r", "measured_1r",
         {"start: 65 ": "start: 65e3 "}, "stiffness beyond the springs", "stiffness.start", "65000 N mm/rad"),
 ]  # fmt: skip

@@ -145,7 +145,7 @@ class SpringLaw(ABC):
 
     max_deflection: float = number(
         POSITION,
-        "largest admissible |deflection|; a limit that is flagged, not the end of the law",
+        "largest admissible |deflection|; larger ones are flagged, but the law does not end there",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
         compare=False,

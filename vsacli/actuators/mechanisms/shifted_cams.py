@@ -33,7 +33,7 @@ class ShiftedCams(Mechanism):
 
     spring: tuple[SpringLaw, SpringLaw] = value(
         Pair(OneOf(LAWS)),
-        "torque of cams 1 and 2 over phi + theta_2 and phi - theta_2; one mapping serves both",
+        "torque of cams 1 and 2 over phi + theta_2 and phi - theta_2; one mapping applies to both",
     )
     branch: str = choice(BRANCHES, "sign of theta_2 on the branch that is used", default="positive")
 

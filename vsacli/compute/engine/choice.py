@@ -95,7 +95,7 @@ def choose(
     check_engine(name)
     usual = in_usual_blocks(samples, kernel.inputs)
     if name == "numpy":
-        return Choice(_numpy(usual), "NumPy computes, as asked for")
+        return Choice(_numpy(usual), "NumPy computes, as requested")
     if name == "auto" and usual < LOOK_FROM:
         return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
     from vsacli.compute.engine.compiled_engine import CompiledEngine

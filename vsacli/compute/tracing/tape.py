@@ -107,7 +107,7 @@ class Tape:
 
     def _new(self, operation: str, operands: tuple[Any, ...], kind: Kind) -> Symbol:
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
-            message = "a value of another program is none of this one; pass it as an argument"
+            message = "a value of another program cannot be used in this one; pass it as an argument"
             raise NotImplementedError(message)
         if self._ended:
             raise RuntimeError("nothing can be added to a tape once its program is made")

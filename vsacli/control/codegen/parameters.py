@@ -20,7 +20,7 @@ PARAMETERS = "parameters"
 
 def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
     """Return the structure of the argument, with a member for each parameter, named by its path."""
-    meaning = "Numbers of the robot, by their paths in its file; the functions do not check them."
+    meaning = "Parameters of the robot, by their paths in its file; the functions do not check them."
     arrays = (Array("_".join(each.by_index), (), _meaning(each)) for each in chosen)
     return Structure(PARAMETERS, meaning, tuple(arrays), tuple(each.value for each in chosen))
 

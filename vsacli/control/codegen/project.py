@@ -33,8 +33,8 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
 WITHOUT_PARAMETERS = (
-    "feedback_linearization: its mass matrix, springs and motors have the numbers of the robot file, so that "
-    "it takes none as parameters; for code of it leave out --parameters"
+    "feedback_linearization: its mass matrix, springs and motors have the parameters of the "
+    "robot file, so that it has none as inputs; to generate it, omit --parameters"
 )
 
 
@@ -151,8 +151,8 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
         each.joints[0].name for each in alone if worst_cost(inverse_dynamics_function(each).program).loops
     ]
     raise InputError.one(
-        f"{robot.name} takes loops at {', '.join(names)}: code without loops needs actuators with a closed "
-        "solution, such as pairs of alike cubic, sinh, exponential or quadratic springs"
+        f"{robot.name} needs loops at {', '.join(names)}: code without loops needs actuators with a closed "
+        "solution, such as pairs of equal cubic, sinh, exponential or quadratic springs"
     )
 
 

@@ -110,7 +110,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
             return drive
         return [*drive, *_inside(robot, computed, "phi"), *_inside(robot, computed, "dphi")]
 
-    gap = "relative distance of the stiffness to the nearer end of what is reachable, negative beyond it"
+    gap = "relative distance of the stiffness to the nearer end of the attainable range, negative outside it"
     rates = _internal_array(robot, "dinternal_phi", "their rates")
     further = () if inside is None else (*inside.arrays, rates)
     return Function(

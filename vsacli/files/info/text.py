@@ -45,7 +45,7 @@ def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
         if not field.kind.records:
             own.append(_words(name, field.quantity, value, joint_type))
         elif isinstance(value, list) and len(value) > 1 and value.count(value[0]) == len(value):
-            yield f"{name}, both alike: {_record(field, value[0], joint_type)}"
+            yield f"{name}, both equal: {_record(field, value[0], joint_type)}"
         elif isinstance(value, list):
             for number, each in enumerate(value, start=1):
                 yield f"{name} {number}: {_record(field, each, joint_type)}"
@@ -97,7 +97,7 @@ def _words(name: str, quantity: Quantity, value: Any, joint_type: str) -> str:
 Description = Mapping[str, Any]
 
 SHOWN_DIGITS = 5
-PLACES = {"link": "between its links", "transmission": "beside its springs"}
+PLACES = {"link": "between its links", "transmission": "parallel to its springs"}
 MOTION = ("dq", "ddq", "d3q", "d4q")
 
 
@@ -120,7 +120,7 @@ def _robot(robot: Description) -> Iterator[str]:
     yield from ("", *aligned(list(_masses(joints))))
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
-    yield "stiffness: reachable without load, and with the static load in either direction"
+    yield "stiffness: attainable without load, and with the static load in either direction"
     yield from ("", *device_lines(joints))
     yield from _dampers(joints)
     if robot["held_at_zero"]:

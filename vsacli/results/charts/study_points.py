@@ -110,7 +110,7 @@ class StudyPoints:
     @property
     def front(self) -> IndexArray:
         """Pareto front: feasible rows that cost less than any with a larger margin, by ascending margin."""
-        assert self.cost is not None, "a front is asked for where there is a cost"
+        assert self.cost is not None, "a front requires a cost"
         rows = np.flatnonzero(self.feasible & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
         rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
         cost = self.cost[1][rows]

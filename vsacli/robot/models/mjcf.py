@@ -85,7 +85,7 @@ def _add_light(root: Element) -> None:
 
 def _comment(robot: Robot) -> str:
     words = forces_words(robot)
-    beside = f" Beside it, passive forces: {words}." if words else ""
+    beside = f" In addition, passive forces: {words}." if words else ""
     return f"{robot.name}, by vsacli {__version__}, for MuJoCo {LOWEST_VERSION} or later.{beside}"
 
 

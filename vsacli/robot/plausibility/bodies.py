@@ -150,7 +150,7 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is {size} turns", units=(DEGREES,), in_angles=True),
     Rule("ranges of prismatic joints", "`limits.position`", _numbers("m", "limits", size=_in_extents),
         size="times the reach of the robot", high=40, usual=0.1,
-        reason="even the track under an arm is shorter than so many arms",
+        reason="even the track under an arm is shorter than this",
         finding="is {size} times the reach of the robot", units=(MILLIMETERS, CENTIMETERS)),
     Rule("velocities of revolute joints", "`limits.velocity`", _numbers("rad/s", "limits", size=_velocity),
         size="rad/s", high=FASTEST, usual=3,

@@ -113,7 +113,7 @@ class Conversion:
         """Yield sentences on parts left out or changed."""
         joints = [joint.urdf for joint in self.chain.joints]
         yield from _held("below the base", self.chain.held_below)
-        yield from _held("beside the chain, their links lumped", self.chain.held_beside)
+        yield from _held("outside the chain, their links lumped", self.chain.held_beside)
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()

@@ -70,7 +70,7 @@ def read_beside(root: Element, problems: Problems) -> Beside:
     for gazebo in root.all("gazebo"):
         if any(child.tag in SPRINGS for child in gazebo.children):
             name = gazebo.attributes.get("reference", "").strip()
-            left_out.setdefault(name, []).append(f"spring beside the drive (<{SPRINGS[0]}>)")
+            left_out.setdefault(name, []).append(f"spring parallel to the drive (<{SPRINGS[0]}>)")
     return Beside(gear_ratios, left_out)
 
 

@@ -143,7 +143,7 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
     if (leader := urdf.followed(joint).leader) != name:
         return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
     if name not in leaders:
-        return f"{shown} is neither beside the chain nor below its base, so that it has no effect"
+        return f"{shown} is neither outside the chain nor below its base, so that it has no effect"
     return ""
 
 
@@ -263,13 +263,13 @@ def _check_joints(
         name = f"joint {quoted(joint.name)}"
         if joint.type not in MOVING:
             reason = f"is {joint.type}; a chain has revolute, continuous and prismatic joints"
-            problems.add(joint.line, f"{name} {reason}; choose base and tip beside it")
+            problems.add(joint.line, f"{name} {reason}; choose base and tip so that it is not between them")
         if joint.mimic is not None:
             reason = f"follows {quoted(joint.mimic.leader)} (<mimic>), so it has no drive of its own"
             problems.add(joint.line, f"{name} {reason}; choose a tip before it")
     on_chain = {joint.name for joint in path.moving}
     choices = (
-        ("beside the chain", beside, "choose a tip before these two"),
+        ("outside the chain", beside, "choose a tip before these two"),
         ("below the base", below_base, "choose a base before these two, or a tip"),
     )
     for place, joints, choice in choices:

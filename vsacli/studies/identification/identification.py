@@ -64,7 +64,7 @@ WORDS = (*GROUPS, LINKS)
 FORCES = wrench_columns("wrench")
 """Columns of the wrench on the end effector."""
 
-PUSHED = "nothing is found of links while something acts on the end effector"
+PUSHED = "nothing is identified of links while something acts on the end effector"
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
 """Ratios of residual to noise and of residual to torque; beyond both, the equations do not hold: the residual
@@ -235,7 +235,8 @@ def _notes(
     if left := [name for name in left if name not in damped]:
         yield f"nothing was recorded of {', '.join(left)}"
     if damped:
-        yield f"nothing is found of {', '.join(damped)}: what the damper beside the springs took is not known"
+        names = ", ".join(damped)
+        yield f"nothing is identified of {names}: the torque of the damper parallel to the springs is unknown"
     if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
         yield reason
     elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):

@@ -406,6 +406,9 @@ def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bo
         return Gain(f"{alike}, but {carried}: it is springs and motors that differ", unreliable=False)
     beside = f"{carried}, which does not decide it" if by_links else "the links tell nothing of it"
     if rotor:
-        reason = "a rotor and springs hardly differ alike, torques that read too {size} make them"
+        reason = (
+            "it is unlikely that a rotor and springs deviate by the same factor; torques that read too "
+            "{size} explain it"
+        )
         return Gain(f"{alike}: {reason.format(size=size)}; {beside}", unreliable=True)
     return Gain(f"{alike}: torques that read too {size} look the same; {beside}", unreliable=False)

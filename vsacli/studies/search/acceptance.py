@@ -248,7 +248,7 @@ class Trouble(NamedTuple):
         below = self.value < self.bound
         if self.variable == "stiffness":
             needed = f"{'at least' if below else 'at most'} {stiffness_text(joint, self.bound)}"
-            return f"{joint.name} needs {needed} {when} and is asked for {self.value:.6g}"
+            return f"{joint.name} needs {needed} {when}, but the command is {self.value:.6g}"
         asked = f"{self.value:.6g} {self.unit} {when}"
         side = "below" if below else "above"
         return f"the {self.whose} of {joint.name}, {asked}, is {side} its limit {self.bound:g}"

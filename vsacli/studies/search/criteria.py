@@ -297,7 +297,7 @@ def trapezoidal(time: FloatArray) -> FloatArray:
     return weights
 
 
-ENDS_OF_CORRIDOR = "lower end of the corridor", "upper end of the corridor"
+ENDS_OF_CORRIDOR = "minimum attainable stiffness", "maximum attainable stiffness"
 
 
 def limit_names(checks: Sequence[LimitCheck]) -> list[str]:

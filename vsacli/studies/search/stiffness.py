@@ -259,7 +259,7 @@ class StiffnessSearch:
     ) -> None:
         self._admissible = checked_range(acceptance, joint, load)
         if np.any(self._admissible.low > self._admissible.high):
-            raise ImpossibleError(f"corridor and limits leave {joint.name} no stiffness")
+            raise ImpossibleError(f"attainable range and limits leave {joint.name} no stiffness")
         self._joint, self._load, self._criterion = joint, load, criterion
         self._spaces, self._seed, self._progress = spaces, seed, progress
         self._span = float(load.time[0]), float(load.time[-1])

@@ -93,7 +93,7 @@ def least_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray
     """Return the smallest addition at each sample separately, a lower bound for every smooth profile."""
     low, high = checked_range(acceptance, joint, load)
     if np.any(low > high):
-        raise ImpossibleError(f"corridor and limits leave {joint.name} no stiffness")
+        raise ImpossibleError(f"attainable range and limits leave {joint.name} no stiffness")
     asked = load.command.commanded["stiffness"]
     change: FloatArray = np.clip(0.0, low - asked, high - asked)
     return change

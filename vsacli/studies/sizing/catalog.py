@@ -40,7 +40,7 @@ _NEEDED = {
 class CatalogMotor:
     """A motor of a catalog, which may already have a gear."""
 
-    name: str = value(Name(), "name of the motor, each once")
+    name: str = value(Name(), "name of the motor, unique in the file")
     inertia: float = number(units.INERTIA, "inertia of the rotor", check=POSITIVE)
     continuous_torque: float | None = number(
         _TORQUE, "largest root mean square of the torque", check=POSITIVE, default=None
@@ -48,26 +48,29 @@ class CatalogMotor:
     max_torque: float | None = number(_TORQUE, "largest |torque|", check=POSITIVE, default=None)
     max_velocity: float | None = number(_VELOCITY, "largest |speed|", check=POSITIVE, default=None)
     torque_constant: float | None = number(
-        units.TORQUE_CONSTANT, "torque over current, and so voltage over speed", check=POSITIVE, default=None
+        units.TORQUE_CONSTANT,
+        "ratio of torque to current, and so of voltage to speed",
+        check=POSITIVE,
+        default=None,
     )
     resistance: float | None = number(
         units.RESISTANCE,
-        "resistance of the windings; needs torque_constant",
+        "resistance of the windings; requires torque_constant",
         check=NON_NEGATIVE,
         default=None,
     )
     continuous_current: float | None = number(
         units.CURRENT,
-        "largest root mean square of the current; needs torque_constant",
+        "largest root mean square of the current; requires torque_constant",
         check=POSITIVE,
         default=None,
     )
     max_current: float | None = number(
-        units.CURRENT, "largest |current|; needs torque_constant", check=POSITIVE, default=None
+        units.CURRENT, "largest |current|; requires torque_constant", check=POSITIVE, default=None
     )
     max_voltage: float | None = number(
         units.VOLTAGE,
-        "largest |voltage|; needs torque_constant and resistance",
+        "largest |voltage|; requires torque_constant and resistance",
         check=POSITIVE,
         default=None,
     )
@@ -75,13 +78,14 @@ class CatalogMotor:
     coulomb: float = number(_TORQUE, "dry friction against the motion", check=NON_NEGATIVE, default=0.0)
     gear_ratio: float | None = number(
         units.GEAR_RATIO,
-        "turns of the motor to one of the joint, or rad to 1 m, if it has a gear; else gears are looked for",
+        "gear ratio: turns of the motor per turn of the joint, or rad per m, if the motor has a "
+        "gear; else gear ratios are chosen",
         check=POSITIVE,
         default=None,
     )
     gear_efficiency: float = number(
         units.DIMENSIONLESS,
-        "share of the power that its gear passes on, in either direction",
+        "efficiency of the gear, the same in both directions",
         check=_SHARE,
         default=1.0,
     )

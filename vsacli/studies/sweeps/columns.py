@@ -60,31 +60,46 @@ class Column(NamedTuple):
 KEPT = {
     each.name: each
     for each in (
-        Column("margin", JOINT, units.DIMENSIONLESS, "smallest relative margin to an end of the corridor"),
-        Column("margin_time", JOINT, units.TIME, "when the margin is smallest"),
+        Column(
+            "margin",
+            JOINT,
+            units.DIMENSIONLESS,
+            "smallest relative margin to an end of the attainable stiffness range",
+        ),
+        Column("margin_time", JOINT, units.TIME, "time of the smallest margin"),
         Column(
             "infeasible_steps",
             JOINT,
             units.DIMENSIONLESS,
-            "number of infeasible steps",
+            "number of infeasible samples",
             lambda joint: float(joint.samples.get("infeasible", 0)),
         ),
         Column(
             "first_infeasible",
             JOINT,
             units.TIME,
-            "time of the first infeasible step",
+            "time of the first infeasible sample",
             lambda joint: joint.first_time.get("infeasible", math.nan),
         ),
-        Column("peak_tau_e", JOINT, units.TORQUE, "largest size of the elastic torque"),
-        Column("peak_tau_motor", MOTOR, units.TORQUE, "largest size of the motor torque", whole=True),
-        Column("peak_dtheta", MOTOR, units.VELOCITY, "largest size of the motor velocity", whole=True),
+        Column("peak_tau_e", JOINT, units.TORQUE, "peak absolute elastic torque"),
+        Column("peak_tau_motor", MOTOR, units.TORQUE, "peak absolute motor torque", whole=True),
+        Column("peak_dtheta", MOTOR, units.VELOCITY, "peak absolute motor velocity", whole=True),
         *(
             Column(name, JOINT, quantity, long_name, attrgetter(f"energy.{attribute}"), whole=True)
             for name, attribute, quantity, long_name in (
-                ("energy_spent", "spent", units.ENERGY, "energy that the motors spend"),
-                ("energy_recovered", "recovered", units.ENERGY, "energy that the motors take back"),
-                ("elastic_peak", "elastic_peak", units.ENERGY, "largest energy in the springs"),
+                (
+                    "energy_spent",
+                    "spent",
+                    units.ENERGY,
+                    "positive motor work: energy that the motors deliver",
+                ),
+                (
+                    "energy_recovered",
+                    "recovered",
+                    units.ENERGY,
+                    "negative motor work: energy that the motors recover",
+                ),
+                ("elastic_peak", "elastic_peak", units.ENERGY, "peak elastic energy of the springs"),
                 (
                     "co_contraction",
                     "co_contraction",

@@ -147,7 +147,7 @@ def dimensions_of(
             origin = next((each for each in before if each.path == path and not each.linked), None)
             if origin is None:
                 hint = did_you_mean(path, [each.path for each in before if not each.linked])
-                raise InputError.one(f"linked: no path above it that varies by itself is {path!r}{hint}")
+                raise InputError.one(f"linked: no path above it that varies independently is {path!r}{hint}")
             yield Dimension(
                 varied.path, unit, linked=path, factor=_number(factor, "1"), numeric=origin.numeric
             )

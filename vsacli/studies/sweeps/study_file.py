@@ -181,20 +181,23 @@ class Optimized:
 
     minimize: str = choice(
         MINIMIZED,
-        "rms of the motor torques, energy that the motors spend, heat of their windings, largest of the "
-        "motor torques, or duration",
+        "objective: rms of the motor torques, positive motor work, copper loss of the windings, "
+        "peak motor torque, or duration",
         default="torque",
     )
     vary: str | None = choice(
-        VARIED, "what may change: by default the stiffness, for time the timing", default=None
+        VARIED,
+        "decision variables: stiffness profile, timing, or both; by default the stiffness, for "
+        "time the timing",
+        default=None,
     )
     min_margin: float = value(
         Share(),
-        "relative margin that every step shall keep to the ends of its corridor",
+        "minimum relative margin of every sample to the ends of its attainable stiffness range",
         check=_MARGIN,
         default=MIN_MARGIN,
     )
-    seed: int = integer("of the starts that are drawn", check=_SEED, default=0)
+    seed: int = integer("seed of the random initial guesses", check=_SEED, default=0)
 
     def __post_init__(self) -> None:
         check_fields(self, *self._problems())
@@ -261,27 +264,33 @@ class StudyFile:
     """The content of a study file."""
 
     name: str = value(Name(), "name of the study")
-    robot: str = text("path of the robot file, relative to this one")
+    robot: str = text("path of the robot file, relative to the study file")
     trajectory: tuple[str, ...] = value(
         OneOrMore(Text()),
-        "path of a trajectory file, relative to this one; `*` stands for anything in its name",
+        "path of a trajectory file, relative to the study file; `*` matches any characters of its name",
     )
     vary: tuple[Varied, ...] = value(
-        Ways(), "what varies, by the paths of `--set`; without it, only trajectories do", default=()
+        Ways(), "varied values, by the paths of `--set`; without it, only the trajectories vary", default=()
     )
-    method: str = choice(METHODS, "which values are combined: all with all, or so many drawn", default=GRID)
+    method: str = choice(
+        METHODS,
+        "sampling method: all combinations of the values, or a given number of random samples",
+        default=GRID,
+    )
     samples: int | None = integer(
-        "runs of each trajectory that are drawn; absent if the method is grid", check=_COUNT, default=None
+        "number of random samples for each trajectory; absent if the method is grid",
+        check=_COUNT,
+        default=None,
     )
-    seed: int = integer("of what is drawn", check=_SEED, default=0)
+    seed: int = integer("seed of the random samples", check=_SEED, default=0)
     optimize: Optimized | None = value(
         Record(Optimized),
-        "what is optimized in each run; all that is kept is of the optimum then",
+        "optimization of each run; all kept values are then those of the optimum",
         default=None,
     )
     keep: tuple[str, ...] | None = value(
         Items(Choice(tuple(KEPT), words="name of a column")),
-        "what is kept of each run beside its verdict; all by default",
+        "values that are kept of each run in addition to its verdict; all by default",
         default=None,
     )
     variables: tuple[str, ...] | None = value(
@@ -289,7 +298,9 @@ class StudyFile:
         "variables of results that are kept over time",
         default=None,
     )
-    every: int = integer("of so many steps these variables are kept at one", check=_COUNT, default=1)
+    every: int = integer(
+        "decimation factor of these variables: one of this many samples is kept", check=_COUNT, default=1
+    )
 
     def __post_init__(self) -> None:
         check_fields(self, *self._problems())

@@ -83,7 +83,7 @@ class Use:
         """Return the field of a wrench's frame; empty for other signals."""
         if self.signal is not WRENCH:
             return {}
-        doc = f"along whose axes `{' '.join(WRENCH_AXES)}` are given"
+        doc = f"frame in whose axes `{' '.join(WRENCH_AXES)}` are given"
         return {"frame": choice(WRENCH_FRAMES, doc)}
 
     def degree(self, degrees: range) -> Check:
@@ -173,22 +173,26 @@ class Recorded(Declaration):
         from vsacli.trajectory.fits import METHODS
 
         doc = (
-            "spline for derivatives that are not given: through the samples, or near noisy ones by least"
-            " squares, or a smoothing one for noise of any color; by default what their noise asks for"
+            "spline for derivatives that are not given: interpolation of the samples, least squares "
+            "for noisy ones, or smoothing for noise of any color; by default chosen by the noise"
         )
         file = text("path of the CSV file, relative to the trajectory file")
-        bandwidth = "frequency in Hz above which there is no motion; by default the record tells"
+        bandwidth = "bandwidth of the motion in Hz; by default estimated from the recording"
         fields = {
             **use.frame(),
             "file": file,
             "fit": choice(METHODS, doc, default=None),
-            "noise": use.size("standard deviation of the noise of a sample; by default the record tells"),
+            "noise": use.size(
+                "standard deviation of the noise of a sample; by default estimated from the recording"
+            ),
             "bandwidth": number(units.RATE, bandwidth, check=POSITIVE, default=None),
             "columns": columns_field(),
             "ignore": ignore_field(),
         }
         if use.signal is POSITION:
-            fields["unwrap"] = boolean("take jumps by 2 pi out of revolute joints' angles", default=False)
+            fields["unwrap"] = boolean(
+                "remove jumps by 2 pi from the angles of revolute joints", default=False
+            )
         return fields
 
     def _problems(self) -> Iterator[FieldProblem]:

@@ -158,14 +158,14 @@ class Hold(Formula):
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
-        return {**use.frame(), "value": use.one("all the time" + (AXES if use.signal is WRENCH else ""))}
+        return {**use.frame(), "value": use.one("throughout" + (AXES if use.signal is WRENCH else ""))}
 
     @classmethod
     def meaning(cls, use: Use) -> str:
         """Return the meaning for users."""
         if use.signal is POSITION:
             return "The robot stands still."
-        return f"The same {use.signal.key} all the time."
+        return f"Constant {use.signal.key}."
 
     def over(self, span: tuple[float, float]) -> Constant:
         """See `Formula.over`."""

@@ -145,7 +145,7 @@ class ViaPart(Via, _Standalone):
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
-        doc = "duration of the part, if there are no times"
+        doc = "duration of the part; absent if times are given"
         return {**super().fields(use), "duration": number(units.TIME, doc, check=POSITIVE, default=None)}
 
     @classmethod
@@ -206,7 +206,7 @@ class Sequence(Formula):
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
         parts = {name: part.record(use) for name, part in PARTS.items()}
-        return {"parts": value(Items(OneOf(parts)), "what happens, in this order")}
+        return {"parts": value(Items(OneOf(parts)), "parts in temporal order")}
 
     @classmethod
     def meaning(cls, use: Use) -> str:

@@ -197,17 +197,19 @@ class SumOfSinusoids(Formula):
         """Return the declared fields by name."""
         amplitudes = Items(PerJoint(use.signal.quantities[0], use.signal.key))
         subject = "robot" if use.signal is POSITION else use.signal.key
-        about = "the joint moves" if use.signal is POSITION else "it swings"
+        about = "the joint moves" if use.signal is POSITION else "it oscillates"
         sine = "amplitudes of sin(k w t), one entry for each k from 1 on"
         ramp = (
-            "how long the sum rises from zero at the start, and falls to zero at the end, so that the"
+            "time in which the sum rises from zero at the start, and falls to zero at the end, so that the"
             f" {subject} begins and ends at rest at the offset"
         )
         return {
             "frequency": number(units.RATE, "frequency of the lowest harmonic, k = 1", check=POSITIVE),
             "offset": use.one(f"about which {about}"),
             "sine": value(amplitudes, sine, default=()),
-            "cosine": value(amplitudes, "amplitudes of cos(k w t), likewise", default=()),
+            "cosine": value(
+                amplitudes, "amplitudes of cos(k w t), one entry for each k from 1 on", default=()
+            ),
             "ramp": number(units.TIME, ramp, check=NON_NEGATIVE, default=0.0),
         }
 
@@ -217,7 +219,7 @@ class SumOfSinusoids(Formula):
         if use.signal is POSITION:
             return super().meaning(use)
         positive = ", and must stay positive" if use.signal.positive else ""
-        return f"A sum of sinusoids as above{positive}. Without `ramp` it changes from the first instant on."
+        return f"A sum of sinusoids as above{positive}. Without `ramp` it does not start at rest."
 
     def _problems(self) -> Iterator[FieldProblem]:
         if not (self.sine or self.cosine):

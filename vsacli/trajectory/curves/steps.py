@@ -152,7 +152,7 @@ _SMOOTH = (
 
 
 class Steps(Formula):
-    """Levels that are held, with rest-to-rest changes from each to the next."""
+    """Constant levels, with rest-to-rest changes from each to the next."""
 
     degree: int
     levels: tuple[Values, ...]
@@ -163,14 +163,14 @@ class Steps(Formula):
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
         degree = "degree of the polynomials that lead from level to level"
-        times = "when the change to each further level begins, from the start on; one less than levels"
+        times = "start times of the changes, from the start of the signal; one less than levels"
         axes = f" {AXES.removeprefix(', ')}" if use.signal is WRENCH else ""
         return {
             **use.frame(),
             "degree": integer(degree, check=odd(DEGREES, 2 * use.smoothness + 1, _SMOOTH)),
-            "levels": use.several(f"{axes}, the first from the start on"),
+            "levels": use.several(f"{axes} of the levels, in order"),
             "times": value(Items(Number(units.TIME)), times, check=NON_NEGATIVE),
-            "transition": number(units.TIME, "how long each change lasts", check=POSITIVE),
+            "transition": number(units.TIME, "duration of each change", check=POSITIVE),
         }
 
     def _problems(self) -> Iterator[FieldProblem]:

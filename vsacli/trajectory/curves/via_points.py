@@ -233,7 +233,7 @@ SHOWN_TIMES = 12
 """Most times that are printed; of more, the first and last ones are."""
 
 _TIMES = (
-    "when each point is passed, from the start on, the first 0; the duration follows from the last."
+    "time of each point, from the start, the first 0; the last one is the duration."
     " If absent, they follow from the distances of the points"
 )
 

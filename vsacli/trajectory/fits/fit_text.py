@@ -96,7 +96,7 @@ def _vibration(known: Smoothing) -> str:
     lines = known.lines.others
     listed = ", ".join(f"{frequency:.4g}" for frequency in lines[:LISTED_LINES])
     if known.follows_lines:
-        return f"{listed} Hz beyond a smooth motion; if it is none of it, set bandwidth: {min(lines) / 2:.2g}"
+        return f"{listed} Hz beyond a smooth motion; if it is noise, set bandwidth: {min(lines) / 2:.2g}"
     return f"{listed} Hz, which is taken for noise; if it is motion, set bandwidth: {2 * max(lines):.2g}"
 
 

@@ -82,9 +82,9 @@ class Potential(Mechanism):
     constants: tuple[tuple[str, float], ...] = value(
         NamedNumbers(), "constants of the energy by name", check=FINITE, default=()
     )
-    start: BranchStart = value(Record(BranchStart), "where q = 0: motor positions that name the branch")
+    start: BranchStart = value(Record(BranchStart), "motor positions at q = 0 that select the branch")
     range: PotentialRange = value(
-        Record(PotentialRange), "where the energy holds; its ends bound the stiffness"
+        Record(PotentialRange), "range of validity of the energy; its ends bound the stiffness"
     )
 
     def __post_init__(self) -> None:

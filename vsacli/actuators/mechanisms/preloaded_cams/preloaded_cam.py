@@ -115,7 +115,7 @@ class Maccepa(PreloadedCam):
     def __post_init__(self) -> None:
         problems = self._pretension_problems()
         if self.b == self.c:
-            problems.append(FieldProblem(("c",), "must differ from b: levers alike have a kink at rest"))
+            problems.append(FieldProblem(("c",), "must differ from b: equal levers have a kink at rest"))
         check_fields(self, *problems)
 
     @classmethod

@@ -157,7 +157,7 @@ class Awas(SineRatio):
 
     k: float = number(units.LINEAR_STIFFNESS, "stiffness of either spring", check=POSITIVE)
     arm: tuple[float, float] = interval(units.LENGTH, "shortest and longest arm, above zero")
-    lead: float = number(units.LEAD, "length that the arm gains per theta_2", check=NON_ZERO)
+    lead: float = number(units.LEAD, "change of the arm length per theta_2", check=NON_ZERO)
 
     def __post_init__(self) -> None:
         problems = []
@@ -206,7 +206,7 @@ class Lever(SineRatio):
     pivot: tuple[float, float] = interval(
         units.LENGTH, "range of the pivot's distance p from the spring, above zero and below the length"
     )
-    lead: float = number(units.LEAD, "way of the pivot per theta_2", check=NON_ZERO)
+    lead: float = number(units.LEAD, "displacement of the pivot per theta_2", check=NON_ZERO)
 
     def __post_init__(self) -> None:
         problems = []

@@ -127,9 +127,11 @@ class Power(ScaleLaw):
     jack spring, -3 for the free length of a leaf spring.
     """
 
-    exponent: float = number(units.DIMENSIONLESS, "power of the length", check=NON_ZERO)
-    lead: float = number(units.INVERSE_POSITION, "length that theta_2 adds", check=NON_ZERO, default=1.0)
-    offset: float = number(units.DIMENSIONLESS, "length where theta_2 is zero", default=0.0)
+    exponent: float = number(units.DIMENSIONLESS, "exponent of the length", check=NON_ZERO)
+    lead: float = number(
+        units.INVERSE_POSITION, "change of the length per theta_2", check=NON_ZERO, default=1.0
+    )
+    offset: float = number(units.DIMENSIONLESS, "length at theta_2 = 0", default=0.0)
 
     def at(self, s: FloatArray) -> Scale:
         """Return K with its derivatives."""
@@ -147,7 +149,7 @@ class Power(ScaleLaw):
 class PolynomialScale(ScaleLaw):
     """K = c0 + c1 theta_2 + c2 theta_2^2 + c3 theta_2^3 + c4 theta_2^4."""
 
-    c0: float = number(units.DIMENSIONLESS, "scale where theta_2 is zero", default=0.0)
+    c0: float = number(units.DIMENSIONLESS, "scale at theta_2 = 0", default=0.0)
     c1: float = number(units.DIMENSIONLESS, "coefficient of theta_2", default=0.0)
     c2: float = number(units.DIMENSIONLESS, "coefficient of theta_2^2", default=0.0)
     c3: float = number(units.DIMENSIONLESS, "coefficient of theta_2^3", default=0.0)

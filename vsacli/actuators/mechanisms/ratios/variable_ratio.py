@@ -64,9 +64,11 @@ class VariableRatio(Mechanism):
     At a given torque the stiffness falls with the scale while the deflection grows, up to where g'^2 = g g''.
     """
 
-    setting: tuple[float, float] = interval(units.POSITION, "theta_2 that the mechanism allows")
-    scale: ScaleLaw = value(OneOf(SCALES), "K over theta_2: positive, rising or falling throughout")
-    torque: SpringLaw | Sine = value(OneOf(TORQUES), "g, the torque where K is 1")
+    setting: tuple[float, float] = interval(units.POSITION, "range of theta_2 that the mechanism allows")
+    scale: ScaleLaw = value(
+        OneOf(SCALES), "scale K over theta_2: positive, strictly increasing or decreasing"
+    )
+    torque: SpringLaw | Sine = value(OneOf(TORQUES), "torque g over the deflection, for K = 1")
 
     def __post_init__(self) -> None:
         problems = []
@@ -75,7 +77,7 @@ class VariableRatio(Mechanism):
         else:
             problems += [FieldProblem(("scale",), each) for each in self.scale.problems(self.setting)]
         if isinstance(self.torque, SpringLaw) and np.isfinite(self.torque.max_deflection):
-            reason = "is no limit of a serial actuator; leave it out (a table, for one, ends by itself)"
+            reason = "is no limit of a serial actuator; delete it (the range of a table already is a limit)"
             problems.append(FieldProblem(("torque", "max_deflection"), reason))
         check_fields(self, *problems)
 
