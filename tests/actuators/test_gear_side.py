@@ -312,7 +312,7 @@ def test_a_sized_robot_has_motors_on_their_shafts(vsacli, tmp_path):
     arm, swing = (REPOSITORY / name / "planar_2r.yaml" for name in ("robots", "trajectories"))
     (tmp_path / "m.csv").write_text("name,inertia,max_torque\nm,0.01,1000\n")
     target = tmp_path / "sized.yaml"
-    assert vsacli("size", arm, swing, "--catalogue", tmp_path / "m.csv", "-o", target).code == 0
+    assert vsacli("size", arm, swing, "--catalog", tmp_path / "m.csv", "-o", target).code == 0
     for joint in load_robot(target).joints:
         assert {each.side for each in joint.actuator.motor} == {"shaft"}
 
