@@ -41,7 +41,7 @@ def test_gear_ratios_reflect_it_with_their_signs() -> None:
     """Shaft inertias b_k and coupling b_12 behind the ratios n_k: B_k = n_k^2 b_k, B_12 = n_1 n_2 b_12."""
     ratios = (50.0, -20.0)
     motors = tuple(
-        Motor(inertia=b / n**2, damping=d / n**2, gear_ratio=n)
+        Motor(inertia=b / n**2, damping=d / n**2, gear_ratio=n, side="shaft")
         for b, d, n in zip(INERTIA, DAMPING, ratios, strict=True)
     )
     geared = dataclasses.replace(COUPLED, motor=motors, coupled_inertia=COUPLING / (ratios[0] * ratios[1]))

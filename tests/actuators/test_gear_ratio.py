@@ -31,10 +31,10 @@ SPRING = "spring: {type: cubic, k: 400, k_c: 2000}"
 
 # Each motor on its shaft, and the same on the joint side, multiplied by hand.
 SHAFT = [
-    "{inertia: 0.02, damping: 0.01, max_torque: 20, max_velocity: 5, gear_ratio: -10}",
-    "{inertia: 0.001, damping: 0.002, max_torque: 1, max_velocity: 30, gear_ratio: 40}",
-    "{inertia: 5e-5, damping: 1e-4, max_torque: 0.12, max_velocity: 200, gear_ratio: 200}",
-    "{inertia: 0.004, gear_ratio: 20}",
+    "{inertia: 0.02, damping: 0.01, max_torque: 20, max_velocity: 5, gear_ratio: -10, side: shaft}",
+    "{inertia: 0.001, damping: 0.002, max_torque: 1, max_velocity: 30, gear_ratio: 40, side: shaft}",
+    "{inertia: 5e-5, damping: 1e-4, max_torque: 0.12, max_velocity: 200, gear_ratio: 200, side: shaft}",
+    "{inertia: 0.004, gear_ratio: 20, side: shaft}",
 ]
 REFLECTED = [
     "{inertia: 2, damping: 1, max_torque: 200, max_velocity: 0.5}",
@@ -202,7 +202,7 @@ def test_ratios_that_are_none(number: str, problem: str):
 
 
 def test_on_the_shaft_units_are_rotary_at_a_slide_too():
-    assert rig([*SHAFT[:2], SHAFT[2].replace("200,", "90 deg,"), SHAFT[3]])
+    assert rig([*SHAFT[:2], SHAFT[2].replace("max_velocity: 200", "max_velocity: 90 deg"), SHAFT[3]])
     with pytest.raises(InputError, match=r"13: inertia: expected a number in kg m\^2, found 'heavy'"):
         rig([*SHAFT[:2], SHAFT[2].replace("5e-5", "heavy"), SHAFT[3]])
     with pytest.raises(InputError, match="13: inertia: expected a number in kg, found 'heavy'"):
@@ -210,7 +210,7 @@ def test_on_the_shaft_units_are_rotary_at_a_slide_too():
 
 
 def test_a_motor_knows_both_sides():
-    motor = Motor(inertia=0.01, gear_ratio=-100)
+    motor = Motor(inertia=0.01, gear_ratio=-100, side="shaft")
     assert (motor.inertia, motor.at_joint.inertia) == (0.01, pytest.approx(100))
     assert motor.at_joint.max_torque == np.inf
     with pytest.raises(InvalidRecordError, match="Motor: gear_ratio: must be finite and not zero, not nan"):

@@ -33,7 +33,7 @@ joints:
 GEARED = """\
     actuator:
       type: antagonistic
-      motor: [{inertia: 0.02, gear_ratio: -10}, {inertia: 0.001, gear_ratio: 40}]
+      motor: [{inertia: 0.02, gear_ratio: -10, side: shaft}, {inertia: 0.001, gear_ratio: 40, side: shaft}]
       spring: {type: cubic, k: 400, k_c: 2000}
 """
 MOVE = """\

@@ -219,7 +219,7 @@ def test_a_singular_joint_is_flagged_and_the_others_are_not(tmp_path: Path) -> N
 
 
 def test_currents_of_a_controlled_robot_are_flagged(tmp_path: Path) -> None:
-    shaft = {"inertia": 3e-3, "gear_ratio": -30, "torque_constant": 0.3, "resistance": 2.0}
+    shaft = {"inertia": 3e-3, "gear_ratio": -30, "side": "shaft", "torque_constant": 0.3, "resistance": 2.0}
     motor = {**shaft, "max_current": 300.0, "max_voltage": 700.0}
     robot = shipped_robot("vsa_3r").replace("joints.base.actuator.motor", motor)
     state, *others = loop_inputs(robot, 4)

@@ -51,7 +51,7 @@ def test_a_seed_repeats_the_readings_and_another_does_not():
 def test_encoders_round_to_their_steps_on_either_side_of_the_gear():
     robot = vsa_3r()
     base = robot.joints[0]
-    motors = (replace(base.actuator.motor[0], gear_ratio=-100.0), base.actuator.motor[1])
+    motors = (replace(base.actuator.motor[0], gear_ratio=-100.0, side="shaft"), base.actuator.motor[1])
     base = replace(base, actuator=replace(base.actuator, motor=motors))
     robot = replace(robot, joints=(base, *robot.joints[1:]))
     past = simulate(robot, short_motion(3), sensors=Sensors(encoder_bits=12)).history

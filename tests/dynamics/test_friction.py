@@ -75,7 +75,7 @@ def test_what_rests_has_no_direction():
 @pytest.mark.parametrize("ratio", [80.0, -80.0])
 @pytest.mark.parametrize("friction", [SHARP, SMOOTH])
 def test_a_gear_turns_friction_with_the_velocity(ratio, friction):
-    motor = Motor(inertia=1e-4, gear_ratio=ratio, friction=friction).at_joint.friction
+    motor = Motor(inertia=1e-4, gear_ratio=ratio, side="shaft", friction=friction).at_joint.friction
     for velocity in (-0.7, 0.002):
         assert law(motor, velocity) == pytest.approx(ratio * law(friction, ratio * velocity), rel=1e-14)
 

@@ -22,7 +22,7 @@ from vsacli.base.outputs import Outputs
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 
-SHAFT = {"gear_ratio": -20.0, "torque_constant": 0.2, "resistance": 1.5}
+SHAFT = {"gear_ratio": -20.0, "side": "shaft", "torque_constant": 0.2, "resistance": 1.5}
 
 
 def with_windings(robot: Robot, **limits: float) -> Robot:
@@ -81,13 +81,13 @@ def test_limits_are_flagged_in_simulations():
 
 REFUSED = {
     "torque_constant": ({"torque_constant": 0.2}, r"needs gear_ratio \(1 for a direct drive\)"),
-    "resistance": ({"resistance": 1.0, "gear_ratio": 2.0}, "needs torque_constant"),
+    "resistance": ({"resistance": 1.0, "gear_ratio": 2.0, "side": "shaft"}, "needs torque_constant"),
     "max_current": (
-        {"max_current": 1.0, "gear_ratio": 2.0},
+        {"max_current": 1.0, "gear_ratio": 2.0, "side": "shaft"},
         "needs torque_constant, without which",
     ),
     "max_voltage": (
-        {"max_voltage": 1.0, "gear_ratio": 2.0},
+        {"max_voltage": 1.0, "gear_ratio": 2.0, "side": "shaft"},
         "needs torque_constant and resistance, without which the voltage",
     ),
 }
@@ -118,6 +118,7 @@ joints:
       motor:
         inertia: 2e-4
         gear_ratio: -50
+        side: shaft
         friction: {coulomb: [0.02, 0.03]}
         torque_constant: 0.05
         resistance: 0.8
@@ -161,7 +162,7 @@ def test_from_the_file_to_result_figures_and_columns(files):
 
 
 def test_files_name_line_and_fix(files):
-    text = ROBOT.replace("        gear_ratio: -50\n", "")
+    text = ROBOT.replace("        gear_ratio: -50\n        side: shaft\n", "")
     (files / "robot.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"robot.yaml:15: motor: torque_constant: needs gear_ratio \(1 for"):
         load_robot(files / "robot.yaml")

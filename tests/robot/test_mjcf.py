@@ -86,7 +86,7 @@ def test_random_chains_under_odd_gravity(types, seed):
 
 def test_rigid_elastic_and_antagonistic_joints_of_both_types():
     robot = random_robot("RPRPR", 5)
-    geared = Motor(inertia=1e-4, damping=1e-5, gear_ratio=-80)
+    geared = Motor(inertia=1e-4, damping=1e-5, gear_ratio=-80, side="shaft")
     actuators = (
         Rigid(motor=geared),
         Rigid(motor=Motor(inertia=2, damping=0.3)),
@@ -100,7 +100,9 @@ def test_rigid_elastic_and_antagonistic_joints_of_both_types():
 
 def test_smooth_friction_of_joints_and_motors():
     sides = Motor(inertia=0.5, friction=Friction(coulomb=(0.3, 0.7), offset=-0.1, width=0.1))
-    geared = Motor(inertia=1e-4, gear_ratio=-50, friction=Friction(coulomb=(0.01, 0.02), width=3))
+    geared = Motor(
+        inertia=1e-4, gear_ratio=-50, side="shaft", friction=Friction(coulomb=(0.01, 0.02), width=3)
+    )
     robot = random_robot("RPR", 2)
     actuators = (
         Rigid(motor=geared),

@@ -47,7 +47,7 @@ MEANT = {
         3, 0.01, 0.03, 0.006, pair(Motor(inertia=2e-6, max_torque=0.2), Exponential(c=0.02, a=8))
     ),
     "a finger of 1 g": arm(
-        2, 1e-3, 0.01, 0.002, Rigid(motor=Motor(inertia=3e-9, gear_ratio=256, max_torque=1e-4))
+        2, 1e-3, 0.01, 0.002, Rigid(motor=Motor(inertia=3e-9, gear_ratio=256, side="shaft", max_torque=1e-4))
     ),
     "an excavator": arm(
         3,
@@ -60,16 +60,23 @@ MEANT = {
         2, 2, 0.3, 0.03, Elastic(motor=Motor(inertia=0.2), spring=Cubic(k=400, k_c=5))
     ),
     "a space manipulator": arm(
-        6, 60, 3.5, 0.15, Elastic(motor=Motor(inertia=1e-3, gear_ratio=1800), stiffness=1e5), (0, 0, 0)
+        6,
+        60,
+        3.5,
+        0.15,
+        Elastic(motor=Motor(inertia=1e-3, gear_ratio=1800, side="shaft"), stiffness=1e5),
+        (0, 0, 0),
     ),
     "on the Moon": arm(2, 5, 0.4, 0.05, Rigid(motor=Motor(inertia=0.5)), (0, 0, -1.62)),
     "direct drive": arm(2, 3, 0.35, 0.04, Rigid(motor=Motor(inertia=8e-3, gear_ratio=1, max_velocity=50))),
     "stiff gears on a light arm": arm(
-        1, 1.0, 0.3, 0.02, Elastic(motor=Motor(inertia=3e-5, gear_ratio=160), stiffness=1e4)
+        1, 1.0, 0.3, 0.02, Elastic(motor=Motor(inertia=3e-5, gear_ratio=160, side="shaft"), stiffness=1e4)
     ),
     "springs without stiffness at rest": arm(2, 1.0, 0.2, 0.02, pair(Motor(inertia=0.05), Quadratic(k=80))),
     "a leg in a wheel": arm(1, 0.2, 0.1, 0.05, Rigid(motor=Motor(inertia=1e-3, max_velocity=40))),
-    "a snake of 30 modules": arm(30, 0.3, 0.08, 0.03, Rigid(motor=Motor(inertia=2e-6, gear_ratio=300))),
+    "a snake of 30 modules": arm(
+        30, 0.3, 0.08, 0.03, Rigid(motor=Motor(inertia=2e-6, gear_ratio=300, side="shaft"))
+    ),
 }
 
 

@@ -123,6 +123,7 @@ def test_a_single_motor_takes_the_gear(tmp_path, actuator, ratio, expected):
     conversion = import_urdf(write(tmp_path / "arm.urdf", text), placeholders=Placeholders(actuator))
     (arm,) = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion))).joints
     assert arm.actuator.motor.gear_ratio == expected
+    assert arm.actuator.motor.side == (expected and "shaft")
     # Divided and multiplied by the ratio: a rounding or two; the inertia has two digits, on the shaft.
     assert arm.actuator.motors[0].max_torque == pytest.approx(32, rel=1e-15)
     assert arm.actuator.motors[0].inertia == pytest.approx(0.025, rel=0.05)

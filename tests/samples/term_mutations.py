@@ -265,7 +265,7 @@ def _motor(inertia: float, **further: Any) -> Motor:
 def _pair(coupled: bool) -> Antagonistic:
     friction = Friction(coulomb=(0.8, 1.2), offset=0.3, width=0.05)
     sharp = Friction(coulomb=(0.6, 1.1))
-    electrical = {"torque_constant": 0.05, "resistance": 0.4, "gear_ratio": 50.0}
+    electrical = {"torque_constant": 0.05, "resistance": 0.4, "gear_ratio": 50.0, "side": "shaft"}
     geared = {"coulomb": (0.02, 0.03), "offset": 0.005, "width": 2.0}
     motors = (
         Motor(inertia=2e-4, damping=1e-4, friction=Friction(**geared), **electrical),  # type: ignore[arg-type]

@@ -31,7 +31,9 @@ def computed(vsacli, tmp_path):
     """Columns of a result `r.h5` by name; on a grid of 2 ms, shifted by BEGIN, they make a recording."""
     (tmp_path / "wave.yaml").write_text(MOTION)
     edited(
-        ROBOT, tmp_path / "robot.yaml", ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, inertia: 1.28e-3")
+        ROBOT,
+        tmp_path / "robot.yaml",
+        ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, side: shaft, inertia: 1.28e-3"),
     )
     assert vsacli("invdyn", "robot.yaml", "wave.yaml", "-o", "r.h5").code == 0
     printed = vsacli("export", "r.h5", "--variables", "q,theta,tau_motor").out
@@ -245,7 +247,10 @@ def test_units_and_sides_of_the_gear_are_converted(computed, tmp_path):
 
 def test_currents_are_compared(vsacli, tmp_path):
     (tmp_path / "wave.yaml").write_text(MOTION)
-    driven = ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, torque_constant: 0.1, inertia: 1.28e-3")
+    driven = (
+        "motor: {inertia: 3.20",
+        "motor: {gear_ratio: 50, side: shaft, torque_constant: 0.1, inertia: 1.28e-3",
+    )
     edited(ROBOT, tmp_path / "robot.yaml", driven)
     assert vsacli("invdyn", "robot.yaml", "wave.yaml", "-o", "r.h5").code == 0
     printed = vsacli("export", "r.h5", "--variables", "q,current").out

@@ -223,7 +223,13 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
 @pytest.mark.parametrize("torque", ["torques of shafts", "currents"])
 def test_records_may_be_of_the_other_side_of_the_gear(torque: str, tmp_path: Path) -> None:
     ratio, constant = -50, 0.1
-    motor = {"inertia": 3.2 / ratio**2, "damping": 1e-4, "gear_ratio": ratio, "torque_constant": constant}
+    motor = {
+        "inertia": 3.2 / ratio**2,
+        "damping": 1e-4,
+        "gear_ratio": ratio,
+        "side": "shaft",
+        "torque_constant": constant,
+    }
     geared = joint({"joints.base.actuator.motor": motor})
     record = excited(geared, JOINT).noisy(seed=10)
     columns = {"time": record.time, "base.q [deg]": np.degrees(record.q[:, 0])}

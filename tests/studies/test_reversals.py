@@ -34,7 +34,12 @@ def coarse(folder: Path, robot: Robot) -> Trajectory:
 def test_the_variance_is_that_of_drawn_speeds(speed: float, correlation: float) -> None:
     """Of so many draws a variance is known to 1/sqrt(200000), 0.2 %; five times that is allowed."""
     ratio = 2.0  # gear: friction on the joint's side is twice that on the shaft
-    motor = {"inertia": 0.1, "gear_ratio": ratio, "friction": {"coulomb": [BACKWARD, FORWARD]}}
+    motor = {
+        "inertia": 0.1,
+        "gear_ratio": ratio,
+        "side": "shaft",
+        "friction": {"coulomb": [BACKWARD, FORWARD]},
+    }
     robot = dataclasses.replace(puma(), joints=puma().joints[:1]).replace(
         "joints.waist.actuator.motor", motor
     )

@@ -128,7 +128,9 @@ def variables(joint, demand):
 
 MOTORS = (
     Motor(inertia=1.0, damping=0.1, friction=Friction(coulomb=(0.2,) * 2, offset=0.05, width=0.4)),
-    Motor(inertia=0.02, damping=0.002, gear_ratio=-7.0, friction=Friction(coulomb=(0.01, 0.02))),
+    Motor(
+        inertia=0.02, damping=0.002, gear_ratio=-7.0, side="shaft", friction=Friction(coulomb=(0.01, 0.02))
+    ),
 )
 
 

@@ -143,7 +143,7 @@ def turntable():
         type="revolute",
         dh=DenavitHartenberg(a=0, alpha=0, d=0, theta=0),
         link=link,
-        actuator=Rigid(motor=Motor(inertia=1e-4, gear_ratio=50)),
+        actuator=Rigid(motor=Motor(inertia=1e-4, gear_ratio=50, side="shaft")),
     )
     time = np.linspace(0, 2 * 2 * math.pi / FREQUENCY, 4001)
     phase = FREQUENCY * time
@@ -230,7 +230,9 @@ def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(crit
     first, second = (choices(each.demand, motors, Gears.read("100"), criterion) for each in sizing.motors)
 
     def buildable(one, other):
-        motors = [{"inertia": inertias[each.motor], "gear_ratio": 100.0} for each in (one, other)]
+        motors = [
+            {"inertia": inertias[each.motor], "gear_ratio": 100.0, "side": "shaft"} for each in (one, other)
+        ]
         changes = {"joints.0.actuator.coupled_inertia": coupling / 100**2, "joints.0.actuator.motor": motors}
         try:
             robot.replace(changes)

@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck, OfJoint, within
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command
@@ -45,12 +45,16 @@ class PlaceholderConstants(NamedTuple):
 
     @property
     def only_motor(self) -> Motor:
-        """Motor that drives the joint alone; its inertia is rounded to hide the digits of the division."""
+        """Motor that drives the joint alone, on its shaft if its gear ratio is known.
+
+        The inertia is rounded to hide the digits of the division.
+        """
         ratio = abs(self.gear_ratio or 1.0)
         return Motor(
             inertia=float(f"{self.motor_inertia / (ratio * ratio):.12g}"),
             max_torque=self.max_torque / ratio,
             gear_ratio=self.gear_ratio,
+            side=None if self.gear_ratio is None else SHAFT,
         )
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.friction import Friction
+from vsacli.actuators.friction import NO_FRICTION, Friction
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
+from vsacli.base.units import Quantity, constant
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     NON_ZERO,
@@ -21,11 +23,26 @@ from vsacli.documents.fields import (
     POSITIVE_OR_INFINITE,
     Record,
     check_fields,
+    choice,
     number,
     value,
 )
 
-_SIDE = "joint side of the gear unless gear_ratio is given"
+JOINT, SHAFT = "joint", "shaft"
+"""Sides of a gear."""
+
+_ON_SIDE = "joint side of the gear unless side is shaft"
+
+_ON_EITHER_SIDE = {
+    "inertia": units.MOTOR_INERTIA,
+    "damping": units.DAMPING,
+    "max_torque": units.TORQUE,
+    "max_velocity": units.VELOCITY,
+    "friction.coulomb": units.TORQUE,
+    "friction.offset": units.TORQUE,
+    "friction.width": units.VELOCITY,
+}
+"""Quantities of the values that are given on either side of the gear."""
 
 NEEDED = {
     "torque_constant": ("gear_ratio",),
@@ -70,31 +87,37 @@ class JointMotor:
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor as declared: on the joint side of its gear, or, with a gear ratio, on its own shaft."""
+    """A motor as declared: on the joint side of its gear, or with `side: shaft` on its own shaft."""
 
-    inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_SIDE}", check=POSITIVE)
-    damping: float = number(units.DAMPING, f"viscous damping, {_SIDE}", check=NON_NEGATIVE, default=0.0)
+    inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_ON_SIDE}", check=POSITIVE)
+    damping: float = number(units.DAMPING, f"viscous damping, {_ON_SIDE}", check=NON_NEGATIVE, default=0.0)
     max_torque: float = number(
         units.TORQUE,
-        f"largest |torque|, {_SIDE}; flagged beyond",
+        f"largest |torque|, {_ON_SIDE}; flagged beyond",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
     )
     max_velocity: float = number(
         units.VELOCITY,
-        f"largest |velocity|, {_SIDE}; flagged beyond",
+        f"largest |velocity|, {_ON_SIDE}; flagged beyond",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
     )
     gear_ratio: float | None = number(
         units.GEAR_RATIO,
-        "turns of the motor per turn of the joint, negative if it turns in the opposite direction; "
-        "if given, the other values are those of the motor shaft, as in datasheets, in kg m^2, N m "
-        "s/rad, N m, rad/s at every joint",
+        "turns of the motor per turn of the joint, negative if it turns in the opposite direction; a ratio "
+        "other than 1 requires side",
         check=NON_ZERO,
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), f"dry friction, {_SIDE}", default=None)
+    side: str | None = choice(
+        (JOINT, SHAFT),
+        "side of the gear to which inertia, damping, max_torque, max_velocity and friction refer; required with a "
+        "gear_ratio other than 1; values of the shaft, as in data sheets, are in kg m^2, N m s/rad, N m, rad/s "
+        "at any joint",
+        default=None,
+    )
+    friction: Friction | None = value(Record(Friction), f"dry friction, {_ON_SIDE}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
         "ratio of torque to current, and so of voltage to velocity, on the motor shaft; requires "
@@ -121,15 +144,45 @@ class Motor:
         default=None,
     )
 
-    unit_variant_with = ("gear_ratio", "revolute")
+    unit_variant = "side"
+    unit_variants = MappingProxyType({SHAFT: "revolute"})
+    required_unless = MappingProxyType({"side": ("gear_ratio", 1)})
 
     def __post_init__(self) -> None:
-        problems = []
+        check_fields(self, *self._gear_problems(), *self._missing())
+
+    def _gear_problems(self) -> Iterator[FieldProblem]:
+        ratio = self.gear_ratio
+        if ratio is None or NON_ZERO.problem(ratio):
+            return
+        if self.side is None and ratio != 1:
+            yield self._without_side(ratio)
+            return
         inertia = self.at_joint.inertia
-        if self.gear_ratio and POSITIVE.problem(inertia) and not POSITIVE.problem(self.inertia):
+        if POSITIVE.problem(inertia) and not POSITIVE.problem(self.inertia):
             reason = f"makes the inertia on the joint side {inertia:g}, too far from anything built"
-            problems.append(FieldProblem(("gear_ratio",), reason))
-        check_fields(self, *problems, *self._missing())
+            yield FieldProblem(("gear_ratio",), reason)
+
+    def _without_side(self, ratio: float) -> FieldProblem:
+        """Return the problem of a motor with a gear but no side, with both meanings of its values."""
+        values, of_shaft, of_joint = map(
+            _given, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
+        )
+        meanings: list[str] = []
+        quantities: list[Quantity] = []
+        for (name, quantity, size), (*_, at_joint), (*_, on_shaft) in zip(
+            values, of_shaft, of_joint, strict=True
+        ):
+            rotary = constant(quantity.revolute)
+            if not meanings:  # says once which number is where
+                first = f"{size} {{}} at the shaft = {at_joint} {{}} at the joint"
+                meanings.append(f"{name} {first}, or {size} {{}} at the joint = {on_shaft} {{}} at the shaft")
+                quantities += (rotary, quantity, quantity, rotary)
+            else:
+                meanings.append(f"{name} {size} {{}} = {at_joint} {{}}, or = {on_shaft} {{}}")
+                quantities += (rotary, quantity, rotary)
+        reason = "; ".join((f"{ratio:g} needs side: {SHAFT} or {JOINT}", *meanings))
+        return FieldProblem(("gear_ratio",), reason, quantities=tuple(quantities))
 
     def _missing(self) -> Iterator[FieldProblem]:
         """Yield the keys missing for constants of the windings."""
@@ -146,23 +199,46 @@ class Motor:
         revolute = joint_type == "revolute"
         return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
 
+    @property
+    def ratio_of_side(self) -> float:
+        """Motion of the declared side over that on the joint side: 1 or the gear ratio."""
+        return 1.0 if self.side == JOINT else self.gear_ratio or 1.0
+
     @cached_property
     def at_joint(self) -> JointMotor:
         """Motor on the joint side: inertia and damping times the ratio squared, torques times the ratio."""
-        signed = self.gear_ratio or 1.0
-        ratio = abs(signed)
+        ratio = self.gear_ratio or 1.0
         return JointMotor(
-            inertia=self.inertia * ratio * ratio,
-            damping=self.damping * ratio * ratio,
-            max_torque=self.max_torque * ratio,
-            max_velocity=self.max_velocity / ratio,
+            **self._reflected(self.ratio_of_side),
             gear_ratio=self.gear_ratio,
-            friction=self.friction and self.friction.geared(signed),
-            torque_constant=None if self.torque_constant is None else signed * self.torque_constant,
+            torque_constant=None if self.torque_constant is None else ratio * self.torque_constant,
             resistance=self.resistance,
             max_current=self.max_current,
             max_voltage=self.max_voltage,
         )
+
+    def _reflected(self, signed: float) -> dict[str, Any]:
+        """Return the values on the other side of a gear whose declared side moves `signed` times as far."""
+        ratio = abs(signed)
+        return {
+            "inertia": self.inertia * ratio * ratio,
+            "damping": self.damping * ratio * ratio,
+            "max_torque": self.max_torque * ratio,
+            "max_velocity": self.max_velocity / ratio,
+            "friction": self.friction and self.friction.geared(signed),
+        }
+
+
+def _given(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
+    """Yield name, quantity and text of the values of `_ON_EITHER_SIDE` that are neither zero nor infinite."""
+    friction = values["friction"] or NO_FRICTION
+    for name, quantity in _ON_EITHER_SIDE.items():
+        part = name.removeprefix("friction.")
+        content = values[name] if part == name else getattr(friction, part)
+        sizes = dict.fromkeys(content if isinstance(content, tuple) else (content,))
+        if any(0 < abs(size) < math.inf for size in sizes):
+            texts = [f"{size:.4g}" for size in sizes]
+            yield name, quantity, texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 
 ELECTRICAL = ("current", "voltage", "copper_loss")

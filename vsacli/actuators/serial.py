@@ -42,8 +42,8 @@ class Serial(Actuator):
     )
     coupled_inertia: float = number(
         units.MOTOR_INERTIA,
-        "coupling inertia B_12 between the accelerations of the motors if motor 2 is mounted on "
-        "motor 1; joint side of the gears, or, of a motor with gear_ratio, its shaft",
+        "coupling inertia B_12 between the accelerations of the motors if motor 2 is mounted on motor 1; "
+        "joint side of the gears, or, of a motor with side: shaft, its shaft",
         default=0.0,
     )
     mechanism: Mechanism = value(
@@ -105,8 +105,8 @@ class Serial(Actuator):
 
     @property
     def coupled_rotors(self) -> float:
-        """Coupled inertia times both gear ratios, with their signs."""
-        first, second = (motor.gear_ratio or 1.0 for motor in self.motor)
+        """Coupled inertia on the joint side: times the gear ratios, with signs, of motors on their shafts."""
+        first, second = (motor.ratio_of_side for motor in self.motor)
         return self.coupled_inertia * first * second
 
     @property

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from vsacli.base.texts import one_line
+from vsacli.base.units import Quantity
 
 
 class VsacliError(Exception):
@@ -95,11 +96,13 @@ class FieldProblem(NamedTuple):
             joints.
         message: as in `Problem`.
         joint: index of the joint concerned, if any; a file reader replaces it by the joint's name.
+        quantities: quantities whose units replace `{}` in the message, since they differ between joints.
     """
 
     path: tuple[str | int, ...]
     message: str
     joint: int | None = None
+    quantities: tuple[Quantity, ...] = ()
 
     def __str__(self) -> str:
         return self._sentence(map(str, self.path), None if self.joint is None else str(self.joint + 1))
@@ -111,7 +114,14 @@ class FieldProblem(NamedTuple):
 
     def _sentence(self, path: Iterable[str], joint: str | None) -> str:
         where = " of joint ".join(filter(None, [".".join(path), joint]))
-        return f"{where}: {self.message}" if where else self.message
+        message = self.message.format(*self.quantities) if self.quantities else self.message
+        return f"{where}: {message}" if where else message
+
+    def in_units(self, variant: str | None) -> FieldProblem:
+        """Return the problem with the units of a joint type; None is an unknown one."""
+        units = [each if variant is None else each.unit(variant) for each in self.quantities]
+        message = self.message.format(*units) if units else self.message
+        return self._replace(message=message, quantities=())
 
     def inside(self, *outer: str | int) -> FieldProblem:
         """Return the same problem seen from an enclosing record; `outer` is the path from there."""

@@ -17,10 +17,22 @@ class Quantity:
         """Return the unit at a joint of type `revolute` or `prismatic`."""
         return self.revolute if joint_type == "revolute" else self.prismatic
 
+    def inside(self, variant: str | None) -> Quantity:
+        """Return the quantity in a record with a unit variant of its own; None is that of the joint."""
+        return self if variant is None else constant(self.unit(variant))
+
     def __str__(self) -> str:
         if self.revolute == self.prismatic:
             return self.revolute
         return f"{self.revolute} ({self.prismatic} if prismatic)"
+
+
+class GearQuantity(Quantity):
+    """A quantity that relates both sides of a gear; its unit is the joint's in any record."""
+
+    def inside(self, _variant: str | None) -> Quantity:
+        """Return the quantity itself."""
+        return self
 
 
 class WrenchQuantity(Quantity):
@@ -89,7 +101,7 @@ DAMPING = Quantity("N m s/rad", "N s/m")
 DAMPING_RATE = Quantity("N m/rad", "N/m")
 DAMPING_ACCELERATION = Quantity("N m/(rad s)", "N/(m s)")
 MOTOR_INERTIA = Quantity("kg m^2", "kg")
-GEAR_RATIO = Quantity("1", "rad/m")
+GEAR_RATIO = GearQuantity("1", "rad/m")
 ENERGY = constant("J")
 POWER = constant("W")
 CURRENT = constant("A")

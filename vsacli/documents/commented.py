@@ -8,7 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents.field_kinds import REQUIRED, Choice, Field, Interval, Kind, declared, on_one_line
+from vsacli.documents.field_kinds import (
+    REQUIRED,
+    Choice,
+    Field,
+    Interval,
+    Kind,
+    declared,
+    on_one_line,
+    variant_inside,
+)
 from vsacli.documents.nested import Items, OneOf, Pair, Record
 
 Values: TypeAlias = Mapping[str, Any]
@@ -58,7 +67,7 @@ def _rendered(line: _Line) -> Iterator[str]:
 
 def _record(cls: type, values: Values, variant: str) -> Iterator[_Line]:
     """Yield all fields of a record; fields without a value are inactive and show their defaults."""
-    variant = str(values.get(getattr(cls, "unit_variant", ""), variant))
+    variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
     for name, (field, default) in declared(cls).items():
         comment = _comment(field, variant)
         if name in values:

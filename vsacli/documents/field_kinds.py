@@ -6,8 +6,10 @@ arrays, JSON values and numbers in `record_values`. Lists and records are in `ne
 
 A record class is a frozen, keyword-only dataclass whose attributes are made by the functions of `fields`. It
 may have these class attributes: `not_yet` names keys of the format that this version does not support;
-`unit_variant` names the choice that determines the units in the record and in nested records;
-`unit_variant_with` is a key and the choice that applies if the key is present.
+`unit_variant` names the choice that determines the units in the record and in nested records; `unit_variants`
+maps its words to unit variants, and words without one keep that of the enclosing record (without the mapping,
+the words are the variants); `required_unless` maps a key to another one and a number: the first is required
+with the second unless that has this number.
 """
 
 from __future__ import annotations
@@ -165,6 +167,25 @@ def declared(cls: type) -> dict[str, tuple[Field, Any]]:
         for attribute in dataclasses.fields(cls)
         if "field" in attribute.metadata
     }
+
+
+def variant_inside(cls: type, word: Any, variant: str | None) -> str | None:
+    """Return the unit variant inside a record.
+
+    Args:
+        cls: record class.
+        word: content of its field `unit_variant`, None if absent.
+        variant: unit variant of the enclosing record.
+    """
+    selector = getattr(cls, "unit_variant", None)
+    if selector is None:
+        return variant
+    variants = getattr(cls, "unit_variants", None)
+    if variants is not None:
+        known: str | None = variants.get(word, variant)
+        return known
+    kind = declared(cls)[selector][0].kind
+    return str(word) if isinstance(kind, Choice) and word in kind.options else None
 
 
 def check_fields(record: Any, *further: FieldProblem) -> None:

@@ -1,6 +1,6 @@
 """JSON Schema (draft 2020-12) of a declared document, with which editors complete and check YAML.
 
-A schema accepts everything that the reader accepts. It cannot express values of expressions, conditions
+A schema accepts everything that the reader accepts. It cannot express values of expressions, most conditions
 between fields, or the joints of a robot.
 """
 
@@ -71,6 +71,7 @@ class _Builder:
             },
             "required": [*required, *(name for name, (_, default) in fields.items() if default is REQUIRED)],
             "additionalProperties": False,
+            **_conditions(getattr(cls, "required_unless", {})),
         }
 
     def _field(self, field: Field, default: Any) -> Schema:
@@ -118,6 +119,18 @@ class _Builder:
             summary = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
             self.definitions[name] = {"description": summary, **self.record(cls, beside)}
         return {"$ref": f"#/$defs/{name}"}
+
+
+def _conditions(required_unless: Mapping[str, tuple[str, float]]) -> Schema:
+    """Return keywords that require keys; expressions, whose values no schema knows, require none."""
+    conditions = [
+        {
+            "if": {"properties": {other: {"type": "number", "not": {"const": value}}}, "required": [other]},
+            "then": {"required": [name]},
+        }
+        for name, (other, value) in required_unless.items()
+    ]
+    return {"allOf": conditions} if conditions else {}
 
 
 def _list(item: Schema, length: int | None = None) -> Schema:

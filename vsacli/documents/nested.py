@@ -16,7 +16,6 @@ from vsacli.documents import tree
 from vsacli.documents.field_kinds import (
     REQUIRED,
     Check,
-    Choice,
     Field,
     FieldPath,
     Kind,
@@ -24,6 +23,7 @@ from vsacli.documents.field_kinds import (
     declared,
     read_number,
     unknown_word,
+    variant_inside,
 )
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
 
@@ -253,7 +253,7 @@ def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside:
         return cls(**values)
     except InvalidRecordError as error:
         for problem in error.fields:
-            message = problem.in_file(list(scope.members))
+            message = problem.in_units(scope.variant).in_file(list(scope.members))
             scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}")
         return INVALID
     except InputError as error:
@@ -263,16 +263,8 @@ def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside:
 
 def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
     """Return the scope of the values in a record."""
-    key, variant = getattr(cls, "unit_variant_with", (None, None))
-    if key in node.entries:
-        return scope._replace(variant=variant)
-    selector = getattr(cls, "unit_variant", None)
-    if selector is None:
-        return scope
-    match declared(cls)[selector][0].kind, node.entries.get(selector):
-        case Choice(options=options), tree.Scalar(text=word) if word in options:
-            return scope._replace(variant=word)
-    return scope._replace(variant=None)
+    chosen = _scalar_entry(node, getattr(cls, "unit_variant", ""))
+    return scope._replace(variant=variant_inside(cls, chosen.text if chosen else None, scope.variant))
 
 
 def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:

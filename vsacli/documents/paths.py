@@ -110,6 +110,33 @@ def replace(
     return found
 
 
+def replace_all(
+    record: _Record,
+    values: Mapping[str, Any],
+    members: Mapping[str, str] | None = None,
+    exempt: Mapping[str, Mapping[str, str]] | None = None,
+    file: str = "",
+) -> _Record:
+    """Return a record with new values at several paths, replaced in turn; see `replace`.
+
+    Values that are refused are tried again after the others: keys that need each other, such as `gear_ratio`
+    and `side` of a motor, may be given in any order.
+    """
+    refused: dict[str, Any] = {}
+    first = None
+    for path, value in values.items():
+        try:
+            record = replace(record, path, value, members, exempt, file)
+        except InputError as error:
+            first = first or error
+            refused[path] = value
+    if first is None:
+        return record
+    if len(refused) == len(values):
+        raise first
+    return replace_all(record, refused, members, exempt, file)
+
+
 def _node(value: Any) -> tree.Node:
     """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
@@ -147,7 +174,8 @@ class _Replacement(NamedTuple):
         try:
             return dataclasses.replace(record, **{word: content})
         except InvalidRecordError as error:
-            problems = [str(problem.inside(*place)) for problem in error.fields]
+            variant = inside.scope.variant
+            problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None
 
     def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:

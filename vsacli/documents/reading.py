@@ -159,12 +159,12 @@ def changed(
     Raises:
         ChangeError: the first change that cannot be applied.
     """
-    from vsacli.documents.paths import replace
+    from vsacli.documents.paths import replace_all
 
-    for path, value in changes.items():
+    for path in changes:
         check_path_of_change(path)
-        try:
-            document = replace(document, path, value, members, exempt, source.path)
-        except InputError as error:
-            raise ChangeError(error.problems) from None
+    try:
+        document = replace_all(document, changes, members, exempt, source.path)
+    except InputError as error:
+        raise ChangeError(error.problems) from None
     return document, source._replace(changes=json.dumps(changes)) if changes else source

@@ -19,6 +19,7 @@ from vsacli.documents.field_kinds import (
     Text,
     declared,
     on_one_line,
+    variant_inside,
 )
 from vsacli.documents.nested import Items, OneOf, Pair, PerJoint, Record
 
@@ -160,7 +161,10 @@ class Number(NamedTuple):
 
 
 def numbers(
-    record: Any, members: Mapping[str, str] = MappingProxyType({}), path: NumberPath = ()
+    record: Any,
+    members: Mapping[str, str] = MappingProxyType({}),
+    path: NumberPath = (),
+    variant: str | None = None,
 ) -> Iterator[Number]:
     """Yield every finite number in the declared fields of a record, nested records included.
 
@@ -168,27 +172,36 @@ def numbers(
         record: record with declared fields.
         members: name and unit variant of every joint, if the record has values by joint.
         path: path to the record.
+        variant: unit variant in the enclosing record, if it is not that of the joint.
     """
-    for name, (field, _) in declared(type(record)).items():
+    cls = type(record)
+    if hasattr(cls, "unit_variants"):
+        variant = variant_inside(cls, getattr(record, cls.unit_variant), variant)
+    for name, (field, _) in declared(cls).items():
         requirement = "" if field.check is None else field.check.requirement
-        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name))
+        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name), variant)
 
 
 def _numbers(
-    kind: Kind, content: Any, requirement: str, members: Mapping[str, str], path: NumberPath
+    kind: Kind,
+    content: Any,
+    requirement: str,
+    members: Mapping[str, str],
+    path: NumberPath,
+    variant: str | None,
 ) -> Iterator[Number]:
     if content is None:
         return
     if isinstance(kind, Pair) and content[0] is content[1]:
-        yield from _numbers(kind.item, content[0], requirement, members, path)
+        yield from _numbers(kind.item, content[0], requirement, members, path, variant)
     elif kind.item is not None:
         names = entry_names(kind, content, members)
         for number, (name, entry) in enumerate(zip(names, content, strict=True)):
-            yield from _numbers(kind.item, entry, requirement, members, (*path, Entry(number, name)))
+            yield from _numbers(kind.item, entry, requirement, members, (*path, Entry(number, name)), variant)
     elif kind.records:
-        yield from numbers(content, members, path)
+        yield from numbers(content, members, path, variant)
     elif kind.unit is not None and math.isfinite(content):
-        yield Number(path, kind.unit, float(content), requirement)
+        yield Number(path, kind.unit.inside(variant), float(content), requirement)
 
 
 def entry_names(kind: Kind, content: Any, members: Mapping[str, str]) -> list[str]:

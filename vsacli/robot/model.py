@@ -74,7 +74,8 @@ class Robot:
 
         Args:
             path: keys of the robot file joined by dots; an entry of a list is given by its name or index, `*`
-                stands for all entries. Or a mapping of such paths to values, which are replaced in turn.
+                stands for all entries. Or a mapping of such paths to values, which are replaced in turn; keys
+                that need each other, such as `gear_ratio` and `side`, may be in any order.
             value: any value that a file may have there: a number, a text such as "90 deg", a list or a
                 mapping.
 
@@ -83,10 +84,7 @@ class Robot:
         """
         from vsacli.documents import paths
 
-        robot = self
-        for each, wanted in ({path: value} if isinstance(path, str) else path).items():
-            robot = paths.replace(robot, each, wanted)
-        return robot
+        return paths.replace_all(self, {path: value} if isinstance(path, str) else path)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

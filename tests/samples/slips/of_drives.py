@@ -72,7 +72,7 @@ REST: list[Slip] = [
     Slip("N mm/rad^3 as k_c", "vsa_3r", "rest_to_rest",
         {"k_c: 2000": "k_c: 2000e3"}, "early hardening of springs", "actuator.spring", ""),
     Slip("a gear ratio left out", "scara_4", "scara_4",
-        {"max_velocity: 400, gear_ratio: 80": "max_velocity: 400"},
+        {"max_velocity: 400, gear_ratio: 80, side: shaft": "max_velocity: 400"},
         "velocities of motors behind the gear", "max_velocity", "400 deg/s"),
     Slip("kg mm^2 as rotor", "ur5_6r", "ur5_6r",
         {"motor: {inertia: 1.2e-4": "motor: {inertia: 120"}, "heavy rotors", "motor.inertia", "120 kg mm^2"),

@@ -12,7 +12,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.texts import together
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
-from vsacli.documents.field_kinds import Field
+from vsacli.documents.field_kinds import Field, variant_inside
 from vsacli.documents.fields import declared
 from vsacli.documents.reading import written
 from vsacli.files import recordings
@@ -34,8 +34,6 @@ def device_lines(joints: Sequence[Values]) -> Iterator[str]:
     for (kind_name, *lines), numbers in alike.items():
         yield f"{together(numbers, names)}: {kind_name}"
         yield from (f"  {line}" for line in lines)
-    if any("gear_ratio" in line for parts in alike for line in parts):
-        yield "numbers of a motor with gear_ratio are those of its shaft"
 
 
 def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
@@ -67,15 +65,14 @@ def _record(field: Field, values: Values, joint_type: str) -> str:
     """Return a record of a field in words: its type and its parameters."""
     word = values.get("type", "")
     cls = field.kind.records[word]
-    key, other_type = getattr(cls, "unit_variant_with", ("", joint_type))
-    inside = other_type if values.get(key) is not None else joint_type
+    inside = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), joint_type) or joint_type
     words = [word] if word else []
     for name, each, value in _given(cls, values):
         if each.kind.records:
             several = value if isinstance(value, list) else [value]
             words += [f"{name} ({_record(each, one, inside)})" for one in several]
         else:
-            words.append(_words(name, each.quantity, value, inside))
+            words.append(_words(name, each.quantity.inside(inside), value, joint_type))
     return ", ".join(words)
 
 

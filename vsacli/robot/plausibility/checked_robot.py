@@ -58,12 +58,10 @@ class CheckedRobot:
                 yield Measured(path, value, unit, abs(value))
 
     def _variant(self, path: NumberPath) -> str:
-        """Return the joint type on which the unit of a number depends; "revolute" for a motor with a gear."""
+        """Return the joint type on which the unit of a number depends."""
         if path[0] != "joints" or not isinstance(path[1], Entry):
             return "revolute"
-        joint = self.joints[path[1].number]
-        geared = any(motor.gear_ratio for at, motor in motors(joint) if at == path[2:-1])
-        return "revolute" if geared else joint.type
+        return self.joints[path[1].number].type
 
 
 def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:

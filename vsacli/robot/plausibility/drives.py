@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from vsacli.actuators.friction import Friction
-from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.base import units
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
@@ -21,8 +21,9 @@ TINY = 0.1
 """Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
 
 DAMPING_IN_MILLIMETERS = OtherUnit("N mm s/rad", 1e-3)
+ROTARY = (RPM._replace(instead_of="rad/s"), DEGREES_PER_SECOND._replace(instead_of="rad/s"))
 OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
-WHICH_SIDE = "with `gear_ratio` it is that of the motor's shaft, without that on the joint's side"
+WHICH_SIDE = "with `side: shaft` it is that of the motor's shaft, otherwise that on the joint's side"
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 """Names of rules, of gear ratios and sizes, whose findings explain those of motors behind a gear."""
 
@@ -72,10 +73,15 @@ class _Driven(NamedTuple):
         """Largest velocity on the joint side of the gear, rad/s (m/s)."""
         return _bounded(self.behind.max_velocity)
 
+    @property
+    def rotates(self) -> bool:
+        """Whether the motor is known to turn; it may be a linear one at a prismatic joint without a gear."""
+        return self.joint.is_revolute or self.motor.gear_ratio is not None
+
     def unit(self, name: str) -> str:
-        """Return the unit of a field; a motor with a gear is rotational."""
-        kind = self.joint.type if name == "gear_ratio" or self.motor.gear_ratio is None else "revolute"
-        return declared(Motor)[name][0].quantity.unit(kind)
+        """Return the unit of a field; a shaft is rotational at any joint."""
+        variant = "revolute" if self.motor.side == SHAFT else None
+        return declared(Motor)[name][0].quantity.inside(variant).unit(self.joint.type)
 
     def path(self, name: str) -> NumberPath:
         """Return the path of a field."""
@@ -123,21 +129,27 @@ def _heavy_rotor(driven: _Driven) -> float:
     return ratio(driven.behind.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
 
 
+def _shaft_velocity(driven: _Driven) -> float:
+    """Return the largest velocity of the motor's shaft, as written if the gear ratio is unknown."""
+    return driven.velocity * abs(driven.motor.gear_ratio or 1.0) if driven.rotates else math.nan
+
+
 def _output_velocity(driven: _Driven) -> float:
     return driven.velocity if driven.joint.is_revolute else math.nan
 
 
 def _joint_velocity(driven: _Driven) -> float:
     """Return the largest velocity that the motor allows the joint, over the limit of the joint."""
-    return ratio(driven.velocity, max(map(abs, driven.joint.limits.velocity)))
+    limit = max(map(abs, driven.joint.limits.velocity))
+    return ratio(driven.velocity, limit) if driven.rotates else math.nan
 
 
 def _speed_voltage(driven: _Driven) -> float:
     """Return the voltage that the largest velocity of a motor induces, over its largest voltage."""
-    constant, bound = driven.motor.torque_constant, driven.motor.max_voltage
+    constant, bound = driven.behind.torque_constant, driven.motor.max_voltage
     if constant is None or bound is None:
         return math.nan
-    return constant * _bounded(driven.motor.max_velocity) / _bounded(bound)
+    return abs(constant) * driven.velocity / _bounded(bound)
 
 
 def _damping(number: int, joint: Joint, size: float) -> Measured:
@@ -162,7 +174,11 @@ def _joint_damping(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 class _Rubbing(NamedTuple):
-    """Dry friction of a motor, or of a joint, which has no gear and no largest torque."""
+    """Dry friction of a motor, or of a joint, which has no gear and no largest torque.
+
+    Attributes:
+        gear: torque on the joint side over that on the side of the values.
+    """
 
     path: NumberPath
     friction: Friction
@@ -175,7 +191,7 @@ class _Rubbing(NamedTuple):
 
 def _rubbing(checked: CheckedRobot) -> Iterator[_Rubbing]:
     for driven in _all_motors(checked):
-        friction, joint, gear = driven.motor.friction, driven.joint, abs(driven.motor.gear_ratio or 1.0)
+        friction, joint, gear = driven.motor.friction, driven.joint, abs(driven.motor.ratio_of_side)
         if friction is not None:
             path, unit, bound = driven.path("friction"), driven.unit("max_torque"), driven.motor.max_torque
             yield _Rubbing(path, friction, joint, driven.scale, unit, gear, _bounded(bound))
@@ -225,7 +241,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         size="on the joint's side of the gear, over the inertia of the link about its joint", low=0.005,
         reason="gears multiply the rotor by the square of their ratio, and direct drives have large rotors",
         finding="is, on the joint's side of the gear, {size} of the inertia of the link about its joint",
-        advice="is it the rotor's own? Then give `gear_ratio` too, or multiply by its square",
+        advice="is it the rotor's own? Then give `gear_ratio` and `side: shaft`, or multiply by its square",
         explained_by=GEARS),
     Rule("heavy rotors", "`motor.inertia`", _motors("inertia", _heavy_rotor, carrying=True),
         size="on the joint's side of the gear, over mass times reach squared (mass) of the robot",
@@ -241,22 +257,23 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="stops the motor alone at a rate of {size} 1/s",
         units=(DAMPING_IN_MILLIMETERS, OtherUnit("N m s/krpm", 0.03 / math.pi)),
         advice="check the units of damping and inertia"),
-    Rule("velocities of motors", "`max_velocity`", _motors("max_velocity", unit="rad/s", carrying=True),
-        size="rad/s, as written", high=2500, usual=400, reason="robots have no faster motors",
-        finding="is more than 24,000 turns a minute", units=(RPM, DEGREES_PER_SECOND), in_angles=True),
+    Rule("velocities of motors", "`max_velocity`",
+        _motors("max_velocity", _shaft_velocity, carrying=True),
+        size="rad/s, of the motor's shaft", high=2500, usual=400, reason="robots have no faster motors",
+        finding="is more than 24,000 turns a minute of the motor", units=ROTARY, in_angles=True),
     Rule("velocities of motors behind the gear", "`max_velocity`",
         _motors("max_velocity", _output_velocity, unit="rad/s", carrying=True),
         size="rad/s, on the joint's side of the gear", high=FASTEST, usual=4,
         reason="limbs do not turn so fast",
-        finding="is, on the joint's side of the gear, {size} rad/s", units=(RPM, DEGREES_PER_SECOND),
-        advice="with `gear_ratio` it would be that of the motor's shaft",
+        finding="is, on the joint's side of the gear, {size} rad/s", units=ROTARY,
+        advice="with `gear_ratio` and `side: shaft` it would be that of the motor's shaft",
         explained_by=(*GEARS, "velocities of motors")),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
-        _motors("max_velocity", _joint_velocity, unit="rad/s", carrying=True),
+        _motors("max_velocity", _joint_velocity, carrying=True),
         size="on the joint's side of the gear, over the limit of the joint", high=8,
         reason="the limit of a joint is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
-        units=(RPM, DEGREES_PER_SECOND), advice="check the units of both", in_angles=True,
+        units=ROTARY, advice="check the units of both", in_angles=True,
         explained_by=(*GEARS, "velocities of motors", "velocities of motors behind the gear")),
     Rule("weak motors", "`max_torque`",
         _motors("max_torque", lambda m: ratio(m.torque, m.load), carrying=True),
@@ -264,7 +281,8 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         low=0.05, usual=2,
         reason="such a motor could accelerate the arm by a twentieth of gravity",
         finding="is, on the joint's side of the gear, {size} of what the weight of the stretched arm can ask",
-        advice="is it the motor's own? Then give `gear_ratio` too, or multiply by it", explained_by=GEARS),
+        advice="is it the motor's own? Then give `gear_ratio` and `side: shaft`, or multiply by it",
+        explained_by=GEARS),
     Rule("strong motors", "`max_torque`",
         _motors("max_torque", lambda m: ratio(m.torque, m.scale), carrying=True),
         size="on the joint's side of the gear, over the weight of the robot at its reach",

@@ -9,7 +9,7 @@ from typing import Any
 
 from vsacli.base.texts import for_yaml
 from vsacli.base.units import TORQUE
-from vsacli.documents.fields import Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
+from vsacli.documents.fields import Choice, Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
 from vsacli.robot.file import FORMAT
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
@@ -117,6 +117,8 @@ def _value(kind: Kind, content: Any) -> str:
             return _mapping({"type": word, **_written(content)})
         case Number():
             return _number(content)
+        case Choice():
+            return str(content)
         case Interval() | Vector():
             return _numbers(content)
     return json.dumps(content)

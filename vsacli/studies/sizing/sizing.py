@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.motor import SHAFT, JointMotor
 from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, check_type
@@ -209,7 +209,7 @@ def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:
     motor, choice = place.record, place.best
     assert motor is not None, "as of every place"
     assert choice is not None, "likewise"
-    found: dict[str, Any] = {"inertia": motor.inertia, "gear_ratio": choice.ratio}
+    found: dict[str, Any] = {"inertia": motor.inertia, "gear_ratio": choice.ratio, "side": SHAFT}
     found |= {name: getattr(motor, name) for name in KEPT if getattr(motor, name) is not None}
     if motor.damping:
         found["damping"] = motor.damping
