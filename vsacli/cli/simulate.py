@@ -91,7 +91,7 @@ class Options(NamedTuple):
     "--stiffness-poles",
     metavar="POLES",
     type=FILE,
-    help="Poles of the stiffness error in 1/s, in the same form.",
+    help="Poles of the stiffness error in 1/s, in the form of --poles.",
     show_default="-20",
 )
 @click.option(
@@ -131,8 +131,8 @@ class Options(NamedTuple):
     "--encoder-bits",
     metavar="N",
     type=int,
-    help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds the "
-    "same variables.",
+    help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds "
+    "q_measured and theta_measured to the result.",
 )
 @click.option(
     "--seed",
