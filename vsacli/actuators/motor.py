@@ -117,49 +117,6 @@ class Motor:
         "N m, rad/s at any joint",
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), "dry friction, joint side of the gear", default=None)
-    torque_constant: float | None = number(
-        units.JOINT_TORQUE_CONSTANT,
-        "ratio of the torque on the joint side of the gear to the current",
-        default=None,
-    )
-    resistance: float | None = number(units.RESISTANCE, "resistance of the windings", default=None)
-    max_current: float | None = number(units.CURRENT, "largest |current|", default=None)
-    max_voltage: float | None = number(units.VOLTAGE, "largest |voltage|", default=None)
-
-
-@dataclass(frozen=True)
-class Motor:
-    """A motor as declared: on the joint side of its gear, or with `side: shaft` on its own shaft."""
-
-    inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_ON_SIDE}", check=POSITIVE)
-    damping: float = number(units.DAMPING, f"viscous damping, {_ON_SIDE}", check=NON_NEGATIVE, default=0.0)
-    max_torque: float = number(
-        units.TORQUE,
-        f"largest |torque|, {_ON_SIDE}; flagged beyond",
-        check=POSITIVE_OR_INFINITE,
-        default=math.inf,
-    )
-    max_velocity: float = number(
-        units.VELOCITY,
-        f"largest |velocity|, {_ON_SIDE}; flagged beyond",
-        check=POSITIVE_OR_INFINITE,
-        default=math.inf,
-    )
-    gear_ratio: float | None = number(
-        units.GEAR_RATIO,
-        "turns of the motor per turn of the joint, negative if it turns in the opposite direction; a ratio "
-        "other than 1 requires side",
-        check=NON_ZERO,
-        default=None,
-    )
-    side: str | None = choice(
-        (JOINT, SHAFT),
-        "side of the gear to which inertia, damping, max_torque, max_velocity and friction refer; required with a "
-        "gear_ratio other than 1; values of the shaft, as in data sheets, are in kg m^2, N m s/rad, N m, rad/s "
-        "at any joint",
-        default=None,
-    )
     friction: Friction | None = value(Record(Friction), f"dry friction, {_ON_SIDE}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
