@@ -107,7 +107,7 @@ def _examined(command: tuple[str, ...], _path: str) -> Compiler:
     macros = _output(command, NATIVE, "-dM", "-E", "-x", "c", os.devnull)
     if any(f"#define {lie}\n" in f"{macros}\n" for lie in LIES):
         raise CompilerError(
-            f"{_spoken(command)!r} contains -ffast-math or a similar option, under which NaN goes unnoticed"
+            f"{_spoken(command)!r} enables -ffast-math or a similar option, under which NaN goes unnoticed"
         )
     return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS)))
 
