@@ -72,7 +72,7 @@ def _in_tables(lines: Sequence[str]) -> list[bool]:
     not wider than the first column.
     """
     found = [False]
-    for line, below in zip(lines, (*lines[1:], ""), strict=True):
+    for line, below in zip(lines, [*lines[1:], ""], strict=False):
         first = FIRST_COLUMN.match(below)
         is_name = bool(first) and _has_cells(below) and len(line) <= len(first[0] if first else "")
         alone = found[-1] and bool(line.strip()) and (line.startswith(BETWEEN_CELLS) or is_name)

@@ -82,6 +82,9 @@ def straight_line(computed: FloatArray, measured: FloatArray) -> tuple[float, fl
     return float(np.mean(measured) - gain * np.mean(computed)), gain, correlation
 
 
+MOST_DECIMALS = 6
+"""Decimals beyond which a standard error is printed with an exponent, as for exact data."""
+
 SHOWN_LAG = 5e-4
 """Smallest common lag, s, that is reported as a possible offset between clocks."""
 
@@ -187,6 +190,8 @@ def _with_error(value: float, error: float, unit: str, form: str) -> str:
     if not (math.isfinite(error) and error > 0):
         return f"{value:{form}} {unit}".rstrip()
     decimals = -math.floor(math.log10(error))
+    if decimals > MOST_DECIMALS:
+        return f"{value:{form}} +- {error:.1g} {unit}".rstrip()
     rounded, sign = (
         round(value, decimals) or 0.0,
         "+" if form.startswith("+") and round(value, decimals) else "",

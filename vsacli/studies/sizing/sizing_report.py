@@ -145,9 +145,10 @@ def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Yield a sentence for each trajectory with samples that were left out."""
     for outcome in outcomes:
         if outcome.left_out:
+            missing = f"{outcome.left_out} of {counted(outcome.samples, 'sample')}"
             yield (
-                f"{outcome.trajectory}: {outcome.left_out} of {counted(outcome.samples, 'sample')} infeasible "
-                "or singular and left out, so the answer is not for the whole motion; check-feasibility says why"
+                f"{outcome.trajectory}: {missing} infeasible or singular and left out, so the answer is not "
+                "for the whole motion; check-feasibility says why"
             )
 
 
@@ -266,7 +267,8 @@ def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
             yield f"{motor.name}: no sample is feasible, so nothing is known of it"
         elif motor.best is not None:
             with_gear = f"{motor.best.motor} with the gear {motor.best.ratio:.4g}"
-            yield f"{motor.name}: no motor suffices; the nearest, {with_gear}, would use {_listed(beyond)}"
+            others = "" if math.isnan(motor.best.low) else f"; gears {_gears(motor.best)} would suffice"
+            yield f"{motor.name}: no motor suffices; {with_gear} would use {_listed(beyond)}{others}"
         else:
             reason = f"it uses {_listed(beyond)}{_other_gears(motor)}"
             yield f"{motor.name}: {reason}"
