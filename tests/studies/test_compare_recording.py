@@ -274,7 +274,7 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     page = Page(tmp_path / "pages" / "r-m-comparison.html")
     assert {section["heading"] for section in page.data["sections"]} == names
     assert len(page.charts) == 2 * 15
-    assert began in page.text
+    assert "time offset +0.5137 +- 2e-08 s" in page.text
     assert hashlib.sha256((tmp_path / "m.csv").read_bytes()).hexdigest() in page.text
     report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--time-offset", str(BEGIN)).out)
     assert report["format"] == "vsacli-comparison/2"
