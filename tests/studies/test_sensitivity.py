@@ -61,7 +61,7 @@ def test_the_ranking_is_what_changes_do(arm, motion):
 
 def test_published_figures_of_the_papers_arm(vsacli):
     lines = vsacli("sensitivity", ROBOT, REST_TO_REST).out.splitlines()
-    rows = {line.split()[0]: line.split() for line in lines}
+    rows = {line.split()[0]: line.split() for line in lines if line}
     assert rows["joints.shoulder.actuator.spring.k"][3:6] == ["shoulder", "2.3", "2.49"]
     assert rows["joints.shoulder.actuator.spring.k_c"][3:5] == ["shoulder", "0.44"]
     assert rows["joints.elbow.link.mass"][3:5] == ["shoulder", "0.18"]
