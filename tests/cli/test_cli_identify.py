@@ -72,7 +72,7 @@ def test_figures_and_report(vsacli: Command, record: Path) -> None:
     found = vsacli("identify", ROBOT, record, *SPRINGS, "--plot", "figures")
     assert [path.name for path in Path("figures").iterdir()] == ["vsa_3r-1-record.png"]
     assert found.code == 3
-    assert found.out.startswith("vsa-3r from 1 record: POOR FIT\n")
+    assert found.out.startswith("POOR FIT  vsa-3r from 1 recording: ")
     assert "filtered to " in found.out
 
 
@@ -80,7 +80,7 @@ def test_a_page_of_report_and_records(vsacli: Command, record: Path) -> None:
     found = vsacli("identify", ROBOT, record, *SPRINGS, "--plot", "figures", "--format", "html")
     assert found.code == 3
     page = Page(Path("figures/vsa_3r-identification.html"))
-    assert re.search(r"vsa-3r from 1 record\s*poor fit\s*Report\s*number", page.text)
+    assert re.search(r"vsa-3r from 1 recording: 12 parameters[^\n]*\s*poor fit\s*Report", page.text)
     for line in found.out.splitlines()[1:]:
         for cell in filter(None, map(str.strip, line.split("   "))):
             assert cell in page.text
@@ -103,7 +103,7 @@ def test_what_cannot_be_told_is_exit_code_3(vsacli: Command, own_folder: Path) -
     record = excited(arm, MOTION._replace(swing=[0] * 3)).noisy(seed=1).write(own_folder / "record.csv", arm)
     found = vsacli("identify", ROBOT, record, *SPRINGS, "-o", "fitted.yaml")
     assert found.code == 3
-    assert "from 1 record: UNIDENTIFIABLE" in found.out
+    assert found.out.startswith("UNIDENTIFIABLE  vsa-3r from 1 recording: ")
     assert "base: only spring.k + 0.0" in found.out
     assert load_robot("fitted.yaml").joints[0].actuator.spring == arm.joints[0].actuator.spring
 

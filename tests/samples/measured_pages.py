@@ -23,10 +23,8 @@ def wicked_page(file: Path) -> Path:
     """A page whose texts would act if they were no texts."""
     time = np.linspace(0, 2, 101)
     curves = [MeasuredCurve(WICKED, "N m", 0.1, time, np.sin(time), np.sin(time) + 0.1)]
-    report = ReportText(WICKED, [("a", WICKED), (WICKED, "b")], [WICKED])
+    report = ReportText(WICKED, [("a", WICKED), (WICKED, "b")], [WICKED], [WICKED], [[(WICKED,), (WICKED,)]])
     inputs = [InputText(WICKED, "0" * 64, WICKED, WICKED), InputText(WICKED, "0" * 64, None, WICKED)]
-    facts = PageTexts(
-        WICKED, WICKED, WICKED, "bad", report, [(WICKED, WICKED)], inputs, table=[(WICKED,), (WICKED,)]
-    )
+    facts = PageTexts(WICKED, WICKED, WICKED, "bad", report, [(WICKED, WICKED)], inputs)
     file.write_text(measured_page(facts, {WICKED: curves}, WICKED), encoding="utf-8")
     return file

@@ -266,15 +266,15 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     done = vsacli("compare", "r.h5", "m.csv", "--plot", "figures")
     assert done.code == 0
     # What is left is the error of the spline through 500 samples a second.
-    began = "3 s of 3 s compared; the result begins 0.5137 +- 2e-08 s into the recording"
-    assert began in done.out
+    assert "; time offset +0.5137 +- 2e-08 s\n" in done.out
+    assert "3 s of 3 s compared; time offset found from the signals" in done.out
     names = {"q", "theta", "tau_motor"}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"r-m-{name}.png" for name in names}
     assert vsacli("compare", "r.h5", "m.csv", "--plot", "pages", "--format", "html").code == 0
     page = Page(tmp_path / "pages" / "r-m-comparison.html")
     assert {section["heading"] for section in page.data["sections"]} == names
     assert len(page.charts) == 2 * 15
-    assert began in page.text
+    assert "time offset +0.5137 +- 2e-08 s" in page.text
     assert hashlib.sha256((tmp_path / "m.csv").read_bytes()).hexdigest() in page.text
     report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--time-offset", str(BEGIN)).out)
     assert report["format"] == "vsacli-comparison/2"

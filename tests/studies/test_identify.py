@@ -136,9 +136,7 @@ def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) 
     told = identify(joint({"joints.*.actuator.spring.k": 350}), record, fit=["springs", "motors"])
     assert told.verdict == "unidentifiable"
     base = told.systems[0]
-    assert [number.note for number in base.numbers if ".spring." in number.path] == [
-        "cannot be told apart"
-    ] * 2
+    assert [number.note for number in base.numbers if ".spring." in number.path] == ["not distinguished"] * 2
     assert [number.value for number in base.numbers if ".spring." in number.path] == [350, 2000]
     assert "spring.k + 0.0" in base.combinations[0]
     assert all(residual.residual < 1.5 * residual.noise for residual in base.residuals)

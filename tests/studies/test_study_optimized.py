@@ -66,7 +66,7 @@ def test_durations_before_and_after(vsacli: Any, own_folder: Path) -> None:
     assert done.code == 0, done.err
     assert column("study.h5", "verdict").tolist() == ["ok", "impossible"]
     assert "1 ok, 1 impossible\n" in done.out
-    assert "nothing feasible was found in 1 runs; error in the table says why" in done.out
+    assert "nothing feasible was found in 1 run; the column error of the table says why" in done.out
     assert column("study.h5", "error")[1]
     before, after = column("study.h5", "cost_before"), column("study.h5", "cost_after")
     duration = load_trajectory("pull.yaml", load_robot("tendon.yaml")).duration

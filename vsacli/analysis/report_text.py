@@ -9,7 +9,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.base.texts import together
+from vsacli.base.texts import counted, together
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
 from vsacli.dynamics.energy import JointEnergy
 
@@ -156,7 +156,7 @@ def _rounded(value: float, digits: int) -> str:
 
 def count(samples: int) -> str:
     """Return a number of samples, in words."""
-    return f"{samples} sample" if samples == 1 else f"{samples} samples"
+    return counted(samples, "sample")
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:

@@ -6,6 +6,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from operator import itemgetter
 
 from vsacli.base.tables import BETWEEN_CELLS
 
@@ -33,6 +34,9 @@ QUOTED = re.compile(r"'[^']*'")
 CONTINUED = " \\"
 """End of each line of a command but its last, so that the lines can be copied into a shell."""
 
+FIRST_COLUMN = re.compile(r"\s*\S.*?\s{3,}")
+"""The first column of a line of a table, up to the second one."""
+
 HARD_BLANK = "\N{NO-BREAK SPACE}"
 """Placeholder for blanks that must not break while a text is wrapped."""
 
@@ -51,14 +55,29 @@ def fitted(text: str, width: int) -> str:
     broken = [headline]
     if len(headline) > width:
         broken = _wrapped(TOGETHER.sub(HARD_BLANK, headline), INDENT, width)
-    for is_table, group in groupby(lines, key=_has_cells):
-        several = list(group)
+    for is_table, group in groupby(zip(lines, _in_tables(lines), strict=True), key=itemgetter(1)):
+        several = [line for line, _ in group]
         fits = all(len(line) <= width for line in several)
         if is_table and len(several) > 1 and not fits:
             broken += _parts_of_table(several, width)
         else:
             broken += [part for line in several for part in _broken(line, width)]
     return "\n".join(broken)
+
+
+def _in_tables(lines: Sequence[str]) -> list[bool]:
+    """Return which lines belong to tables: those with several cells, and some between them with one.
+
+    These are lines of a header with the unit of one column, blank in front, and names above groups of rows,
+    not wider than the first column.
+    """
+    found = [False]
+    for line, below in zip(lines, [*lines[1:], ""], strict=False):
+        first = FIRST_COLUMN.match(below)
+        is_name = bool(first) and _has_cells(below) and len(line) <= len(first[0] if first else "")
+        alone = found[-1] and bool(line.strip()) and (line.startswith(BETWEEN_CELLS) or is_name)
+        found.append(_has_cells(line) or alone)
+    return found[1:]
 
 
 def _has_cells(line: str) -> bool:

@@ -34,16 +34,20 @@ class ReportText(NamedTuple):
         rows: a table, its header first; none if there is no table.
         lines: further values, a line or more each.
         findings: problems and warnings, a line or more each, the most critical first.
+        tables: further tables below the first, each with its header.
     """
 
     headline: str
     rows: Sequence[tuple[str, ...]]
     lines: Sequence[str]
     findings: Sequence[str] = ()
+    tables: Sequence[Sequence[tuple[str, ...]]] = ()
 
     def __str__(self) -> str:
-        table = "\n".join(line.rstrip() for line in aligned(self.rows)) if self.rows else ""
-        parts = ("\n".join([self.headline, *self.findings]), table, "\n".join(self.lines))
+        tables = [
+            "\n".join(line.rstrip() for line in aligned(rows)) for rows in (self.rows, *self.tables) if rows
+        ]
+        parts = ("\n".join([self.headline, *self.findings]), *tables, "\n".join(self.lines))
         return "\n\n".join(filter(None, parts))
 
 

@@ -53,6 +53,11 @@ def sentence(clause: str) -> str:
     return clause if clause.endswith(("?", ".")) else f"{clause}."
 
 
+def counted(number: int, noun: str, several: str = "") -> str:
+    """Return a number with its noun, in the plural unless it is 1; regular plurals need not be given."""
+    return f"{number} {noun if number == 1 else several or noun + 's'}"
+
+
 FEWEST_IN_A_ROW = 3
 """Length from which a run of consecutive names is shortened to the first and the last."""
 

@@ -17,7 +17,7 @@ from vsacli.cli.command_parts import (
     robot_argument,
     words_of,
 )
-from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
+from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say_json, say_text, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
@@ -156,7 +156,10 @@ def identify(
             page.write_text(identification_page(found, columns))
         elif folder is not None:
             draw_figures(found, robot, folder, file_format, outputs)
-    say(found, as_json)
+    if as_json:
+        say_json(found.as_json())
+    else:
+        say_text(str(found.as_text(verbose=talk.verbose)), found.verdict)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 

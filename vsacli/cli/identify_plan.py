@@ -66,7 +66,7 @@ def plan(
     talk.wrote(outputs)
     if output is None:
         talk.note("the excitation was not written; name a file for it: -o excitation.yaml")
-    return EXIT_OF_VERDICT[found.report.verdict]
+    return EXIT_OF_VERDICT[found.verdict]
 
 
 def _noise(given: tuple[float, ...] | None) -> Noise:

@@ -22,7 +22,7 @@ def draw_figures(found: Identification, robot: str, folder: str, file_format: st
     files.save(
         {
             names[record]: measured_sheet(
-                of_it, f"{found.robot}, {Path(record).stem}: predicted by the numbers found, filtered"
+                of_it, f"{found.robot}, {Path(record).stem}: predicted by the parameters found, filtered"
             )
             for record, of_it in curves.items()
         }
@@ -50,14 +50,13 @@ def identification_page(found: Identification, columns: str | None) -> str:
         *([] if columns is None else [("columns", one_line(columns))]),
     ]
     facts = PageTexts(
-        title=report.headline.rpartition(":")[0],
+        title=one_line(found.title),
         label=found.robot,
         verdict=found.verdict.replace("_", " "),
         tone=tone_of(found.verdict),
         report=report,
         provenance=provenance,
         inputs=[source_text(source) for source in found.sources],
-        table=found.residual_rows(),
     )
     return measured_page(facts, _curves(found), "predicted")
 

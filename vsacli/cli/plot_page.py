@@ -163,12 +163,10 @@ def _named(path: str) -> str:
 
 
 def _studies(paths: list[Path]) -> str:
-    from vsacli.base.tables import ReportText
     from vsacli.results.pages import study_page
     from vsacli.results.store.study_table import StoredStudy
     from vsacli.studies.sweeps import StudySummary
 
     with ExitStack() as stack:
         tables = [stack.enter_context(StoredStudy(path)) for path in paths]
-        summaries = [str(StudySummary.of(table)).splitlines() for table in tables]
-        return study_page(tables, [ReportText(first, [], rest) for first, *rest in summaries])
+        return study_page(tables, [StudySummary.of(table).as_text() for table in tables])

@@ -91,7 +91,6 @@ class PageTexts(NamedTuple):
         provenance: pairs of a name and its value.
         inputs: input files.
         fix: fixes; None if none are needed, or none were searched.
-        table: table of the report in addition to that in the text; header first, empty if there is none.
     """
 
     title: str
@@ -102,7 +101,6 @@ class PageTexts(NamedTuple):
     provenance: Sequence[tuple[str, str]]
     inputs: Sequence[InputText]
     fix: FixText | None = None
-    table: Sequence[tuple[str, ...]] = ()
 
 
 class InputText(NamedTuple):
@@ -193,6 +191,8 @@ def _shown(text: str | None) -> str | None:
 
 def printable(report: ReportText) -> ReportText:
     """Return a report whose texts name files or columns, with nothing in it that a page would not show."""
-    rows = [tuple("\n".join(map(one_line, cell.split("\n"))) for cell in row) for row in report.rows]
+    rows, *tables = (
+        [tuple(map(for_terminal, row)) for row in table] for table in (report.rows, *report.tables)
+    )
     findings, lines = (list(map(for_terminal, texts)) for texts in (report.findings, report.lines))
-    return ReportText(one_line(report.headline), rows, lines, findings)
+    return ReportText(one_line(report.headline), rows, lines, findings, tables)

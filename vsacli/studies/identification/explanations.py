@@ -25,7 +25,7 @@ from vsacli.studies.identification.estimation import (
     wider,
 )
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_report import CHANGED, significant
+from vsacli.studies.identification.identification_text import CHANGED, significant
 from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.residual_causes import Cause, causes
 
@@ -177,7 +177,7 @@ def _moved(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator
         name, unit, error = found.system.names[number], found.system.units[number], float(errors[at])
         there = f"{significant(value, before)} +- {before:.2g} {unit}"
         if np.isfinite(before) and not np.isfinite(error):
-            yield f"{name} cannot be told, found as {there}"
+            yield f"{name} would be unidentifiable, not {there}"
         elif abs(changes[at]) > CHANGED * before:
             now = f"{significant(value + float(changes[at]), error)} +- {error:.2g}"
             yield f"{name} would be {now}, not {there}"

@@ -35,10 +35,10 @@ from vsacli.studies.identification.identification_report import (
     RecordReport,
     Residual,
     SystemReport,
-    significant,
     system_report,
     torques,
 )
+from vsacli.studies.identification.identification_text import significant
 from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_equations import (
     FRICTION,
@@ -240,7 +240,7 @@ def _notes(
     if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
         yield reason
     elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):
-        yield "links are found by springs as in the file, which are taken for exact"
+        yield "links are identified with the springs of the file, which are assumed to be exact"
 
 
 def _explanations(

@@ -11,7 +11,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, aligned
+from vsacli.base.tables import ReportText, headline
+from vsacli.base.texts import counted
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
@@ -19,23 +20,26 @@ from vsacli.robot.parameters import JOINTS
 from vsacli.studies.identification.conditioning import Signals, torque_noise
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, held_out, rms
+from vsacli.studies.identification.identification_text import (
+    AT_BOUND,
+    CHANGED,
+    INDISTINCT,
+    NO_EFFECT,
+    NOT_PHYSICAL,
+    counts,
+    definitions,
+    findings,
+    parameter_rows,
+    residual_rows,
+    significant,
+    use_line,
+)
 from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recordings import TORQUE, Record
 
 OK, UNIDENTIFIABLE, POOR_FIT, UNRELIABLE = "ok", "unidentifiable", "poor_fit", "unreliable"
 """Verdicts, the worst last: all parameters are identified; some are not; residuals exceed the noise; a
 recording looks wrong."""
-
-CHANGED = 3.0
-"""Difference from the file, in standard errors, that is a change. Of a hundred unchanged parameters, five
-exceed two standard errors by chance, and less than one exceeds three."""
-
-
-TENS = 10
-"""Difference in standard errors below which it is printed with a decimal."""
-
-LARGEST_SAID = 1e3
-"""Difference in standard errors above which it is not printed, since it means nothing."""
 
 
 @dataclass(frozen=True)
@@ -211,93 +215,27 @@ class Identification(Published):
         return tuple(number for system in self.systems for number in system.numbers)
 
     def __str__(self) -> str:
-        return "\n".join(
-            [
-                self._headline(),
-                self._summary(),
-                *map(_used_line, self.records),
-                *(line.rstrip() for line in aligned(self._numbers())),
-                *aligned(self.residual_rows()),
-                *self._sentences(),
-            ]
+        return str(self.as_text())
+
+    @property
+    def title(self) -> str:
+        """Name of the robot, and how many of its parameters agree with the file."""
+        return f"{self.robot} from {counted(len(self.records), 'recording')}: {counts(self.numbers)}"
+
+    def as_text(self, *, verbose: bool = False) -> ReportText:
+        """Return the report in parts.
+
+        Args:
+            verbose: whether to add the definitions of base parameters that are sums.
+        """
+        lines = [*map(use_line, self.records), *definitions(self.numbers, verbose=verbose)]
+        return ReportText(
+            headline(self.verdict, self.title),
+            parameter_rows(self.numbers, self.fitted.joint_names),
+            lines,
+            list(findings(self)),
+            [residual_rows(self)],
         )
-
-    def as_text(self) -> ReportText:
-        """Return the report in parts, with the table of parameters; `residual_rows` is the other table."""
-        lines = [self._summary(), *map(_used_line, self.records), *self._sentences()]
-        return ReportText(self._headline(), self._numbers(), lines)
-
-    def _headline(self) -> str:
-        count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
-        return f"{self.robot} from {count}: {self.verdict.upper().replace('_', ' ')}"
-
-    def _summary(self) -> str:
-        """Return the numbers of parameters that agree with the file, differ, or are unidentifiable."""
-        identifiable = sum(each.identifiable for each in self.numbers)
-        changed = sum(each.changed for each in self.numbers)
-        counts = {
-            f"{'agrees' if identifiable - changed == 1 else 'agree'} with the file": identifiable - changed,
-            f"{'differs' if changed == 1 else 'differ'} by more than {CHANGED:g} standard errors": changed,
-            "cannot be told": len(self.numbers) - identifiable,
-        }
-        listed = ", ".join(f"{count} {words}" for words, count in counts.items() if count)
-        return f"{len(self.numbers)} number{'s' if len(self.numbers) != 1 else ''}: {listed}"
-
-    def _numbers(self) -> list[tuple[str, ...]]:
-        rows: list[tuple[str, ...]] = [("number", "file", "found", "+-", "unit", "")]
-        for each in self.numbers:
-            said = each.note or (_off(each.off) if each.changed else "as in the file")
-            found = significant(each.value, each.standard_error)
-            error = f"{each.standard_error:.2g}" if each.identifiable else "-"
-            rows.append((each.path, f"{each.before:.6g}", found, error, each.unit, said))
-        return rows
-
-    def residual_rows(self) -> list[tuple[str, ...]]:
-        """Return a table of the residuals of each motor or link, the header first."""
-        rows: list[tuple[str, ...]] = [
-            ("rms, filtered", "torque", "residual", "noise", "held out", "condition")
-        ]
-        for system in self.systems:
-            for each in system.residuals:
-                torque, residual, noise, held_out = (
-                    f"{value:.3g} {each.unit}" if math.isfinite(value) else "-"
-                    for value in (each.torque, each.residual, each.noise, each.held_out)
-                )
-                rows.append((each.group, torque, residual, noise, held_out, f"{system.condition:.3g}"))
-        return rows
-
-    def _sentences(self) -> Iterator[str]:
-        for system in self.systems:
-            yield from (f"{system.title}: {sentence}" for sentence in system.combinations)
-            yield from (
-                f"{each.path} is {each.sum}" for each in system.numbers if each.sum not in ("", each.path)
-            )
-        for record in self.records:
-            yield from (f"{record.path}: {doubt}" for doubt in record.doubts)
-        yield from self.notes
-
-
-def _off(errors: float) -> str:
-    size = abs(errors)
-    return f"changed, {size:.{int(size < TENS)}f} errors" if size < LARGEST_SAID else "changed"
-
-
-def _used_line(record: RecordReport) -> str:
-    used = f"{record.duration:.4g} s at {record.rate:.4g} Hz, filtered to {record.bandwidth:.3g} Hz"
-    line = f"{record.path}: {used}"
-    if not math.isfinite(record.delay):
-        return f"{line}; whether torques lag behind positions cannot be told"
-    late = f"{1e3 * record.delay:+.2g} +- {1e3 * record.delay_error:.1g} ms behind positions"
-    return f"{line}; torques are {late}{', which is taken out' if record.corrected else ''}"
-
-
-def significant(value: float, error: float) -> str:
-    """Return a value rounded to two digits of its standard error."""
-    if not (math.isfinite(error) and error > 0):
-        return f"{value:.6g}"
-    decimals = 1 - math.floor(math.log10(error))
-    rounded = round(value, decimals)
-    return f"{rounded:.{max(decimals, 0)}f}"
 
 
 SMOOTH_CURVES = 8
@@ -310,7 +248,8 @@ def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> Syst
     of_joint = f"{JOINTS}.{system.title}.actuator."
     names = [system.names[number].removeprefix(of_joint) for number in found.free]
     combinations = [
-        f"only {each.words(names)} can be told: {each.value:.6g} +- {each.standard_error:.2g}"
+        f"only {each.words(names)} is identifiable: {significant(each.value, each.standard_error)} "
+        f"+- {each.standard_error:.2g}"
         for each in fit.inseparable
     ]
     return SystemReport(
@@ -332,12 +271,12 @@ def numbers_of(found: Solution) -> Iterator[Number]:
         before = float(system.before[number])
         if number in found.bound:
             value, error = found.bound[number]
-            note = "came out impossible" if np.isnan(error) else "" if value == before else "at its bound"
+            note = NOT_PHYSICAL if np.isnan(error) else "" if value == before else AT_BOUND
         else:
             at = found.free.index(number)
             value, error = float(fit.values[at]), float(fit.standard_errors[at])
-            note = "cannot be told apart" if at in inseparable else ""
-            note = "changes nothing" if at in fit.unexcited else note
+            note = INDISTINCT if at in inseparable else ""
+            note = NO_EFFECT if at in fit.unexcited else note
         yield Number(name, unit, before, value, error, note, total)
 
 

@@ -28,7 +28,7 @@ from vsacli.robot.parameters import parameters
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import SEPARABLE, Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_report import significant
+from vsacli.studies.identification.identification_text import significant
 from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP

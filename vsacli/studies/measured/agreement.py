@@ -82,6 +82,9 @@ def straight_line(computed: FloatArray, measured: FloatArray) -> tuple[float, fl
     return float(np.mean(measured) - gain * np.mean(computed)), gain, correlation
 
 
+MOST_DECIMALS = 6
+"""Decimals beyond which a standard error is printed with an exponent, as for exact data."""
+
 SHOWN_LAG = 5e-4
 """Smallest common lag, s, that is reported as a possible offset between clocks."""
 
@@ -124,52 +127,74 @@ class Comparison(Published):
     def __str__(self) -> str:
         return str(self.as_text())
 
+    @property
+    def title(self) -> str:
+        """Names, the largest relative error, and the time offset."""
+        return f"{self.result}, {self.recording}: {self._worst()}; {self._alignment()}"
+
     def as_text(self) -> ReportText:
         """Return the report in parts."""
-        return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
-
-    def _headline(self) -> str:
-        when = _with_error(abs(self.time_offset), self.time_offset_error, "s", ".4f")
-        where = f"{when} {'into' if self.time_offset >= 0 else 'before'} the recording"
         how = "found from the signals" if self.found else "as given"
-        covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared"
-        return f"{self.result}, {self.recording}: {covered}; the result begins {where} ({how})"
+        covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared; time offset {how}"
+        return ReportText(self.title, self._rows(), [covered], self.notes)
+
+    def _worst(self) -> str:
+        known = [each for each in self.signals if math.isfinite(each.share)]
+        worst = max(known, key=lambda each: each.share, default=None)
+        if worst is None:
+            return "no relative error, since no computed signal changes"
+        return f"rms error up to {100 * worst.share:.3g} % ({worst.column})"
+
+    def _alignment(self) -> str:
+        """Return at which time in the recording the result begins."""
+        return f"time offset {_with_error(self.time_offset, self.time_offset_error, 's', '+.4f')}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         header = (
             "measured",
             "compared with",
+            "unit",
             "rms error",
-            "of rms",
+            "of rms\n%",
             "largest",
-            "at",
+            "at\ns",
             "offset",
             "gain",
-            "lag",
+            "lag\nms",
         )
         return [header, *map(_row, self.signals)]
 
 
 def _row(signal: Agreement) -> tuple[str, ...]:
-    def figure(value: float, form: str, unit: str = "") -> str:
-        return f"{value:{form}}{unit}" if math.isfinite(value) else "-"
+    def figure(value: float, form: str) -> str:
+        return f"{value:{form}}" if math.isfinite(value) else "-"
 
-    unit = f" {signal.unit}"
     return (
         signal.column,
         signal.variable,
-        figure(signal.rms, ".3g", unit),
-        figure(100 * signal.share, ".3g", " %"),
-        figure(signal.worst, "+.3g", unit),
-        figure(signal.worst_time, ".3f", " s"),
-        _with_error(signal.offset, signal.offset_error, signal.unit, "+.2g"),
+        signal.unit,
+        figure(signal.rms, ".3g"),
+        figure(100 * signal.share, ".3g"),
+        figure(signal.worst, "+.3g"),
+        figure(signal.worst_time, ".3f"),
+        _with_error(signal.offset, signal.offset_error, "", "+.2g"),
         _with_error(signal.gain, signal.gain_error, "", ".4g"),
-        _with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "ms", "+.1f"),
+        _with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "", "+.1f"),
     )
 
 
 def _with_error(value: float, error: float, unit: str, form: str) -> str:
+    """Return a value rounded to one digit of its standard error, with it; by the form without one."""
     if not math.isfinite(value):
         return "-"
-    known = f" +- {error:.1g}" if math.isfinite(error) else ""
-    return f"{value:{form}}{known} {unit}".rstrip()
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:{form}} {unit}".rstrip()
+    decimals = -math.floor(math.log10(error))
+    if decimals > MOST_DECIMALS:
+        return f"{value:{form}} +- {error:.1g} {unit}".rstrip()
+    rounded, sign = (
+        round(value, decimals) or 0.0,
+        "+" if form.startswith("+") and round(value, decimals) else "",
+    )
+    shown, spread = (f"{each:{kind}.{max(decimals, 0)}f}" for each, kind in ((rounded, sign), (error, "")))
+    return f"{shown} +- {spread} {unit}".rstrip()

@@ -179,7 +179,7 @@ class CopperLoss(Criterion):
     """Copper loss of the motors of the joint."""
 
     name = "copper_loss"
-    words = "heat in the windings"
+    words = "copper loss"
 
     def check(self, joint: Joint) -> None:
         """Check that the motors have a resistance."""
@@ -212,7 +212,7 @@ class Energy(Criterion):
     """
 
     name = "energy"
-    words = "energy spent"
+    words = "positive motor work"
     smoothings = SMOOTHINGS
 
     def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText
+from vsacli.base.texts import counted
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -88,13 +89,21 @@ class TimingOptimum(Published):
     agreeing: int
     bounding: dict[str, dict[str, float]]
 
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the table of durations."""
+        durations = {
+            "as commanded": self.before,
+            "slowed down or sped up uniformly": self.uniform,
+            "local optimum": self.after,
+        }
+        header = ("timing", "duration\ns", "change\n%")
+        known = {words: value for words, value in durations.items() if not math.isnan(value)}
+        rows = [(words, f"{value:.4g}", _change(self.before, value)) for words, value in known.items()]
+        return [header, *rows]
+
     def lines(self) -> Iterator[str]:
-        """Yield the durations, and the active bounds of each joint."""
-        yield f"as commanded {self.before:.4g} s"
-        if not math.isnan(self.uniform):
-            yield f"fastest when slowed down or sped up as a whole {self.uniform:.4g} s"
-        than = "" if math.isnan(self.uniform) else f", {100 * (1 - self.after / self.uniform):.1f} % less"
-        yield f"{_search(self)}: {self.after:.4g} s{than}"
+        """Yield how it was found, and the active bounds of each joint."""
+        yield _search(self)
         yield from (f"{name}: {_along(shares, 'path')}" for name, shares in self.bounding.items())
 
 
@@ -162,60 +171,96 @@ class Optimum(Published):
         return self.robot.name
 
     def __str__(self) -> str:
-        return "\n".join(self._lines())
+        return str(self.as_text())
 
-    def _lines(self) -> Iterator[str]:
-        title = f"{self.robot_name}, {self.asked}: {self.words} by another {VARIED[self.varied]}"
+    @property
+    def title(self) -> str:
+        """Names, the objective, and what was gained."""
+        what = f"{self.words} by {VARIED[self.varied]}"
+        return f"{self.robot_name}, {self.asked}: {what}: {self._gain()}"
+
+    def _gain(self) -> str:
+        """Return cost before and after with the change; of several joints, the range of changes."""
         if self.trajectory is None:
-            yield f"{title}: nothing feasible was found"
-            yield from (f"- {reason}" for reason in self.reasons)
-            return
-        yield title
+            return "nothing feasible was found"
         if self.timing is not None:
-            yield from self.timing.lines()
-            return
-        if self.slow_down != 1:
-            yield (
-                f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: nothing "
-                "feasible was found that lasts as commanded"
-            )
-        yield from aligned(list(self._rows()))
-        whole = "time" if self.together is None else "path"
-        yield from (
-            f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
-        )
-
-    def _rows(self) -> Iterator[tuple[str, ...]]:
+            return _gain(self.timing.before, self.timing.after, "s")
         if self.together is not None:
-            yield ("joint", "as commanded", "local optimum", "change")
-            costs: dict[str, JointOptimum | TotalCost] = {**self.joints, "together": self.together}
-            for name, of in costs.items():
-                before, after = (_cost(cost, of.unit) for cost in (of.before, of.after))
-                yield (name, before, after, _change(of.before, of.after))
-            return
-        yield ("joint", "as commanded", "best constant", "local optimum", "change")
-        for name, each in self.joints.items():
-            found = [_cost(cost, each.unit) for cost in (each.before, each.constant, each.after)]
-            yield (name, *found, _change(each.before, each.after))
+            total = self.together
+            if total.unit:
+                return _gain(total.before, total.after, total.unit)
+            return f"{_change(total.before, total.after)} % on average over the joints"
+        if len(self.joints) == 1:
+            [only] = self.joints.values()
+            return _gain(only.before, only.after, only.unit)
+        known = {name: each for name, each in self.joints.items() if each.before > 0}
+        if not known:
+            return "feasible, which it is not as commanded"
+        order = sorted(known, key=lambda name: known[name].after / known[name].before)
+        changes = [f"{_change(known[name].before, known[name].after)} % ({name})" for name in order]
+        return " to ".join(dict.fromkeys((changes[0], changes[-1])))
+
+    def as_text(self) -> ReportText:
+        """Return the report in parts."""
+        if self.trajectory is None:
+            return ReportText(self.title, [], [], list(self.reasons))
+        if self.timing is not None:
+            return ReportText(self.title, self.timing.rows(), list(self.timing.lines()))
+        slowed = (
+            f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: no feasible "
+            "timing of the commanded duration was found"
+        )
+        whole = "time" if self.together is None else "path"
+        lines = [
+            f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
+        ]
+        return ReportText(self.title, self._rows(), lines, [slowed] if self.slow_down != 1 else [])
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Return the table of costs, the total last."""
+        costs: dict[str, JointOptimum | TotalCost] = dict(self.joints)
+        constants = self.together is None
+        if self.together is not None:
+            costs["together" if self.together.unit else "together, relative"] = self.together
+        units = " | ".join(dict.fromkeys(each.unit for each in costs.values() if each.unit))
+        names = ("as commanded", *(["best constant"] if constants else []), "local optimum")
+        rows = [("joint", *(f"{name}\n{units}".rstrip() for name in names), "change\n%")]
+        for name, each in costs.items():
+            constant = [_cost(each.constant)] if constants and isinstance(each, JointOptimum) else []
+            change = _change(each.before, each.after)
+            rows.append((name, _cost(each.before), *constant, _cost(each.after), change))
+        return rows
 
 
-def _cost(cost: float, unit: str) -> str:
-    return "-" if math.isnan(cost) else f"{cost:.4g} {unit}".rstrip()
+def _cost(cost: float) -> str:
+    return "-" if math.isnan(cost) else f"{cost:.4g}"
 
 
 def _change(before: float, after: float) -> str:
-    return "-" if not before > 0 or math.isnan(after) else f"{100 * (after / before - 1):+.1f} %"
+    if not before > 0 or math.isnan(after):
+        return "-"
+    change = round(100 * (after / before - 1), 1)
+    return f"{change:+.1f}" if change else "0.0"
+
+
+def _gain(before: float, after: float, unit: str) -> str:
+    """Return a cost before and after with its change; only the latter if the former is infeasible."""
+    found = f"{_cost(after)} {unit}".rstrip()
+    if math.isnan(before):
+        return f"{found} (infeasible as commanded)"
+    change = _change(before, after)
+    return f"{_cost(before)} to {found}" + ("" if change == "-" else f" ({change} %)")
 
 
 def _along(bounding: Mapping[str, float], whole: str) -> str:
     """Return a clause with the active bounds and their shares."""
     along = [
-        f"the {name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the {whole}"
+        f"{name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the {whole}"
         for name, share in bounding.items()
     ]
-    return "inside all bounds" if not along else f"along {', '.join(along)}"
+    return f"active bounds: {', '.join(along) or 'none'}"
 
 
 def _search(optimum: JointOptimum | TimingOptimum) -> str:
-    ended = "local optimum" if optimum.found else "no local optimum, the search ended before"
-    return f"{ended}, from {optimum.agreeing} of {optimum.starts} starts"
+    ended = "local optimum" if optimum.found else "no local optimum: the search ended before"
+    return f"{ended}; reached from {optimum.agreeing} of {counted(optimum.starts, 'start')}"

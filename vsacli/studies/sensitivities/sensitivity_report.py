@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText
+from vsacli.base.texts import counted
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.tolerances import MonteCarlo
 
@@ -108,89 +109,166 @@ class Sensitivity(Published):
     }
 
     def __str__(self) -> str:
-        title = f"{self.robot}, {self.trajectory}: {len(self.parameters)} numbers"
+        return str(self.as_text())
+
+    @property
+    def title(self) -> str:
+        """Names, and with tolerances the largest uncertainty of a motor torque, else the largest effect."""
+        known = {joint: band for joint, band in self.band.items() if math.isfinite(band.share)}
+        worst = max(known, key=lambda joint: known[joint].share, default=None)
+        if worst is not None:
+            band = known[worst]
+            size = f"{band.torque:.3g} {self.units[worst]} ({_percent(band.share)} of its peak, {worst})"
+            answer = f"motor torque +- {size}"
+        elif self.top and self.top[0].most is not None:
+            (joint, effect), first = self.top[0].most, self.top[0]
+            change = f"{first.words} of {first.path} changes motor torque"
+            answer = f"{change} by {_percent(effect.share)} of its peak ({joint})"
+        else:
+            answer = "no parameter changes a motor torque"
+        return f"{self.robot}, {self.trajectory}: {counted(len(self.parameters), 'parameter')}; {answer}"
+
+    def as_text(self) -> ReportText:
+        """Return the report in parts; the first table is that of tolerances, if there are any."""
+        ranking = self._rows() if self.top else []
+        band, findings = self._band_rows(), list(self._findings())
+        tables = [band, ranking] if band else [ranking]
+        return ReportText(self.title, tables[0], list(self._lines()), findings, tables[1:])
+
+    def _findings(self) -> Iterator[str]:
         if self.failed:
-            title += f"; {self.failed} steps of joints are {self.verdict} and do not count"
-        return "\n".join([title, *aligned(list(self._rows())), *self._more(), *self._bands(), *self._drawn()])
+            yield (
+                f"{counted(self.failed, 'sample')} of joints {'is' if self.failed == 1 else 'are'} "
+                f"{self.verdict} and ignored; check-feasibility says why"
+            )
+        reversing = [joint for joint, band in self.band.items() if band.reverses]
+        if reversing and self.monte_carlo is None:
+            yield (
+                f"{', '.join(reversing)}: dry friction jumps where a motor reverses, at a time known only to "
+                "first order; --monte-carlo computes robots drawn from the tolerances"
+            )
 
     @property
     def top(self) -> tuple[ParameterEffect, ...]:
         """Effects of the parameters in the table."""
         return tuple(each for each in self.parameters[:SHOWN] if each.most is not None)
 
-    def _rows(self) -> Iterator[tuple[str, ...]]:
-        yield ("number", "change", "peak motor torque", "", "at", "smallest margin", "energy spent")
+    def _rows(self) -> list[tuple[str, ...]]:
+        units = " | ".join(dict.fromkeys(self.units[each.most[0]] for each in self.top if each.most))
+        rows: list[tuple[str, ...]] = [
+            (
+                "parameter",
+                "change",
+                "joint",
+                "peak torque\n%",
+                f"torque\n{units}",
+                "at\ns",
+                "margin\npoints",
+                "motor work\nJ",
+            )
+        ]
         for each in self.top:
             assert each.most is not None
             joint, effect = each.most
             spent = sum(of_joint.spent for of_joint in each.joints.values())
-            yield (
-                each.path,
-                each.words,
-                f"{joint} {100 * effect.share:.2g} %",
-                f"{effect.torque:.3g} {self.units[joint]}",
-                f"{effect.time:.3f} s",
-                _margins(each),
-                f"{spent:+.2g} J",
+            rows.append(
+                (
+                    each.path,
+                    each.words,
+                    joint,
+                    f"{100 * effect.share:.2g}",
+                    f"{effect.torque:.3g}",
+                    f"{effect.time:.3f}",
+                    _margins(each, joint),
+                    f"{spent:+.2g}" if spent else "0",
+                )
             )
+        return rows
 
-    def _more(self) -> Iterator[str]:
+    def _lines(self) -> Iterator[str]:
+        """Yield what the table of parameters leaves out."""
         rest = sum(each.most is not None for each in self.parameters[SHOWN:])
         without = sum(each.most is None for each in self.parameters)
         if rest:
-            last = self.parameters[SHOWN].share
-            yield f"and {rest} more, with {100 * last:.2g} % and less; all with --json"
+            others = counted(rest, "other parameter")
+            effect = _percent(self.parameters[SHOWN].share)
+            yield f"{others} {'has' if rest == 1 else 'have'} an effect of {effect} or less; --json lists all"
         if without:
-            yield f"{without} change no motor torque, or are zero"
-
-    def _bands(self) -> Iterator[str]:
-        for joint, band in self.band.items():
-            said = []
-            if math.isfinite(band.share):
-                size = f"{band.torque:.3g} {self.units[joint]} ({_percent(band.share)} of its peak)"
-                mostly = ", mostly by when dry friction reverses" if band.reversals > 1 / 2 else ""
-                said.append(f"motor torque +- {size} at t = {band.time:.3f} s{mostly}")
-            if math.isfinite(band.margin):
-                said.append(
-                    f"margin {100 * band.margin:.2f} +- {_percent(band.margin_deviation)} at t = "
-                    f"{band.margin_time:.3f} s, lost with a probability of {_probability(band.lost)}"
-                )
-            yield f"{joint}: {'; '.join(said) or 'no motor torque, since no step is feasible and regular'}"
-        reversing = [joint for joint, band in self.band.items() if band.reverses]
-        if reversing and self.monte_carlo is None:
-            yield (
-                f"{', '.join(reversing)}: dry friction jumps where a motor reverses; when it does is known "
-                "to first order, and --monte-carlo draws robots, which tell more"
+            yield f"{counted(without, 'parameter')} without effect on motor torques, or zero"
+        if self.monte_carlo is not None:
+            drawn = self.monte_carlo
+            refused = (
+                f", of which {counted(drawn.refused, 'draw')} made no valid robot" if drawn.refused else ""
             )
+            yield f"Monte Carlo: {counted(drawn.drawn, 'robot')} drawn{refused}"
 
-    def _drawn(self) -> Iterator[str]:
-        if self.monte_carlo is None:
-            return
+    def _band_rows(self) -> list[tuple[str, ...]]:
+        """Return the table of the effects of tolerances on each joint; empty without tolerances."""
+        if not self.band:
+            return []
+        units = " | ".join(dict.fromkeys(self.units[joint] for joint in self.band))
         drawn = self.monte_carlo
-        refused = f", {drawn.refused} of them no robots" if drawn.refused else ""
-        each = ", ".join(
-            f"{joint} {self._deviation(joint, drawn.torque[joint])}, {_probability(lost)} lost"
-            for joint, lost in drawn.lost.items()
+        header = (
+            "joint",
+            f"torque +-\n{units}",
+            "of peak\n%",
+            "at\ns",
+            "margin\n%",
+            "at\ns",
+            "P(infeasible)\n%",
+            *([] if drawn is None else [f"drawn +-\n{units}", "infeasible\n% of draws"]),
+            *(["mostly by"] if any(_by_friction(band) for band in self.band.values()) else []),
         )
-        yield f"of {drawn.drawn} robots drawn{refused}: {each}"
+        rows = [header]
+        for joint, band in self.band.items():
+            has_torque, has_margin = math.isfinite(band.share), math.isfinite(band.margin)
+            torque = (
+                (f"{band.torque:.3g}", _points(band.share), f"{band.time:.3f}") if has_torque else ["-"] * 3
+            )
+            margin = (
+                (
+                    f"{100 * band.margin:.2f} +- {_points(band.margin_deviation)}",
+                    f"{band.margin_time:.3f}",
+                    _probability(band.lost),
+                )
+                if has_margin
+                else ["-"] * 3
+            )
+            of_draws: list[str] = []
+            if drawn is not None:
+                of_draws = ["-", "-"]
+                if joint in drawn.lost:
+                    deviation = drawn.torque[joint]
+                    spread = "-" if math.isnan(deviation) else f"{deviation:.3g}"
+                    of_draws = [spread, _probability(drawn.lost[joint])]
+            friction = ["reversal" if _by_friction(band) else "-"] if header[-1] == "mostly by" else []
+            rows.append((joint, *torque, *margin, *of_draws, *friction))
+        return rows
 
-    def _deviation(self, joint: str, torque: float) -> str:
-        if math.isnan(torque):
-            return "+- unknown (fewer than two have torques)"
-        return f"+- {torque:.3g} {self.units[joint]}"
+
+def _by_friction(band: JointBand) -> bool:
+    """Return whether most of the uncertainty is that of the time at which dry friction reverses."""
+    return band.reversals > 1 / 2
 
 
-def _margins(effect: ParameterEffect) -> str:
-    """Return the largest change of a smallest margin."""
+def _margins(effect: ParameterEffect, shown: str) -> str:
+    """Return the largest change of a smallest margin, with the joint unless the row shows it."""
     changes = {name: each.margin for name, each in effect.joints.items() if math.isfinite(each.margin)}
     joint = max(changes, key=lambda name: abs(changes[name]), default=None)
-    return "-" if joint is None or not changes[joint] else f"{joint} {100 * changes[joint]:+.2g} points"
+    if joint is None or not changes[joint]:
+        return "-"
+    return ("" if joint == shown else f"{joint} ") + f"{100 * changes[joint]:+.2g}"
 
 
 def _probability(share: float) -> str:
-    return _percent(share) if share >= 1e-6 else "less than 1e-4 %"
+    """Return a probability in percent."""
+    return _points(share) if share >= 1e-6 or share == 0 else "< 1e-4"
 
 
 def _percent(share: float) -> str:
     """Return a percentage with two digits, or as an integer from 100 % on."""
-    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+    return f"{_points(share)} %"
+
+
+def _points(share: float) -> str:
+    return f"{100 * share:.2g}" if abs(share) < 0.995 else f"{100 * share:.0f}"

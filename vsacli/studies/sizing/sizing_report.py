@@ -9,8 +9,9 @@ from typing import ClassVar
 
 from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import aligned
-from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, time_text
+from vsacli.base.tables import ReportText, headline
+from vsacli.base.texts import counted
+from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, time_text, units_of
 from vsacli.studies.sizing.choices import CRITERIA, Choice
 from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
 from vsacli.studies.sizing.motor_sizing import MotorSizing
@@ -72,20 +73,24 @@ class Sizing(Published):
         return tuple(motor for motor in self.motors if not motor.does)
 
     def __str__(self) -> str:
-        """Return the lines that the command prints, without a final newline."""
+        return str(self.as_text())
+
+    def as_text(self) -> ReportText:
+        """Return the report in parts: motors and their utilization, then demands on joints and springs."""
         known = [motor for motor in self.motors if motor.asked is not None]
         several = len(self.outcomes) > 1
-        return "\n".join(
-            [
-                self._headline(),
-                *left_out(self.outcomes),
-                *(asked_table(known, several=several) if self.catalog else ()),
-                *(choice_table(known) if self.catalog else own_table(known, several=several)),
-                *lacking(self.lacking),
-                *spring_table(self.springs, several=several),
-                *warnings_and_notes(self.warnings, self.notes),
-            ]
-        )
+        tables = [
+            choice_rows(known) if self.catalog else own_rows(known, several=several),
+            demand_rows(known, several=several) if self.catalog else [],
+            spring_rows(self.springs, several=several),
+        ]
+        first, *others = [table for table in tables if len(table) > 1] or [[]]
+        found = [
+            *lacking(self.lacking),
+            *left_out(self.outcomes),
+            *warnings_and_notes(self.warnings, self.notes),
+        ]
+        return ReportText(self._headline(), first, [], found, others)
 
     @property
     def title(self) -> str:
@@ -95,7 +100,7 @@ class Sizing(Published):
         )
 
     def _headline(self) -> str:
-        return f"{self.title}: {self._answer()}"
+        return headline(self.verdict, f"{self.title}: {self._answer()}")
 
     def _answer(self) -> str:
         places, lacking = len(self.motors), len(self.lacking)
@@ -103,13 +108,28 @@ class Sizing(Published):
         which = f"{places - lacking} of {places} motors" if lacking else every
         if self.catalog is None:
             if not any(motor.own and motor.own.shares for motor in self.motors):
-                return "what is asked of its motors, for which the robot file has no limits"
-            return f"the limits of {which} suffice"
+                return "demands on its motors, for which the robot file has no limits"
+            suffice = "suffices" if places - lacking == 1 else "suffice"
+            return f"{which} {suffice}{_highest(self.motors)}"
         assert self.criterion is not None, "as of every catalog"
-        offered = f"{self.catalog} ({self.candidates} motors) has"
+        offered = f"{self.catalog} ({counted(self.candidates, 'motor')}) has"
         if lacking == places:
-            return f"{offered} none that does"
-        return f"{offered} one for {which}, chosen by {CRITERIA[self.criterion]}"
+            return f"{offered} none that suffices"
+        return f"{offered} a choice for {which}{_highest(self.motors)}, chosen by {CRITERIA[self.criterion]}"
+
+
+def _highest(motors: Sequence[MotorSizing]) -> str:
+    """Return a clause with the highest utilization of all motors; empty if no limit is known."""
+    known = [motor for motor in motors if _shares(motor)]
+    if not known:
+        return ""
+    motor = max(known, key=lambda each: max(_shares(each).values()))
+    return f", utilization up to {_share(max(_shares(motor).values()))} ({motor.name})"
+
+
+def _shares(motor: MotorSizing) -> dict[str, float]:
+    """Return the used share of each limit, of the best choice if there is a catalog."""
+    return motor.best.shares if motor.best else motor.own.shares if motor.own else {}
 
 
 WORDS = {
@@ -125,75 +145,98 @@ def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
     """Yield a sentence for each trajectory with samples that were left out."""
     for outcome in outcomes:
         if outcome.left_out:
+            missing = f"{outcome.left_out} of {counted(outcome.samples, 'sample')}"
             yield (
-                f"{outcome.trajectory}: {outcome.left_out} of {outcome.samples} steps cannot be done and are "
-                "left out, so that this is not for the whole motion; check-feasibility says why"
+                f"{outcome.trajectory}: {missing} infeasible or singular and left out, so the answer is not "
+                "for the whole motion; check-feasibility says why"
             )
 
 
-def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """Yield the lines of the table of demands, whatever the motors."""
-    if not motors:
-        return
-    rows = [("asked, joint side", "peak load", "at", "rms load", "speed", "acceleration")]
+def demand_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[str, ...]]:
+    """Return the table of demands on the joint side, whatever the motors."""
+    types = [motor.demand.joint_type for motor in motors]
+    torque, velocity = units_of(TORQUE, types), units_of(VELOCITY, types)
+    acceleration = units_of(JOINT_ACCELERATION, types)
+    rows: list[tuple[str, ...]] = [
+        (
+            "demand, joint side",
+            f"peak load\n{torque}",
+            "at",
+            f"rms load\n{torque}",
+            f"speed\n{velocity}",
+            f"acceleration\n{acceleration}",
+        )
+    ]
     for motor in motors:
-        asked, joint_type = motor.asked, motor.demand.joint_type
+        asked = motor.asked
         assert asked is not None, "motors of which something is known"
         rows.append(
             (
                 motor.name,
-                _number(asked.load.value, TORQUE.unit(joint_type)),
+                _number(asked.load.value),
                 _when(asked.load, several=several),
-                _number(asked.rms_load, TORQUE.unit(joint_type)),
-                _number(asked.velocity.value, VELOCITY.unit(joint_type)),
-                _number(asked.acceleration, JOINT_ACCELERATION.unit(joint_type)),
+                _number(asked.rms_load),
+                _number(asked.velocity.value),
+                _number(asked.acceleration),
             )
         )
-    yield from aligned(rows)
+    return rows
 
 
-def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
-    """Yield the lines of the table of the robot's own motors, on the joint side if gears are unknown."""
-    if not motors:
-        return
-    rows = [
-        ("motor", "peak torque", "at", "rms", "speed", "power", "current", "voltage", "loss", "uses most")
+def own_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[str, ...]]:
+    """Return the table of the robot's own motors, on the joint side if gears are unknown."""
+    torque, velocity = (
+        (" | ".join(dict.fromkeys(units)) for units in zip(*(motor.units for motor in motors), strict=True))
+        if motors
+        else ("", "")
+    )
+    rows: list[tuple[str, ...]] = [
+        (
+            "motor",
+            "utilization\n%",
+            "limit",
+            f"peak torque\n{torque}",
+            "at",
+            f"rms torque\n{torque}",
+            f"speed\n{velocity}",
+            "power\nW",
+            "current\nA",
+            "voltage\nV",
+            "copper loss\nW",
+        )
     ]
     for motor in motors:
         assert motor.own is not None, "motors of which something is known"
         points, on_joint = motor.own.points, motor.gear_ratio is None
-        torque, velocity = motor.units
         rows.append(
             (
                 motor.name + (" (joint side)" if on_joint else ""),
-                _number(points.torque.value, torque),
+                *_most(motor.own.shares),
+                _number(points.torque.value),
                 _when(points.torque, several=several),
-                _number(points.rms_torque, torque),
-                _number(points.velocity.value, velocity),
-                _number(points.power, "W"),
-                _number(points.current, "A"),
-                _number(points.voltage, "V"),
-                _number(points.copper_loss, "W"),
-                _most(motor.own.shares),
+                _number(points.rms_torque),
+                _number(points.velocity.value),
+                _number(points.power),
+                _number(points.current),
+                _number(points.voltage),
+                _number(points.copper_loss),
             )
         )
-    yield from aligned(_without_empty(rows))
+    return _without_empty(rows)
 
 
-def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
-    """Yield the lines of the table of the best motor of a catalog for each motor."""
-    if not motors:
-        return
+def choice_rows(motors: Sequence[MotorSizing]) -> list[tuple[str, ...]]:
+    """Return the table of the best motor of a catalog for each motor."""
     used = [name for name in LIMITS if any(motor.best and name in motor.best.shares for motor in motors)]
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             "motor",
             "choice",
             "gear",
-            "gears that do",
-            *(WORDS[name] for name in used),
-            "loss",
-            "motors that do",
+            *(f"{WORDS[name]}\n% of limit" for name in used),
+            "copper loss\nW",
+            "sufficient\ngears",
+            "sufficient\nmotors",
         )
     ]
     for motor in motors:
@@ -204,57 +247,65 @@ def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
                 motor.name,
                 best.motor if best.does else f"none, nearest {best.motor}",
                 f"{best.ratio:.4g}",
+                *(_percentage(best.shares.get(name, math.nan)) for name in used),
+                _number(best.copper_loss),
                 _gears(best),
-                *(_share(best.shares.get(name, math.nan)) for name in used),
-                _number(best.copper_loss, "W"),
                 f"{sum(choice.does for choice in motor.choices)}",
             )
         )
-    yield from aligned(_without_empty(rows))
+    return _without_empty(rows)
 
 
 def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
     """Yield a sentence for each motor for which nothing suffices: nearest choice and violated limits."""
     for motor in motors:
-        shares = motor.best.shares if motor.best else motor.own.shares if motor.own else {}
+        shares = _shares(motor)
         beyond = [
             f"{_share(shares[name])} of its {WORDS[name]}" for name in LIMITS if shares.get(name, 0) > 1
         ]
         if motor.asked is None:
-            yield f"{motor.name}: no step can be done, so that nothing is known of it"
+            yield f"{motor.name}: no sample is feasible, so nothing is known of it"
         elif motor.best is not None:
             with_gear = f"{motor.best.motor} with the gear {motor.best.ratio:.4g}"
-            yield f"{motor.name}: no motor does; nearest is {with_gear}, which would use {_listed(beyond)}"
+            others = "" if math.isnan(motor.best.low) else f"; gears {_gears(motor.best)} would suffice"
+            yield f"{motor.name}: no motor suffices; {with_gear} would use {_listed(beyond)}{others}"
         else:
             reason = f"it uses {_listed(beyond)}{_other_gears(motor)}"
-            yield f"{motor.name}: its limits do not suffice, {reason}"
+            yield f"{motor.name}: {reason}"
 
 
 def _other_gears(motor: MotorSizing) -> str:
     if motor.own is None or motor.own.low is None or motor.own.high is None:
         return ""
     if math.isnan(motor.own.low):
-        return "; no other gear would do"
-    return f"; gears {_range(motor.own.low, motor.own.high)} would do"
+        return "; no other gear would suffice"
+    return f"; gears {_range(motor.own.low, motor.own.high)} would suffice"
 
 
-def spring_table(springs: Sequence[SpringDemand], *, several: bool) -> Iterator[str]:
-    """Yield the lines of the table of springs."""
+def spring_rows(springs: Sequence[SpringDemand], *, several: bool) -> list[tuple[str, ...]]:
+    """Return the table of springs."""
     known = [spring for spring in springs if math.isfinite(spring.energy.value)]
-    if not known:
-        return
-    header = ("spring", "energy", "at", "torque", "deflection", "of admissible")
-    yield from aligned(_without_empty([header, *(_spring_row(spring, several=several) for spring in known)]))
+    types = [spring.joint_type for spring in known]
+    torque, position = (units_of(quantity, types) for quantity in (TORQUE, POSITION))
+    header = (
+        "spring",
+        "energy\nJ",
+        "at",
+        f"torque\n{torque}",
+        f"deflection\n{position}",
+        "of admissible\n%",
+    )
+    return _without_empty([header, *(_spring_row(spring, several=several) for spring in known)])
 
 
 def _spring_row(spring: SpringDemand, *, several: bool) -> tuple[str, ...]:
     return (
         f"{spring.joint} {spring.spring}",
-        _number(spring.energy.value, "J"),
+        _number(spring.energy.value),
         _when(spring.energy, several=several),
-        _number(spring.torque.value, TORQUE.unit(spring.joint_type)),
-        _number(spring.deflection.value, POSITION.unit(spring.joint_type)),
-        _share(spring.share),
+        _number(spring.torque.value),
+        _number(spring.deflection.value),
+        _percentage(spring.share),
     )
 
 
@@ -276,15 +327,20 @@ def _range(low: float, high: float) -> str:
     return f"from {low:.4g}" if math.isinf(high) else f"{low:.4g} to {high:.4g}"
 
 
-def _most(shares: dict[str, float]) -> str:
+def _most(shares: dict[str, float]) -> tuple[str, str]:
+    """Return the highest utilization in percent, and the limit it is of."""
     if not shares:
-        return "-"
+        return "-", "-"
     name = max(shares, key=lambda each: shares[each])
-    return f"{_share(shares[name])} of {WORDS[name]}"
+    return _percentage(shares[name]), WORDS[name]
 
 
-def _number(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}" if math.isfinite(value) else "-"
+def _number(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "-"
+
+
+def _percentage(share: float) -> str:
+    return f"{100 * share:.3g}" if math.isfinite(share) else "-"
 
 
 def _share(share: float) -> str:

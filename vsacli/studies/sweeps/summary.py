@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from vsacli.base.json_records import Stored, named
+from vsacli.base.tables import ReportText
+from vsacli.base.texts import counted
 from vsacli.results.store.study_table import StoredStudy
 from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
 
@@ -85,25 +88,49 @@ class StudySummary(Stored):
         )
 
     def __str__(self) -> str:
-        counts = ", ".join(f"{count:,} {verdict}" for verdict, count in self.verdicts.items())
-        lines = [f"{self.study}: {self.runs:,} runs of {self.robot}: {counts or 'none'}"]
-        for each in self.worst:
-            few = each.at if len(each.at) <= MOST_NUMBERS else {}
-            at = ", ".join(f"{path} = {value}" for path, value in few.items())
-            where = f"in run {each.run}{f' ({at})' if at else ''}"
-            lines.append(f"{each.joint}: smallest margin {100 * each.margin:.3g} % {where}")
+        return str(self.as_text())
+
+    @property
+    def title(self) -> str:
+        """Name of the study, number of runs, and how many have each verdict."""
+        counts = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in self.verdicts.items())
+        runs = f"{self.study}: {counted(self.runs, 'run')} of {self.robot}"
+        return f"{runs}: {counts}" if counts else runs
+
+    def as_text(self) -> ReportText:
+        """Return the report in parts."""
+        lines = [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
+        if len(self.failures) > MOST_ERRORS:
+            others = counted(len(self.failures) - MOST_ERRORS, "other run")
+            lines.append(f"{others} failed; the column error of the table says why")
+        return ReportText(self.title, self._rows(), lines, list(self._findings()))
+
+    def _findings(self) -> Iterator[str]:
         without = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))
         if without:
-            lines.append(
-                f"infeasible or singular steps in {without:,} runs; peaks and energies there are NaN"
+            runs = counted(without, "run")
+            yield f"{runs} with infeasible or singular samples; peaks and energies there are NaN"
+        if impossible := self.verdicts.get(IMPOSSIBLE, 0):
+            runs = counted(impossible, "run")
+            yield f"nothing feasible was found in {runs}; the column error of the table says why"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Return the table of the smallest margin of each joint, smallest first."""
+        if not self.worst:
+            return []
+        varied = list(dict.fromkeys(path for each in self.worst for path in each.at))
+        varied = varied if len(varied) <= MOST_NUMBERS else []
+        rows = [("joint", "smallest margin\n%", "run", *varied)]
+        rows += [
+            (
+                each.joint,
+                f"{100 * each.margin:.3g}",
+                f"{each.run}",
+                *(each.at.get(path, "-") for path in varied),
             )
-        impossible = self.verdicts.get(IMPOSSIBLE, 0)
-        if impossible:
-            lines.append(f"nothing feasible was found in {impossible:,} runs; error in the table says why")
-        lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
-        if len(self.failures) > MOST_ERRORS:
-            lines.append(f"and {len(self.failures) - MOST_ERRORS:,} more failed, see error in the table")
-        return "\n".join(lines)
+            for each in sorted(self.worst, key=lambda each: each.margin)
+        ]
+        return rows
 
 
 def _worst(table: StoredStudy) -> list[Extreme]:

@@ -14,13 +14,14 @@ from vsacli.analysis.report import Report
 from vsacli.base.flags import Flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.signals import COMMANDED, POSITION
-from vsacli.base.tables import aligned
-from vsacli.base.texts import one_line, sentence
+from vsacli.base.tables import ReportText, headline
+from vsacli.base.texts import counted, one_line
 from vsacli.base.version import __version__
 from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import MARGIN, RATE
 from vsacli.studies.identification.excitation.fisher import PredictedError
+from vsacli.studies.identification.identification_text import by_joint
 from vsacli.studies.search.fixed_text import formula
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.trajectory import Trajectory
@@ -107,28 +108,53 @@ class Excitation(Published):
         """Largest condition number of the planned motion."""
         return max(self.planned.conditions.values())
 
-    def __str__(self) -> str:
-        return "\n".join(line.rstrip() for line in self._lines())
+    @property
+    def verdict(self) -> str:
+        """Verdict on inverse dynamics along the motion."""
+        return self.report.verdict
 
-    def _lines(self) -> Iterator[str]:
-        steps = f"{self.trajectory.samples} steps, {self.trajectory.duration:g} s"
-        yield f"{self.trajectory.name}: {steps}, seed {self.seed}: {self.report.verdict.upper()}"
-        yield from aligned(self._conditions())
-        yield from aligned(self._numbers())
-        if any("*" in each.path for each in self.planned.numbers):
-            yield "* begins the name of a combination with parameters of other links."
-        yield sentence(f"+- are standard errors with noise of {self.noise}")
-        for whose, useful in (("the excitation", self.planned), ("the motion given", self.own)):
+    @property
+    def title(self) -> str:
+        """Name of the motion, and the number of parameters whose standard error is predicted."""
+        predicted = sum(not math.isnan(each.standard_error) for each in self.planned.numbers)
+        known = f"{predicted} of {counted(len(self.planned.numbers), 'parameter')} identifiable"
+        if self.planned.reason:
+            known = "no standard errors predicted"
+        named = f"{self.trajectory.name}: {counted(self.trajectory.samples, 'sample')}"
+        return f"{named}, {self.trajectory.duration:g} s; {known}, largest condition {self.condition:.3g}"
+
+    def __str__(self) -> str:
+        return str(self.as_text())
+
+    def as_text(self) -> ReportText:
+        """Return the report in parts."""
+        lines = [
+            *self._legend(),
+            *(f"active limit, {100 * MARGIN:g} % from its bound: {each}" for each in self.active),
+            *([] if self.active else ["active limits: none"]),
+            f"seed of the search: {self.seed}",
+        ]
+        rows = self._numbers() if self.planned.numbers else []
+        return ReportText(
+            headline(self.verdict, self.title), rows, lines, list(self._findings()), [self._conditions()]
+        )
+
+    def _findings(self) -> Iterator[str]:
+        for whose, useful in (("the plan", self.planned), ("the given motion", self.own)):
             if useful is not None and useful.reason:
-                yield sentence(f"of {whose} none are predicted: {useful.reason}")
-        active = "; ".join(map(str, self.active)) or "none"
-        yield sentence(f"limits that bind, {100 * MARGIN:g} % from their bounds: {active}")
-        yield from (sentence(f"no motion of this robot tells: {each}") for each in self.structural)
-        yield from (sentence(f"note: {each}") for each in self.assumptions)
+                yield f"no standard errors are predicted for {whose}: {useful.reason}"
+        yield from (f"unidentifiable by any motion: {each}" for each in self.structural)
+        yield from (f"note: {each}" for each in self.assumptions)
+
+    def _legend(self) -> Iterator[str]:
+        if any("*" in each.path for each in self.planned.numbers):
+            yield "* sum of several parameters"
+        if self.planned.numbers:
+            yield f"+- standard error for noise of {self.noise}"
 
     def _conditions(self) -> list[tuple[str, ...]]:
         own = None if self.own is None else self.own.conditions
-        header = ("equations of", "condition", *([] if own is None else ["motion given"]))
+        header = ("equations of", "condition", *([] if own is None else ["condition of\ngiven motion"]))
         return [
             header,
             *(
@@ -139,10 +165,14 @@ class Excitation(Published):
 
     def _numbers(self) -> list[tuple[str, ...]]:
         own = None if self.own is None else {each.path: each for each in self.own.numbers}
-        rows = [("number", "file", "+-", "share", *([] if own is None else ["+- motion given"]), "unit")]
-        for each in self.planned.numbers:
-            given = [] if own is None else [_error(own.get(each.path))]
-            rows.append((each.path, f"{each.value:.6g}", _error(each), _share(each), *given, each.unit))
+        given = () if own is None else ("+- of given\nmotion",)
+        header = ("parameter", "unit", "file", "+-", "+-\n%", *given)
+        rows: list[tuple[str, ...]] = [header]
+        for joint, names, numbers in by_joint(self.planned.numbers, self.robot.joint_names):
+            rows += [(joint, *[""] * (len(header) - 1))] if joint else []
+            for name, each in zip(names, numbers, strict=True):
+                theirs = [] if own is None else [_error(own.get(each.path))]
+                rows.append((name, each.unit, f"{each.value:.4g}", _error(each), _share(each), *theirs))
         return rows
 
 
@@ -155,7 +185,7 @@ def _share(number: PredictedError) -> str:
     if number.value == 0 or math.isnan(number.standard_error):
         return "-"
     share = number.standard_error / abs(number.value)
-    return f"{100 * share:.2g} %" if share < 1 else "> 100 %"
+    return f"{100 * share:.2g}" if share < 1 else "> 100"
 
 
 def excitation_text(excitation: Excitation) -> str:

@@ -1,0 +1,193 @@
+"""Tables and sentences of an identification report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from vsacli.base.texts import counted
+from vsacli.robot.parameters import JOINTS
+
+if TYPE_CHECKING:
+    from vsacli.studies.identification.identification_report import (
+        Identification,
+        Number,
+        RecordReport,
+        Residual,
+    )
+
+T = TypeVar("T", bound="Named")
+
+CHANGED = 3.0
+"""Difference from the file, in standard errors, that is a change. Of a hundred unchanged parameters, five
+exceed two standard errors by chance, and less than one exceeds three."""
+
+LARGEST_SHOWN = 1e3
+"""Deviation in standard errors above which only this bound is printed."""
+
+TENS = 10
+"""Deviation in standard errors below which it is printed with a decimal."""
+
+MOST_DIGITS = 7
+"""Largest number of digits of a value, for errors near rounding, as of recordings without noise."""
+
+INDISTINCT, NO_EFFECT, NOT_PHYSICAL, AT_BOUND = (
+    "not distinguished",
+    "no effect",
+    "not physical",
+    "at its bound",
+)
+"""Notes on parameters: only a sum with others is identifiable; no torque depends on it; the value found is
+impossible, such as a negative inertia; or it is at the end of its range."""
+
+ACTUATOR = "actuator."
+"""Part of a path that is omitted after the name of the joint: nothing else has springs and motors."""
+
+
+def significant(value: float, error: float) -> str:
+    """Return a value rounded to two digits of its standard error."""
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:.6g}"
+    return _with_decimals(value, 1 - math.floor(math.log10(error)))
+
+
+def _with_decimals(value: float, decimals: int, sign: str = "") -> str:
+    rounded = round(value, decimals) or 0.0  # no negative zero
+    return f"{rounded:{sign if rounded else ''}.{max(decimals, 0)}f}"
+
+
+def counts(numbers: Sequence[Number]) -> str:
+    """Return how many parameters agree with the file, differ from it, or are unidentifiable."""
+    identifiable = sum(each.identifiable for each in numbers)
+    changed = sum(each.changed for each in numbers)
+    by_words = {
+        "agrees" if identifiable - changed == 1 else "agree": identifiable - changed,
+        f"{'differs' if changed == 1 else 'differ'} by more than {CHANGED:g} standard errors": changed,
+        "unidentifiable": len(numbers) - identifiable,
+    }
+    listed = ", ".join(f"{number} {words}" for words, number in by_words.items() if number)
+    return f"{counted(len(numbers), 'parameter')}: {listed}"
+
+
+def joint_of(path: str, joints: Sequence[str]) -> str:
+    """Return the name of the joint of a parameter or base parameter; empty if it has none."""
+    beginning = path.removeprefix(f"{JOINTS}.")
+    return max((joint for joint in joints if beginning.startswith(f"{joint}.")), key=len, default="")
+
+
+class Named(Protocol):
+    """A parameter with its path."""
+
+    @property
+    def path(self) -> str:
+        """Path in the robot, or name of a base parameter."""
+
+
+def by_joint(numbers: Sequence[T], joints: Sequence[str]) -> Iterator[tuple[str, list[str], list[T]]]:
+    """Yield joints, names for a table and parameters; those of no joint last, with an empty name.
+
+    The names are paths without the beginning that they share, indented below the name of the joint.
+    """
+    for joint in (*joints, ""):
+        own = [each for each in numbers if joint_of(each.path, joints) == joint]
+        if not own:
+            continue
+        if not joint:
+            yield joint, [each.path for each in own], own
+            continue
+        paths = [each.path.removeprefix(f"{JOINTS}.").removeprefix(f"{joint}.") for each in own]
+        short = [path.removeprefix(ACTUATOR) for path in paths]
+        yield joint, [f"  {path}" for path in (short if len(set(short)) == len(own) else paths)], own
+
+
+def parameter_rows(numbers: Sequence[Number], joints: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the table of parameters by joint: largest deviation first, unidentifiable ones last."""
+    rows: list[tuple[str, ...]] = [("parameter", "unit", "file", "found", "+-", "deviation\nstd error")]
+    ordered = sorted(
+        numbers, key=lambda each: (not each.identifiable, -abs(each.off) if each.identifiable else 0.0)
+    )
+    for joint, names, of_joint in by_joint(ordered, joints):
+        rows += [(joint, *[""] * (len(rows[0]) - 1))] if joint else []
+        rows += [
+            (name, each.unit, *_values(each), _deviation(each))
+            for name, each in zip(names, of_joint, strict=True)
+        ]
+    return rows
+
+
+def _values(number: Number) -> tuple[str, str, str]:
+    """Return value in the file, value found and its error, all to two digits of the error."""
+    before, value, error = number.before, number.value, number.standard_error
+    if not number.identifiable or error <= 0:
+        return f"{before:.4g}", "-" if value == before else f"{value:.4g}", "-"
+    exact = 1 - math.floor(math.log10(error))
+    most = MOST_DIGITS - 1 - math.floor(math.log10(max(abs(before), abs(value), error)))
+    decimals = min(exact, most)
+    shown = _with_decimals(before, decimals)
+    return (
+        shown if float(shown) else f"{before:.2g}",
+        _with_decimals(value, decimals),
+        _with_decimals(error, exact) if exact == decimals else f"{error:.1e}",
+    )
+
+
+def _deviation(number: Number) -> str:
+    if not number.identifiable:
+        return "-"
+    size = abs(number.off)
+    if size > LARGEST_SHOWN:
+        return f"> {LARGEST_SHOWN:g}"
+    return _with_decimals(number.off, int(size < TENS), sign="+")
+
+
+def residual_rows(found: Identification) -> list[tuple[str, ...]]:
+    """Return a table of the residuals of each motor or link, the header first."""
+    units = " | ".join(dict.fromkeys(each.unit for system in found.systems for each in system.residuals))
+    header = ("rms, filtered", *(f"{name}\n{units}" for name in ("torque", "residual", "noise", "held out")))
+    rows: list[tuple[str, ...]] = [(*header, "condition")]
+    for system in found.systems:
+        condition = f"{system.condition:.3g}"
+        rows += [(each.group, *_figures(each), condition) for each in system.residuals]
+    return rows
+
+
+def _figures(residual: Residual) -> Iterator[str]:
+    for value in (residual.torque, residual.residual, residual.noise, residual.held_out):
+        yield f"{value:.3g}" if math.isfinite(value) else "-"
+
+
+def findings(found: Identification) -> Iterator[str]:
+    """Yield the findings: faulty recordings, causes of residuals, then what is unidentifiable, and notes."""
+    yield from (f"{record.path}: {doubt}" for record in found.records for doubt in record.doubts)
+    yield from found.notes
+    for system in found.systems:
+        yield from (f"{system.title}: {sentence}" for sentence in system.combinations)
+    for note in (NO_EFFECT, NOT_PHYSICAL, AT_BOUND):
+        paths = [each.path for each in found.numbers if each.note == note]
+        if paths:
+            yield f"{note}: {', '.join(paths)}"
+    if not all(each.identifiable for each in found.numbers):
+        yield (
+            "unidentifiable parameters keep the values of the file; to plan a motion that identifies more: "
+            "vsacli identify --plan"
+        )
+
+
+def definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
+    """Yield the definitions of base parameters that are sums; unless verbose, only how to see them."""
+    sums = [f"{each.path} is {each.sum}" for each in numbers if each.sum not in ("", each.path)]
+    if verbose:
+        yield from sums
+    elif sums:
+        yield "* sum of several parameters; with -v its terms are listed"
+
+
+def use_line(record: RecordReport) -> str:
+    """Return which part of a recording was used, and how late its torques are."""
+    used = f"{record.duration:.4g} s at {record.rate:.4g} Hz, filtered to {record.bandwidth:.3g} Hz"
+    line = f"{record.path}: {used}"
+    if not math.isfinite(record.delay):
+        return f"{line}; delay of torques unidentifiable"
+    late = f"{1e3 * record.delay:+.2g} +- {1e3 * record.delay_error:.1g} ms behind positions"
+    return f"{line}; torques are {late}{' (removed)' if record.corrected else ''}"
