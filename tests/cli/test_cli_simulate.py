@@ -92,7 +92,7 @@ def test_a_run_that_ends_early_is_written_with_exit_code_3(vsacli, too_soft, tmp
     ("tolerance", "code", "verdict"), [("1%", 3, "off_target"), ("30%", 0, "ok"), ("0.2", 0, "ok")]
 )
 def test_a_run_that_ends_off_the_command_is_off_target(vsacli, quick, tmp_path, tolerance, code, verdict):
-    arguments = ("--perturb", "0.05", "--tolerance", tolerance, "-o", "s.h5")
+    arguments = ("--perturb", "0.05", "--goal-tolerance", tolerance, "-o", "s.h5")
     done = vsacli("simulate", ROBOT, quick, *arguments)
     assert done.code == code
     headline, *_ = done.out.splitlines()
