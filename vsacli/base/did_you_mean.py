@@ -11,7 +11,7 @@ MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
 
 FILE_CUTOFF = 0.75
-"""Similarity of stems from which a file is proposed: `vsa_3` for `vsa_3r` is, `abb_6r` for `vsa_3r` is not."""
+"""Similarity of stems from which a file is proposed: `vsa_3r` for `vsa_3`, but not for `abb_6r`."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
@@ -36,12 +36,10 @@ def near_file(path: Path) -> str:
     Stems are compared, of files with the same ending, without regard to case; of a missing folder its name.
     """
     if not path.parent.is_dir():
-        near = _similar(path.parent)
-        return (
-            f"; there is no folder {str(path.parent)!r} either"
-            if near is None
-            else _proposal(near / path.name)
-        )
+        folder = _similar(path.parent)
+        if folder is None:
+            return f"; there is no folder {str(path.parent)!r} either"
+        return _proposal(folder / path.name)
     near = _similar(path)
     return "" if near is None else _proposal(near)
 
@@ -51,7 +49,7 @@ def _proposal(path: Path) -> str:
 
 
 def _similar(missing: Path) -> Path | None:
-    """Return the entry beside a missing one whose name differs little, if there is one."""
+    """Return the entry whose name differs little from that of a missing one in its folder; None without one."""
     import difflib
 
     if not missing.parent.is_dir():
