@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from vsacli.base.renamed import now_called
 
 MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
+
+FILE_CUTOFF = 0.75
+"""Similarity of stems from which a file is proposed: `vsa_3r` for `vsa_3`, but not for `abb_6r`."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
@@ -24,6 +28,39 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
         return f"; did you mean {' or '.join(map(repr, near))}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""
+
+
+def near_file(path: Path) -> str:
+    """Return a clause that proposes an existing file for a missing one; empty if none is close.
+
+    Stems are compared, of files with the same ending, without regard to case; of a missing folder its name.
+    """
+    if not path.parent.is_dir():
+        folder = _similar(path.parent)
+        if folder is None:
+            return f"; there is no folder {str(path.parent)!r} either"
+        return _proposal(folder / path.name)
+    near = _similar(path)
+    return "" if near is None else _proposal(near)
+
+
+def _proposal(path: Path) -> str:
+    return f"; did you mean {str(path)!r}?"
+
+
+def _similar(missing: Path) -> Path | None:
+    """Return the entry whose name differs little from that of a missing one in its folder; None without one."""
+    import difflib
+
+    if not missing.parent.is_dir():
+        return None
+    stems = {
+        entry.stem.lower(): entry
+        for entry in missing.parent.iterdir()
+        if entry.suffix.lower() == missing.suffix.lower()
+    }
+    close = difflib.get_close_matches(missing.stem.lower(), stems, n=1, cutoff=FILE_CUTOFF)
+    return missing.parent / stems[close[0]].name if close else None
 
 
 def _near(word: str, options: list[str]) -> list[str]:

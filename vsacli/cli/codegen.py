@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from vsacli.cli.command_parts import example, overwrite_option, robot_argument
+from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
 
@@ -58,9 +58,8 @@ def codegen(
     """
     from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
-    from vsacli.robot.file import load_robot
 
-    arm = load_robot(robot)
+    arm = read_robot(robot)
     project = generate(arm, precision, wrench, patterns, loops=not no_loops)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
         write(project, output, outputs)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 from click.core import ParameterSource
 
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, StorageError
 from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
@@ -160,18 +160,83 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
         InputError: with every problem of the robot, or else of the trajectory; or a change that cannot be
             made.
     """
-    from vsacli.robot.file import load_robot
     from vsacli.trajectory.file import load_trajectory
 
+    if robot_path == trajectory_path == STANDARD:
+        twice = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
+        raise InputError.one(f"{twice}; give a file name for one of them")
     with _naming_option():
         of_robot, of_trajectory = _divided(changes)
-        robot = load_robot(robot_path, of_robot)
-        trajectory = load_trajectory(trajectory_path, robot, of_trajectory, progress=talk.fitting)
+        robot = read_robot(robot_path, of_robot)
+        with naming_kind("TRAJECTORY", trajectory_path, ("trajectory", "table")):
+            trajectory = load_trajectory(trajectory_path, robot, of_trajectory, progress=talk.fitting)
     talk.detail(
         f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} steps over "
         f"{trajectory.duration:g} s"
     )
     return Inputs(robot, trajectory)
+
+
+def read_robot(path: str, changes: Changes | None = None) -> Robot:
+    """Read the robot file of an argument ROBOT.
+
+    Raises:
+        InputError: every problem of the file; or what it is, if it is no robot.
+    """
+    from vsacli.robot.file import load_robot
+
+    with naming_kind("ROBOT", path, ("robot",)):
+        return load_robot(path, changes or {})
+
+
+_KINDS = {
+    "table": "CSV table",
+    "poles": "poles file",
+    "columns": "columns file",
+    "table of a study": "study table",
+}
+"""Kinds of files in the words of an error, where they differ."""
+
+_ADVICE = {
+    "URDF": "convert it with vsacli import-urdf",
+    **dict.fromkeys(
+        ("result", "simulation", "table of a study"),
+        "vsacli info FILE --extract FOLDER gives the files that it was computed from",
+    ),
+    "trajectory": "are ROBOT and TRAJECTORY swapped?",
+    "robot": "are ROBOT and TRAJECTORY swapped?",
+}
+"""What to do with a file of a kind that a command does not read as a robot or trajectory."""
+
+
+@contextmanager
+def naming_kind(argument: str, path: str, expected: tuple[str, ...]) -> Iterator[None]:
+    """Raise one error that says what a file is, if it cannot be read since it is of another kind.
+
+    Args:
+        argument: name of the argument in the help.
+        path: path of the file.
+        expected: kinds that the argument may be, the usual one first; as in `FileKind`.
+    """
+    try:
+        yield
+    except InputError as error:
+        kind = None if path == STANDARD else _recognized(path)
+        if kind is None or kind in expected:
+            raise
+        message = f"is a {_KINDS.get(kind, kind)}, but {argument} must be a {expected[0]}"
+        advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""
+        raise InputError.one(message + advice, path) from error
+
+
+def _recognized(path: str) -> str | None:
+    """Return the kind of a file; None if it is of none that is known, or cannot be read."""
+    from vsacli.files.file_kinds import recognize
+
+    try:
+        return recognize(path).value
+    except (InputError, StorageError):
+        return None
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
-from vsacli.cli.file_names import FILE, ending_of
+from vsacli.cli.file_names import FILE, KNOWN, ending_of
 from vsacli.results.exports import FORMATS as OF_RESULTS
 from vsacli.robot.models import FORMATS as OF_ROBOTS
 
@@ -141,9 +141,11 @@ def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind:
     if form is not None and form not in formats:
         raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
     able = [each for each in formats if ending_of(name) in _endings(each)]
-    if ending_of(name) and not able:
+    if ending_of(name) and not able and (form is None or ending_of(name) in KNOWN):
         endings = ", ".join(dict.fromkeys(ending for each in formats for ending in _endings(each)))
-        raise InputError.one(f"no format of a {kind} has such a name; there is {endings}", name)
+        advice = "" if ending_of(name) in KNOWN else "; with --format the name may be any"
+        message = f"export of a {kind} writes {endings}, not {ending_of(name)}{advice}"
+        raise InputError.one(message, name)
     if form is not None:
         if able and form not in able:
             message = f"--format {form} makes no file of this name; name it {_endings(form)[0]}"

@@ -52,9 +52,9 @@ KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a name in lower case if it is a known one; else ""."""
+    """Return the ending of a name in lower case; "" without one, or for a number as in `run.2`."""
     ending = PurePath(name).suffix.lower()
-    return ending if ending in KNOWN else ""
+    return ending if ending[1:2].isalpha() else ""
 
 
 class OutputType(NameType):
@@ -70,7 +70,7 @@ class OutputType(NameType):
         ending = ending_of(name)
         if ending and ending not in ENDINGS[self.form]:
             own, advice = ENDINGS[self.form][0], self.advice if ending == ".csv" else ""
-            self.fail(f"{name!r}: the file is {self.form}; name it {own}{advice}", param, ctx)
+            self.fail(f"{name!r} does not end in {own}: the output is {self.form}{advice}", param, ctx)
         return name
 
 
@@ -84,7 +84,7 @@ class FolderType(NameType):
         """See `click.ParamType.convert`."""
         name = super().convert(value, param, ctx)
         ending = ending_of(name)
-        if ending and not Path(name).is_dir():
+        if ending in KNOWN and not Path(name).is_dir():
             chosen = ctx is not None and any(each.name == "file_format" for each in ctx.command.params)
             advice = f", and the format by --format {ending[1:]}" if chosen and ending in FIGURES else ""
             self.fail(f"{name!r} is the name of a file; name a folder{advice}", param, ctx)
@@ -93,5 +93,5 @@ class FolderType(NameType):
 
 FILE = NameType("file", "file")
 FOLDER = FolderType()
-HDF5_FILE = OutputType("HDF5", "; `vsacli export` makes CSV of it")
+HDF5_FILE = OutputType("HDF5", "; `vsacli export` writes CSV from it")
 YAML_FILE = OutputType("YAML")

@@ -14,6 +14,7 @@ from vsacli.cli.command_parts import (
     json_option,
     numbers,
     overwrite_option,
+    read_robot,
     robot_argument,
     words_of,
 )
@@ -140,11 +141,10 @@ def identify(
     from vsacli.base.outputs import Outputs
     from vsacli.cli.identify_plots import draw_figures, identification_page
     from vsacli.cli.plot_page import page_asked_for
-    from vsacli.robot.file import load_robot
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
 
-    loaded = load_robot(robot)
+    loaded = read_robot(robot)
     inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))

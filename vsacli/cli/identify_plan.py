@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say, tell
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ def plan(
     if len(own_paths) > 1:
         raise click.UsageError("--plan compares with one trajectory at most")
     from vsacli.base.outputs import Outputs
-    from vsacli.robot.file import load_robot
     from vsacli.studies.identification.excitation import (
         TRIALS,
         ImpossibleError,
@@ -46,7 +46,7 @@ def plan(
     from vsacli.trajectory.file import load_trajectory
 
     sensors = _noise(noise)
-    robot = load_robot(robot_path)
+    robot = read_robot(robot_path)
     own = load_trajectory(own_paths[0], robot) if own_paths else None
     inputs = [*robot.sources, *(() if own is None else own.sources)]
     with Outputs(overwrite=overwrite, inputs=[source.path for source in inputs]) as outputs:

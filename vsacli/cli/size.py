@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, run_stem
+from vsacli.cli.command_parts import (
+    example,
+    json_option,
+    overwrite_option,
+    read_robot,
+    robot_argument,
+    run_stem,
+)
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.option_types import Words
@@ -75,11 +82,10 @@ def size(
     if catalog is None and output is not None:
         raise click.UsageError("--output is for the motors chosen from a catalog: give --catalog")
     from vsacli.base.outputs import Outputs
-    from vsacli.robot.file import load_robot
     from vsacli.studies.sizing import size_drives, sized_text
     from vsacli.trajectory.file import load_trajectory
 
-    loaded = load_robot(robot)
+    loaded = read_robot(robot)
     motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
     sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
     inputs = [*(source.path for source in sources), *([] if catalog is None else [catalog])]

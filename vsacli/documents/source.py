@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import NamedTuple, NoReturn
 
-from vsacli.base.did_you_mean import nearest
+from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.storage import STANDARD, place_of
 
@@ -146,11 +146,7 @@ def _sibling(name: str) -> str:
     if name.startswith(IN_PACKAGE):
         package, _, rest = name.removeprefix(IN_PACKAGE).partition("/")
         return f"; of a file in a ROS package give the path, $(ros2 pkg prefix --share {package})/{rest}"
-    path = Path(name)
-    if not path.parent.is_dir():
-        return f"; there is no folder {str(path.parent)!r} either"
-    near = nearest(path.name, (entry.name for entry in path.parent.iterdir()))
-    return f"; did you mean {str(path.with_name(near))!r}?" if near else ""
+    return near_file(Path(name))
 
 
 def _too_large(name: str, size: int, max_bytes: int) -> InputError:

@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError, StorageError
 from vsacli.documents.source import HDF5_SIGNATURE
 from vsacli.trajectory.curves.closed_form import LONGEST
@@ -136,7 +137,7 @@ def _check_signature(path: str | Path) -> None:
         with Path(path).open("rb") as file:
             start = file.read(len(HDF5_SIGNATURE))
     except FileNotFoundError:
-        raise InputError.one(f"there is no such file; {EXPECTED}", path) from None
+        raise InputError.one(f"no such file{near_file(Path(path))}", path) from None
     except IsADirectoryError:
         raise InputError.one(f"is a folder; {EXPECTED}", path) from None
     except OSError as error:
