@@ -49,7 +49,7 @@ def _proposal(path: Path) -> str:
 
 
 def _similar(missing: Path) -> Path | None:
-    """Return the entry whose name differs little from that of a missing one in its folder; None without one."""
+    """Return the entry of the same folder with the most similar name; None if none is close."""
     import difflib
 
     if not missing.parent.is_dir():
