@@ -1,4 +1,4 @@
-"""`--deflections`: following the deflections of the first step from the command line."""
+"""`--deflection-solver`: following the deflections of the first step from the command line."""
 
 from __future__ import annotations
 
