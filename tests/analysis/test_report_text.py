@@ -502,7 +502,7 @@ def test_the_longest_report_of_seven_joints_fits_on_a_page(warned):
                 first_time=dict.fromkeys(worst, 0.123 + at),
                 margin=-15.0896,
                 peak_tau_motor=(21581.7, 10695.8),
-                stiffness_max=2400.0,
+                commanded_max=2400.0,
                 start_theta=(NAN, NAN),
                 end_theta=(0.968 + at, -0.6028 - at),
                 end_dtheta=(0.0123 + at, -0.0123 - at),

@@ -265,10 +265,10 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
         ("codegen a -o arm.c", "'arm.c' is the name of a file; name a folder"),
         ("info r.h5 --extract arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
         ("examples --copy arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
-        ("invdyn a b -o r.mat", "'r.mat': the file is HDF5; name it .h5"),
-        ("study s -o s.yaml", "'s.yaml': the file is HDF5; name it .h5"),
-        ("new robot --joints R -o arm.urdf", "'arm.urdf': the file is YAML; name it .yaml"),
-        ("optimize a b -o best.h5", "'best.h5': the file is YAML; name it .yaml"),
+        ("invdyn a b -o r.mat", "'r.mat' does not end in .h5: the output is HDF5"),
+        ("study s -o s.yaml", "'s.yaml' does not end in .h5: the output is HDF5"),
+        ("new robot --joints R -o arm.urdf", "'arm.urdf' does not end in .yaml: the output is YAML"),
+        ("optimize a b -o best.h5", "'best.h5' does not end in .yaml: the output is YAML"),
     ],
 )
 def test_a_name_that_promises_something_else_is_refused(vsacli, tmp_path, arguments, message):
@@ -287,5 +287,8 @@ def test_a_folder_that_is_called_as_files_are_may_be_used(vsacli, tmp_path):
 def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
     done = vsacli(command, ROBOT, REST_TO_REST, "-o", "torques.csv")
     assert done.code == Exit.USAGE
-    assert "'torques.csv': the file is HDF5; name it .h5; `vsacli export` makes CSV of it" in done.err
+    assert (
+        "'torques.csv' does not end in .h5: the output is HDF5; `vsacli export` writes CSV from it"
+        in done.err
+    )
     assert not list(tmp_path.iterdir())

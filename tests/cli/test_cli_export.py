@@ -172,15 +172,15 @@ def test_the_ending_of_the_name_is_the_format(vsacli, tmp_path, feasible_result,
 @pytest.mark.parametrize(
     ("of", "options", "message"),
     [
-        ("result", "-o r.h5", "r.h5: no format of a result has such a name; there is .csv, .mat, .parquet, "),
-        ("result", "-o a.urdf", "a.urdf: no format of a result has such a name"),
+        ("result", "-o r.h5", "r.h5: export of a result writes .csv, .mat, .parquet, "),
+        ("result", "-o a.urdf", "a.urdf: export of a result writes .csv"),
         ("result", "--format csv -o m.mat", "m.mat: --format csv makes no file of this name; name it .csv"),
         (
             "result",
             "--format joint-trajectory -o m.csv",
             "m.csv: --format joint-trajectory makes no file of this",
         ),
-        ("robot", "-o a.csv", "a.csv: no format of a robot has such a name; there is .urdf, .xml, .mjcf"),
+        ("robot", "-o a.csv", "a.csv: export of a robot writes .urdf, .xml, .mjcf"),
         ("robot", "-o a.xml", "is a robot; say by --format as what to write it: urdf, mjcf"),
     ],
 )

@@ -91,7 +91,7 @@ def test_what_is_no_result_is_refused(vsacli, tmp_path, command, content, messag
 
 
 def test_a_result_that_is_not_there(vsacli):
-    missing = "there is no such file; expected a result file, as invdyn or simulate writes it"
+    missing = "no such file; expected a result file, as invdyn or simulate writes it"
     assert vsacli("plot", "r.h5").err == f"r.h5: {missing}\n"
     assert vsacli("export", "r.h5").err == "r.h5: no such file\n"
 

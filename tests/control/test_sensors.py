@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -147,9 +148,9 @@ def test_a_recording_from_the_desk_is_as_far_off_as_its_noise(vsacli, tmp_path):
     (tmp_path / "lab.csv").write_text(printed.replace("_measured", ""))
     compared = vsacli("compare", tmp_path / "plan.h5", tmp_path / "lab.csv")
     rms = {
-        words[0]: float(words[2])
-        for line in compared.out.split("\n\n")[1].splitlines()[1:]
-        if len(words := line.split()) > 2
+        words[0]: float(words[3])
+        for line in compared.out.split("\n\n")[1].splitlines()[2:]
+        if len(words := re.split(r"\s{3,}", line)) > 3
     }
     # of a normal noise, whose rms over some 10^3 samples is within a few per cent of its deviation
     assert rms["shoulder.q"] == pytest.approx(1e-4, rel=0.1)

@@ -48,7 +48,7 @@ def folder(path):
 @pytest.mark.parametrize(
     ("spoil", "match"),
     [
-        (missing, "there is no such file; expected a result file"),
+        (missing, "no such file; expected a result file"),
         (folder, "is a folder; expected a result file"),
         (lambda path: path.write_bytes(b""), "is empty; expected a result file"),
         (lambda path: path.write_bytes(b"format: x"), "is not an HDF5 file; expected a result file"),

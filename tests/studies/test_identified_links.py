@@ -177,7 +177,7 @@ def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     file = written(robot, run, robot.joint_names, tmp_path, fx=0 * run.time)
     pushed = identify(robot, file)
     assert [system.title for system in pushed.systems] == ["arm", "slide"]
-    sentence = "nothing is found of links while something acts on the end effector"
+    sentence = "nothing is identified of links while something acts on the end effector"
     assert pushed.notes == (f"{file}: {sentence}",)
     with pytest.raises(InputError, match=sentence):
         identify(robot, file, ["links"])

@@ -132,7 +132,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
         ),
         (
             "{type: constant, value: [1, 2, 3, 4, 5, 6]}",
-            "move.yaml:7: wrench: missing key 'frame' (along whose",
+            "move.yaml:7: wrench: missing key 'frame' (frame in whose",
         ),
         (
             "{frame: base, type: sine}",

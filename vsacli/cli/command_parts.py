@@ -198,7 +198,6 @@ _KINDS = {
 """Kinds of files in the words of an error, where they differ."""
 
 _ADVICE = {
-    "URDF": "convert it with vsacli import-urdf",
     **dict.fromkeys(
         ("result", "simulation", "table of a study"),
         "vsacli info FILE --extract FOLDER gives the files that it was computed from",
@@ -222,7 +221,7 @@ def naming_kind(argument: str, path: str, expected: tuple[str, ...]) -> Iterator
         yield
     except InputError as error:
         kind = None if path == STANDARD else _recognized(path)
-        if kind is None or kind in expected:
+        if kind is None or kind in ("urdf", *expected):  # readers say more of XML files
             raise
         message = f"is a {_KINDS.get(kind, kind)}, but {argument} must be a {expected[0]}"
         advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""

@@ -137,7 +137,7 @@ def _check_signature(path: str | Path) -> None:
         with Path(path).open("rb") as file:
             start = file.read(len(HDF5_SIGNATURE))
     except FileNotFoundError:
-        raise InputError.one(f"no such file{near_file(Path(path))}", path) from None
+        raise InputError.one(f"no such file{near_file(Path(path)) or f'; {EXPECTED}'}", path) from None
     except IsADirectoryError:
         raise InputError.one(f"is a folder; {EXPECTED}", path) from None
     except OSError as error:

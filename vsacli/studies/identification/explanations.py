@@ -25,7 +25,8 @@ from vsacli.studies.identification.estimation import (
     wider,
 )
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_text import CHANGED, significant
+from vsacli.studies.identification.identification_text import significant
+from vsacli.studies.identification.identified_values import CHANGED
 from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.residual_causes import Cause, causes
 

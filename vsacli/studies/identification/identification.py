@@ -31,14 +31,11 @@ from vsacli.studies.identification.identification_report import (
     UNIDENTIFIABLE,
     UNRELIABLE,
     Identification,
-    Number,
-    RecordReport,
-    Residual,
-    SystemReport,
     system_report,
     torques,
 )
 from vsacli.studies.identification.identification_text import significant
+from vsacli.studies.identification.identified_values import Number, RecordReport, Residual, SystemReport
 from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_equations import (
     FRICTION,

@@ -22,7 +22,6 @@ from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, held_out, rms
 from vsacli.studies.identification.identification_text import (
     AT_BOUND,
-    CHANGED,
     INDISTINCT,
     NO_EFFECT,
     NOT_PHYSICAL,
@@ -34,128 +33,13 @@ from vsacli.studies.identification.identification_text import (
     significant,
     use_line,
 )
+from vsacli.studies.identification.identified_values import Number, RecordReport, Residual, SystemReport
 from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recordings import TORQUE, Record
 
 OK, UNIDENTIFIABLE, POOR_FIT, UNRELIABLE = "ok", "unidentifiable", "poor_fit", "unreliable"
 """Verdicts, the worst last: all parameters are identified; some are not; residuals exceed the noise; a
 recording looks wrong."""
-
-
-@dataclass(frozen=True)
-class Number(Published):
-    """The result for one parameter of a robot.
-
-    Attributes:
-        path: path of the parameter in the robot, or name of a base parameter.
-        unit: unit of all values.
-        before: value in the robot file.
-        value: identified value, or the previous one.
-        standard_error: standard error of the value; NaN if unidentifiable.
-        note: reason why it is unidentifiable, or at a bound; otherwise empty.
-        sum: terms of a base parameter, which the file does not have; otherwise empty.
-    """
-
-    path: str
-    unit: str
-    before: float
-    value: float
-    standard_error: float
-    note: str = ""
-    sum: str = ""
-
-    shape: ClassVar = {
-        **named("path", "unit", "before", "value", "standard_error", "off", "changed"),
-        "note?": "note",
-        "sum?": "sum",
-    }
-
-    @property
-    def identifiable(self) -> bool:
-        """Whether the parameter was identified."""
-        return math.isfinite(self.standard_error)
-
-    @property
-    def off(self) -> float:
-        """Difference from the file in standard errors; NaN if unidentifiable."""
-        difference = self.value - self.before
-        if not (difference and self.identifiable):
-            return 0.0 * self.standard_error
-        return difference / self.standard_error
-
-    @property
-    def changed(self) -> bool:
-        """Whether the value differs from the file by more than `CHANGED` standard errors."""
-        return self.identifiable and abs(self.value - self.before) > CHANGED * self.standard_error
-
-
-@dataclass(frozen=True)
-class Residual(Published):
-    """The residual of the equations of a motor or a link, as root mean squares after the filter.
-
-    Attributes:
-        group: name of the motor or link.
-        unit: unit of all values.
-        torque: measured torque.
-        residual: measured minus predicted torque.
-        noise: noise of the residual, expected from the noise of torque and positions; NaN if unknown.
-        held_out: residual on held-out samples; NaN if nothing was held out.
-    """
-
-    group: str
-    unit: str
-    torque: float
-    residual: float
-    noise: float
-    held_out: float
-
-
-@dataclass(frozen=True)
-class SystemReport(Published):
-    """The results for the parameters of a joint's motors and springs, or of the links.
-
-    Attributes:
-        title: name of the joint, or "links".
-        numbers: results for all unknown parameters.
-        condition: condition number of the columns of the equations.
-        combinations: identifiable combinations of indistinguishable parameters, as sentences.
-        residuals: residuals of each motor or link.
-        converged: whether the fit converged.
-    """
-
-    title: str
-    numbers: tuple[Number, ...]
-    condition: float
-    combinations: tuple[str, ...]
-    residuals: tuple[Residual, ...]
-    converged: bool = True
-
-
-@dataclass(frozen=True)
-class RecordReport(Published):
-    """Properties of a recording and its use.
-
-    Attributes:
-        path: path of the file.
-        duration: duration of the used part, s.
-        rate: sample rate, Hz.
-        bandwidth: bandwidth of the filter, Hz.
-        delay: delay of torques behind positions, s; NaN if unidentifiable.
-        delay_error: standard error of the delay, s.
-        corrected: whether the delay was removed.
-        doubts: likely faults, as sentences.
-        unused: columns that were not required.
-    """
-
-    path: str
-    duration: float
-    rate: float
-    bandwidth: float
-    delay: float
-    delay_error: float
-    corrected: bool
-    doubts: tuple[str, ...]
-    unused: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -233,8 +117,8 @@ class Identification(Published):
             headline(self.verdict, self.title),
             parameter_rows(self.numbers, self.fitted.joint_names),
             lines,
-            list(findings(self)),
-            [residual_rows(self)],
+            list(findings(self.systems, self.records, self.notes)),
+            [residual_rows(self.systems)],
         )
 
 

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from vsacli.base.texts import counted
 from vsacli.robot.parameters import JOINTS
-
-if TYPE_CHECKING:
-    from vsacli.studies.identification.identification_report import (
-        Identification,
-        Number,
-        RecordReport,
-        Residual,
-    )
+from vsacli.studies.identification.identified_values import (
+    CHANGED,
+    Number,
+    RecordReport,
+    Residual,
+    SystemReport,
+)
 
 T = TypeVar("T", bound="Named")
-
-CHANGED = 3.0
-"""Difference from the file, in standard errors, that is a change. Of a hundred unchanged parameters, five
-exceed two standard errors by chance, and less than one exceeds three."""
 
 LARGEST_SHOWN = 1e3
 """Deviation in standard errors above which only this bound is printed."""
@@ -141,12 +136,12 @@ def _deviation(number: Number) -> str:
     return _with_decimals(number.off, int(size < TENS), sign="+")
 
 
-def residual_rows(found: Identification) -> list[tuple[str, ...]]:
+def residual_rows(systems: Sequence[SystemReport]) -> list[tuple[str, ...]]:
     """Return a table of the residuals of each motor or link, the header first."""
-    units = " | ".join(dict.fromkeys(each.unit for system in found.systems for each in system.residuals))
+    units = " | ".join(dict.fromkeys(each.unit for system in systems for each in system.residuals))
     header = ("rms, filtered", *(f"{name}\n{units}" for name in ("torque", "residual", "noise", "held out")))
     rows: list[tuple[str, ...]] = [(*header, "condition")]
-    for system in found.systems:
+    for system in systems:
         condition = f"{system.condition:.3g}"
         rows += [(each.group, *_figures(each), condition) for each in system.residuals]
     return rows
@@ -157,17 +152,20 @@ def _figures(residual: Residual) -> Iterator[str]:
         yield f"{value:.3g}" if math.isfinite(value) else "-"
 
 
-def findings(found: Identification) -> Iterator[str]:
-    """Yield the findings: faulty recordings, causes of residuals, then what is unidentifiable, and notes."""
-    yield from (f"{record.path}: {doubt}" for record in found.records for doubt in record.doubts)
-    yield from found.notes
-    for system in found.systems:
+def findings(
+    systems: Sequence[SystemReport], recordings: Sequence[RecordReport], notes: Sequence[str]
+) -> Iterator[str]:
+    """Yield the findings: faulty recordings, causes of residuals, then unidentifiable parameters."""
+    numbers = [number for system in systems for number in system.numbers]
+    yield from (f"{recording.path}: {doubt}" for recording in recordings for doubt in recording.doubts)
+    yield from notes
+    for system in systems:
         yield from (f"{system.title}: {sentence}" for sentence in system.combinations)
     for note in (NO_EFFECT, NOT_PHYSICAL, AT_BOUND):
-        paths = [each.path for each in found.numbers if each.note == note]
+        paths = [each.path for each in numbers if each.note == note]
         if paths:
             yield f"{note}: {', '.join(paths)}"
-    if not all(each.identifiable for each in found.numbers):
+    if not all(each.identifiable for each in numbers):
         yield (
             "unidentifiable parameters keep the values of the file; to plan a motion that identifies more: "
             "vsacli identify --plan"

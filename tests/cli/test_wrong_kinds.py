@@ -1,0 +1,60 @@
+"""Files of a wrong kind and misspelled names: one error says what a file is, or what it may be called."""
+
+from __future__ import annotations
+
+import pytest
+from samples.command_line import REST_TO_REST, ROBOT
+
+
+@pytest.fixture(autouse=True)
+def _files(vsacli, own_folder):
+    """Files of several kinds, and a folder of robots."""
+    assert vsacli("invdyn", ROBOT, REST_TO_REST, "-o", "run.h5").code == 0
+    (own_folder / "robots").mkdir()
+    for path in (ROBOT, own_folder / "robots" / "arm.yaml"):
+        (own_folder / "robots" / path.name).write_text(ROBOT.read_text())
+    (own_folder / "arm.yaml").write_text(ROBOT.read_text())
+    (own_folder / "move.yaml").write_text(REST_TO_REST.read_text())
+    (own_folder / "samples.csv").write_text("time,base.q\n0,0\n1,1\n")
+    return own_folder
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot; are ROBOT "),
+        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory; are ROBOT"),
+        (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot; vsacli info FILE"),
+        (("samples.csv", "move.yaml"), "samples.csv: is a CSV table, but ROBOT must be a robot"),
+        (("robot/arm.yaml", "move.yaml"), "robot/arm.yaml: no such file; did you mean 'robots/arm.yaml'?"),
+        (("ARM.yaml", "move.yaml"), "ARM.yaml: no such file; did you mean 'arm.yaml'?"),
+        (("panda.yaml", "move.yaml"), "panda.yaml: no such file\n"),
+        (("-", "-"), "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"),
+    ],
+    ids=["swapped", "robot twice", "result", "table", "folder", "case", "nothing similar", "input twice"],
+)  # fmt: skip
+def test_the_error_says_what_a_file_is(vsacli, arguments, message):
+    for command in ("invdyn", "check-feasibility", "simulate", "optimize", "sensitivity"):
+        outcome = vsacli(command, *arguments)
+        assert outcome.code == 2
+        assert message in outcome.err
+
+
+@pytest.mark.parametrize(
+    "command", [("identify", "move.yaml", "samples.csv"), ("size", "move.yaml", "move.yaml")]
+)
+def test_other_commands_say_it_as_well(vsacli, command):
+    outcome = vsacli(*command)
+    assert outcome.code == 2
+    assert "move.yaml: is a trajectory, but ROBOT must be a robot" in outcome.err
+
+
+@pytest.mark.parametrize("name", ["a.jsonl", "a.cvs", "a.txt"])
+def test_an_unknown_ending_is_refused_unless_the_format_is_named(vsacli, name):
+    outcome = vsacli("export", "run.h5", "--rate", 10, "-o", name)
+    assert outcome.code == 2
+    assert (
+        f"export of a result writes .csv, .mat, .parquet, .json, .yaml, .yml, not {name[1:]}" in outcome.err
+    )
+    assert vsacli("export", "run.h5", "--rate", 10, "--format", "csv", "-o", name).code == 0
+    assert vsacli("invdyn", "arm.yaml", "move.yaml", "-o", name).code == 2
