@@ -20,7 +20,7 @@ from vsacli.trajectory.curves.closed_form import ClosedForm
 from vsacli.trajectory.curves.sequence import PARTS
 from vsacli.trajectory.curves.types import TYPES
 
-OF_PLACE = {"inertia", "gear_ratio", "damping", "friction"}
+OF_PLACE = {"inertia", "gear_ratio", "side", "damping", "friction"}
 """Fields of a motor in a robot file that `size` writes from the place and the gear, or in another form."""
 
 NO_PARTS = {"sequence", "constant", "csv"}
