@@ -54,4 +54,4 @@ def test_a_simulation_along_an_unreliable_record_says_so():
     of = record(MOTIONS["velocity steps, 50 ms"], QUICK, 20, RATE)
     trajectory = Trajectory.from_samples(of.time, of.values[:, None])
     warnings = simulate(ARMS["elastic"], trajectory).report.warnings
-    assert any(each.startswith("elbow: tau_motor is not determined by the record: ") for each in warnings)
+    assert any(each.startswith("elbow: tau_motor is not determined by the recording: ") for each in warnings)

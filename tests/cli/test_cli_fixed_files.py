@@ -181,8 +181,8 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     robot = robot_with(tmp_path, shoulder=2)
     (tmp_path / "fast.yaml").write_text(FAST)
     done = vsacli("check-feasibility", robot, "fast.yaml", "--write-fix", 1, "-o", "fixed.yaml")
-    text = done.out.partition("self-check passed")[2]
-    _, base, shoulder, heading, *fixes = text.splitlines()
+    text = done.out.partition("self-check passed")[2].partition("\n")[2].strip()
+    base, shoulder, heading, *fixes = text.splitlines()
     assert base.startswith("base: stiffness is 850 N m/rad at t = 0.12")
     # statics of the two outer links, with both springs tight, as the report of the arm at rest has it
     assert shoulder.startswith("shoulder: joint-side torque of motor 1 is ")

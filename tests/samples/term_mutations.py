@@ -71,7 +71,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
     return [module for module in modules if vars(module).get(name) is function]
 
 
-BETA, SOLVE = "actuators.pairs.joints:beta", "actuators.pairs.joints:solve"
+BETA, SOLVE = "actuators.pairs.joints:beta", "actuators.pairs.joints:solve_decoupling"
 DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
@@ -185,9 +185,9 @@ MUTATIONS = (
     Mutation(
         "tau_damper between links", "pair", DAMPER, "damping * command.dq", "1.01 * damping * command.dq"
     ),
-    Mutation("damper beside springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"),
+    Mutation("damper parallel to springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"),
     Mutation(
-        "damper beside springs, velocity",
+        "damper parallel to springs, velocity",
         "damped",
         "actuators.damped_springs:DampedSprings.driven",
         "command.tau_e - springs",
