@@ -185,7 +185,9 @@ MUTATIONS = (
     Mutation(
         "tau_damper between links", "pair", DAMPER, "damping * command.dq", "1.01 * damping * command.dq"
     ),
-    Mutation("damper parallel to springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"),
+    Mutation(
+        "damper parallel to springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"
+    ),
     Mutation(
         "damper parallel to springs, velocity",
         "damped",

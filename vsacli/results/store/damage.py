@@ -217,9 +217,15 @@ def check_present(attributes: Container[str], needed: Iterable[str], name: str =
         raise ValueError(f"{name} has no attribute {', '.join(missing)}")
 
 
-def read_attributes(file: h5py.File) -> None:
-    """Read all attributes of all objects once, since damage of one shows only then."""
-    file.visititems(lambda _name, each: dict(each.attrs) and None)
+def read_texts(file: h5py.File) -> None:
+    """Read all attributes of all objects, and all datasets of texts, since damage of one shows only then."""
+
+    def read(_name: str, each: h5py.Group | h5py.Dataset) -> None:
+        dict(each.attrs)
+        if isinstance(each, h5py.Dataset) and h5py.check_string_dtype(each.dtype):
+            bounded(each)[()]
+
+    file.visititems(read)
 
 
 def file_size(file: h5py.File) -> int:

@@ -29,7 +29,7 @@ from vsacli.results.store.damage import (
     check_present,
     check_times,
     own_dataset,
-    read_attributes,
+    read_texts,
     reporting_damage,
 )
 from vsacli.results.store.inputs import StoredInput, read_sources
@@ -352,7 +352,7 @@ class StoredResult(StoredFile):
                 self.read(name, start, start + BLOCK_SAMPLES)
         self.provenance()
         with reporting_damage(self.path):
-            read_attributes(self._file)
+            read_texts(self._file)
             for name in ("time", *self.variables):
                 needed = variable_attributes(self.declared[name], self.joint_types)
                 check_present(self._file[name].attrs, needed, name)

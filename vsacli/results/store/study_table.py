@@ -18,7 +18,7 @@ from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS
 from vsacli.base.version import __version__
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read_attributes, reporting_damage
+from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read_texts, reporting_damage
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import NewFile
@@ -364,6 +364,6 @@ class StoredStudy(StoredFile):
         self.inputs()
         self.provenance()
         with reporting_damage(self.path):
-            read_attributes(self._file)
+            read_texts(self._file)
             for name in self.columns:
                 check_present(self._file[name].attrs, OF_COLUMNS, name)
