@@ -88,7 +88,7 @@ def test_a_deviation_takes_two_robots_with_torques():
     found = sensitivity(robot, trajectory, tolerances="20%", runs=2, seed=4)
     assert found.monte_carlo.lost["shoulder"] == 0.5
     assert np.isnan(found.monte_carlo.torque["shoulder"])
-    header, *_ = rows = found.as_text().rows
+    header, *_ = rows = found.as_text().tables[0]
     shoulder = dict(zip(header, rows[1], strict=True))
     assert (shoulder["drawn +-\nN m"], shoulder["infeasible\n% of draws"]) == ("-", "50")
 

@@ -13,6 +13,7 @@ from vsacli.analysis.report_text import energy_lines
 from vsacli.analysis.trouble_text import counts, findings, spread_lines, uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText, headline
+from vsacli.base.texts import counted
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_check_failed")
 """Verdicts from best to worst; the worst that applies wins."""
@@ -98,7 +99,7 @@ class Report(Stored):
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
         ]
-        return ReportText(headline(self.verdict, self._title()), text.joint_rows(self.joints), lines, found)
+        return ReportText(headline(self.verdict, self._title()), found, [text.joint_rows(self.joints)], lines)
 
     def __str__(self) -> str:
         """Return the lines that the commands print, without a final newline."""
@@ -109,7 +110,7 @@ class Report(Stored):
 
     def _title(self) -> str:
         """Return names, size, and how many joints fail which requirement."""
-        length = text.count(self.samples) + ("" if self.complete else ", stopped early")
+        length = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
         title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
         return "; ".join([title, *filter(None, [counts(self.joints)])])
 

@@ -154,11 +154,6 @@ def _rounded(value: float, digits: int) -> str:
     return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
-def count(samples: int) -> str:
-    """Return a number of samples, in words."""
-    return counted(samples, "sample")
-
-
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
     yield from _positions("initial", joints, [joint.start_theta for joint in joints], "first")
@@ -225,7 +220,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
     for drift in drifts:
         if drift.stop is not None:
             time, reason = time_text(drift.stop.time), drift.stop.reason
-            samples = f"infeasible: {count(infeasible[drift.joint])}"
+            samples = f"infeasible: {counted(infeasible[drift.joint], 'sample')}"
             yield f"{drift.joint}: deflections cannot be integrated beyond t = {time}: {reason} ({samples})"
 
 
@@ -252,12 +247,12 @@ def by_joint(label: str, entries: Sequence[str]) -> str:
 
 def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
     """Return entries of joints by index; equal entries of many joints are combined."""
-    alike: dict[str, list[int]] = {}
+    equal: dict[str, list[int]] = {}
     for number, words in said.items():
-        alike.setdefault(words, []).append(number)
-    if len(names) <= MOST_APART or len(alike) == len(said):
+        equal.setdefault(words, []).append(number)
+    if len(names) <= MOST_APART or len(equal) == len(said):
         return by_joint(label, [f"{names[number]} {words}" for number, words in said.items()])
-    lines = [f"{together(numbers, names)} {words}" for words, numbers in alike.items()]
+    lines = [f"{together(numbers, names)} {words}" for words, numbers in equal.items()]
     return label + (";\n" + " " * len(label)).join(lines)
 
 

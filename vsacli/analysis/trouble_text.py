@@ -10,12 +10,36 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread, Worst
-from vsacli.analysis.report_text import apart, by_joint, count, kind_of, number, of_joints, of_motors, percent
+from vsacli.analysis.report_text import apart, by_joint, kind_of, number, of_joints, of_motors, percent
 from vsacli.base.flags import Flag
+from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 
 DIFFERENT_PEAK = 1.1
 """Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
+
+MOST_IN_FULL = 3
+"""Joints with a full sentence on a kind of problem, where more than one more have it."""
+
+MOST_SENTENCES = 12
+"""Full sentences of a report; where there would be more, only the worst joint of each kind has one."""
+
+MOST_LISTS = 8
+"""Kinds of problems of a report whose lists of joints have values; where there are more, only names."""
+
+FAILURES = {
+    "infeasible": "infeasible",
+    "singular": "singular",
+    "over_limit": "over a limit",
+    "unreliable": "unreliable",
+}
+"""Verdicts that joints are counted for in the first line of a report, and their words there."""
+
+GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", "off_target")
+"""Kinds of problems that come first; limits follow, and warnings come last."""
+
+COUNTED_AS = {"not_finite": "infeasible", "internal_instability": "singular"}
+"""Kinds of problems whose samples are counted under another name."""
 
 
 def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
@@ -40,7 +64,8 @@ def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[st
     yield from map(undetermined_text, uncertainty.undetermined)
     for kind, samples in uncertainty.samples.items():
         if samples:
-            yield f"{samples} of {count(joint.samples[kind])} that are {kind} may not be: uncertainty decides"
+            found = counted(joint.samples[kind], "sample")
+            yield f"{samples} of {found} that are {kind} may not be: uncertainty decides"
     for worst in uncertainty.limits.values():
         yield f"{excess(worst)}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
@@ -70,30 +95,6 @@ def undetermined_text(spread: Spread) -> str:
     if not math.isnan(spread.rms):
         error += f", twice its standard deviation of {spread.rms:.2g} {spread.unit}"
     return f"{subject}: {error}; {100 * DETERMINED:.0f} % is allowed"
-
-
-MOST_IN_FULL = 3
-"""Joints with a full sentence on a kind of problem, where more than one more have it."""
-
-MOST_SENTENCES = 12
-"""Full sentences of a report; where there would be more, only the worst joint of each kind has one."""
-
-MOST_LISTS = 8
-"""Kinds of problems of a report whose lists of joints have values; where there are more, only names."""
-
-FAILURES = {
-    "infeasible": "infeasible",
-    "singular": "singular",
-    "over_limit": "over a limit",
-    "unreliable": "unreliable",
-}
-"""Verdicts that joints are counted for in the first line of a report, and their words there."""
-
-GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", "off_target")
-"""Kinds of problems that come first; limits follow, and warnings come last."""
-
-COUNTED_AS = {"not_finite": "infeasible", "internal_instability": "singular"}
-"""Kinds of problems whose samples are counted under another name."""
 
 
 class Problem(NamedTuple):
@@ -224,7 +225,8 @@ def _when(joint: JointReport, kind: str, samples: int) -> str:
     found = joint.samples[kind]
     if found == samples:
         return "all samples"
-    return count(found) if found == 1 else f"{count(found)}, from {time_text(joint.first_time[kind])}"
+    words = counted(found, "sample")
+    return words if found == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
 
 
 def _between(joint: JointReport, worst: Worst) -> str:
@@ -253,7 +255,8 @@ def _infeasible(joint: JointReport, worst: Worst, samples: int) -> str:
 
 
 def _hints(joint: JointReport) -> str:
-    slack = f"; a tendon goes slack at {count(joint.samples['slack'])}" if joint.samples["slack"] else ""
+    count = joint.samples["slack"]
+    slack = f"; a tendon goes slack at {counted(count, 'sample')}" if count else ""
     return slack + ("; the opposite branch reaches it" if joint.other_branch else "")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from html import escape
 from itertools import zip_longest
@@ -31,22 +32,18 @@ class ReportText(NamedTuple):
 
     Attributes:
         headline: the verdict, and what it is about.
-        rows: a table, its header first; none if there is no table.
-        lines: further values, a line or more each.
         findings: problems and warnings, a line or more each, the most critical first.
-        tables: further tables below the first, each with its header.
+        tables: tables, each with its header first; empty ones are not shown.
+        lines: further values, a line or more each.
     """
 
     headline: str
-    rows: Sequence[tuple[str, ...]]
-    lines: Sequence[str]
     findings: Sequence[str] = ()
     tables: Sequence[Sequence[tuple[str, ...]]] = ()
+    lines: Sequence[str] = ()
 
     def __str__(self) -> str:
-        tables = [
-            "\n".join(line.rstrip() for line in aligned(rows)) for rows in (self.rows, *self.tables) if rows
-        ]
+        tables = ("\n".join(line.rstrip() for line in aligned(rows)) for rows in self.tables if rows)
         parts = ("\n".join([self.headline, *self.findings]), *tables, "\n".join(self.lines))
         return "\n\n".join(filter(None, parts))
 
@@ -59,6 +56,11 @@ def verdict_words(verdict: str) -> str:
 def headline(verdict: str, title: str) -> str:
     """Return the first line of a report: the verdict in capitals, then what it is about."""
     return f"{verdict_words(verdict)}  {title}"
+
+
+def cell(value: float, form: str = ".3g") -> str:
+    """Return a number as a cell shows it; a dash where it does not exist."""
+    return f"{value:{form}}" if math.isfinite(value) else "-"
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:

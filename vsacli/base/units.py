@@ -52,7 +52,12 @@ class WrenchQuantity(Quantity):
 
 def units_of(quantity: Quantity, joint_types: Iterable[str]) -> str:
     """Return the unit of a quantity; of both types of joints where there are both."""
-    return " | ".join(dict.fromkeys(map(quantity.unit, joint_types)))
+    return in_header(map(quantity.unit, joint_types))
+
+
+def in_header(units: Iterable[str]) -> str:
+    """Return the units of a column for its header, each once."""
+    return " | ".join(dict.fromkeys(units))
 
 
 def time_text(time: float) -> str:

@@ -100,12 +100,7 @@ def check_feasibility(
     limits. The smallest change comes first, and each is confirmed by a run. --write-fix N -o FILE writes the
     trajectory with fix N of the list.
     """
-    if number is not None and output is None:
-        raise click.UsageError(f"--write-fix {number} needs -o FILE, the trajectory file to write")
-    if output is not None and number is None:
-        raise click.UsageError("-o FILE needs --write-fix N, the number of a fix as --fixes lists it")
-    if changes and output is not None:
-        raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
+    _check_fix_options(number, output, changes)
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
     from vsacli.base.flags import MIN_MARGIN, check_min_margin
@@ -136,6 +131,16 @@ def check_feasibility(
             _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)
     return show_report(report, as_json, (robot, trajectory), changes, found)
+
+
+def _check_fix_options(number: int | None, output: str | None, changes: tuple[str, ...]) -> None:
+    """Refuse `--write-fix` without `-o`, the reverse, and both with `--set`."""
+    if number is not None and output is None:
+        raise click.UsageError(f"--write-fix {number} needs -o FILE, the trajectory file to write")
+    if output is not None and number is None:
+        raise click.UsageError("-o FILE needs --write-fix N, the number of a fix as --fixes lists it")
+    if changes and output is not None:
+        raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
 
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:

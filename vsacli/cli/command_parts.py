@@ -109,6 +109,18 @@ set_option = click.option(
 )
 
 
+def seed_option(use: str) -> Callable[[Any], Any]:
+    """Return the option `--seed` of a command that draws random numbers for a `use`."""
+    return click.option(
+        "--seed",
+        metavar="N",
+        type=click.IntRange(min=0),
+        default=0,
+        show_default=True,
+        help=f"Seed of the random {use}.",
+    )
+
+
 def check_plotted(folder: str | None) -> None:
     """Refuse `--format` without the folder of `--plot`, in commands that draw only with `--plot`.
 

@@ -104,12 +104,12 @@ class Reported(Protocol):
         """Return JSON values."""
 
 
-def say(found: Reported, as_json: bool) -> None:
+def say(found: Reported, as_json: bool, text: object = None) -> None:
     """Print the findings of a command, as JSON or as text."""
     if as_json:
         say_json(found.as_json())
     else:
-        say_text(str(found), getattr(found, "verdict", ""))
+        say_text(str(found if text is None else text), getattr(found, "verdict", ""))
 
 
 def say_json(content: Mapping[str, Any]) -> None:

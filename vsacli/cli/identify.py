@@ -18,7 +18,7 @@ from vsacli.cli.command_parts import (
     robot_argument,
     words_of,
 )
-from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say_json, say_text, talk_options
+from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
@@ -156,10 +156,7 @@ def identify(
             page.write_text(identification_page(found, columns))
         elif folder is not None:
             draw_figures(found, robot, folder, file_format, outputs)
-    if as_json:
-        say_json(found.as_json())
-    else:
-        say_text(str(found.as_text(verbose=talk.verbose)), found.verdict)
+    say(found, as_json, found.as_text(verbose=talk.verbose))
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 

@@ -16,6 +16,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    seed_option,
     set_option,
     trajectory_argument,
 )
@@ -78,14 +79,7 @@ CHANGE, PACE = "optimum", "pace"
     type=FOLDER,
     help="Save figures of stiffness, torques and timing in this folder, as PNG.",
 )
-@click.option(
-    "--seed",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of the random initial guesses.",
-)
+@seed_option("initial guesses")
 @json_option
 @overwrite_option
 @talk_options

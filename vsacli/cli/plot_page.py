@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vsacli.cli.command_parts import result_line
+from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
 
 if TYPE_CHECKING:
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from vsacli.results.pages import FixText
     from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
-
-FIXABLE = ("infeasible", "singular", "over_limit")
-"""Verdicts of results for which fixes are searched."""
 
 LONG_PAGE = 2_000_000
 """Number of samples, over all files, from which the progress of a page is shown."""

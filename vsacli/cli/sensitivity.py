@@ -18,6 +18,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    seed_option,
     set_option,
     trajectory_argument,
 )
@@ -64,14 +65,7 @@ SHOWN_FROM = 20_000
     type=click.IntRange(min=2),
     help="Number of robots drawn at random from the tolerances and computed as well.",
 )
-@click.option(
-    "--seed",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Seed of the random draws of --monte-carlo.",
-)
+@seed_option("draws of --monte-carlo")
 @click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time to this HDF5 file.")
 @click.option(
     "--plot",

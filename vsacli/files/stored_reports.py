@@ -23,4 +23,4 @@ def stored_report(kind: str, content: Mapping[str, Any]) -> ReportText:
             return SimulationReport.from_json(content).as_text()
         return Report.from_json(content).as_text()
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
-        return ReportText("its report has another form than this version writes; --json shows it", [], [])
+        return ReportText("its report has another form than this version writes; --json shows it")

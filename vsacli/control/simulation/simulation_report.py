@@ -135,7 +135,7 @@ class SimulationReport(Stored):
             *self._loss(),
             *self._effort(),
         ]
-        return ReportText(headline(self.verdict, self._title()), rows(self.joints), lines, found)
+        return ReportText(headline(self.verdict, self._title()), found, [rows(self.joints)], lines)
 
     def __str__(self) -> str:
         """Return the lines that the command prints, without a final newline."""

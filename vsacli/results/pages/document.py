@@ -191,8 +191,6 @@ def _shown(text: str | None) -> str | None:
 
 def printable(report: ReportText) -> ReportText:
     """Return a report whose texts name files or columns, with nothing in it that a page would not show."""
-    rows, *tables = (
-        [tuple(map(for_terminal, row)) for row in table] for table in (report.rows, *report.tables)
-    )
+    tables = [[tuple(map(for_terminal, row)) for row in table] for table in report.tables]
     findings, lines = (list(map(for_terminal, texts)) for texts in (report.findings, report.lines))
-    return ReportText(one_line(report.headline), rows, lines, findings, tables)
+    return ReportText(one_line(report.headline), findings, tables, lines)

@@ -115,10 +115,9 @@ class Identification(Published):
         lines = [*map(use_line, self.records), *definitions(self.numbers, verbose=verbose)]
         return ReportText(
             headline(self.verdict, self.title),
-            parameter_rows(self.numbers, self.fitted.joint_names),
-            lines,
             list(findings(self.systems, self.records, self.notes)),
-            [residual_rows(self.systems)],
+            [parameter_rows(self.numbers, self.fitted.joint_names), residual_rows(self.systems)],
+            lines,
         )
 
 

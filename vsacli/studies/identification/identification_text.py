@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Protocol, TypeVar
 
+from vsacli.base.tables import cell
 from vsacli.base.texts import counted
+from vsacli.base.units import in_header
 from vsacli.robot.parameters import JOINTS
 from vsacli.studies.identification.identified_values import (
     CHANGED,
     Number,
     RecordReport,
-    Residual,
     SystemReport,
 )
 
@@ -138,18 +139,16 @@ def _deviation(number: Number) -> str:
 
 def residual_rows(systems: Sequence[SystemReport]) -> list[tuple[str, ...]]:
     """Return a table of the residuals of each motor or link, the header first."""
-    units = " | ".join(dict.fromkeys(each.unit for system in systems for each in system.residuals))
+    units = in_header(each.unit for system in systems for each in system.residuals)
     header = ("rms, filtered", *(f"{name}\n{units}" for name in ("torque", "residual", "noise", "held out")))
     rows: list[tuple[str, ...]] = [(*header, "condition")]
     for system in systems:
         condition = f"{system.condition:.3g}"
-        rows += [(each.group, *_figures(each), condition) for each in system.residuals]
+        rows += [
+            (each.group, *map(cell, (each.torque, each.residual, each.noise, each.held_out)), condition)
+            for each in system.residuals
+        ]
     return rows
-
-
-def _figures(residual: Residual) -> Iterator[str]:
-    for value in (residual.torque, residual.residual, residual.noise, residual.held_out):
-        yield f"{value:.3g}" if math.isfinite(value) else "-"
 
 
 def findings(

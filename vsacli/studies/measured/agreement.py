@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, cell
 from vsacli.documents.source import Source
 
 Still: TypeAlias = Literal["computed", "measured"]
@@ -136,7 +136,7 @@ class Comparison(Published):
         """Return the report in parts."""
         how = "found from the signals" if self.found else "as given"
         covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared; time offset {how}"
-        return ReportText(self.title, self._rows(), [covered], self.notes)
+        return ReportText(self.title, self.notes, [self._rows()], [covered])
 
     def _worst(self) -> str:
         known = [each for each in self.signals if math.isfinite(each.share)]
@@ -166,17 +166,14 @@ class Comparison(Published):
 
 
 def _row(signal: Agreement) -> tuple[str, ...]:
-    def figure(value: float, form: str) -> str:
-        return f"{value:{form}}" if math.isfinite(value) else "-"
-
     return (
         signal.column,
         signal.variable,
         signal.unit,
-        figure(signal.rms, ".3g"),
-        figure(100 * signal.share, ".3g"),
-        figure(signal.worst, "+.3g"),
-        figure(signal.worst_time, ".3f"),
+        cell(signal.rms, ".3g"),
+        cell(100 * signal.share, ".3g"),
+        cell(signal.worst, "+.3g"),
+        cell(signal.worst_time, ".3f"),
         _with_error(signal.offset, signal.offset_error, "", "+.2g"),
         _with_error(signal.gain, signal.gain_error, "", ".4g"),
         _with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "", "+.1f"),

@@ -12,6 +12,7 @@ import numpy as np
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted
+from vsacli.base.units import in_header
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -203,9 +204,9 @@ class Optimum(Published):
     def as_text(self) -> ReportText:
         """Return the report in parts."""
         if self.trajectory is None:
-            return ReportText(self.title, [], [], list(self.reasons))
+            return ReportText(self.title, list(self.reasons))
         if self.timing is not None:
-            return ReportText(self.title, self.timing.rows(), list(self.timing.lines()))
+            return ReportText(self.title, tables=[self.timing.rows()], lines=list(self.timing.lines()))
         slowed = (
             f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: no feasible "
             "timing of the commanded duration was found"
@@ -214,7 +215,7 @@ class Optimum(Published):
         lines = [
             f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
         ]
-        return ReportText(self.title, self._rows(), lines, [slowed] if self.slow_down != 1 else [])
+        return ReportText(self.title, [slowed] if self.slow_down != 1 else [], [self._rows()], lines)
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the table of costs, the total last."""
@@ -222,7 +223,7 @@ class Optimum(Published):
         constants = self.together is None
         if self.together is not None:
             costs["together" if self.together.unit else "together, relative"] = self.together
-        units = " | ".join(dict.fromkeys(each.unit for each in costs.values() if each.unit))
+        units = in_header(each.unit for each in costs.values() if each.unit)
         names = ("as commanded", *(["best constant"] if constants else []), "local optimum")
         rows = [("joint", *(f"{name}\n{units}".rstrip() for name in names), "change\n%")]
         for name, each in costs.items():

@@ -10,6 +10,7 @@ from typing import ClassVar
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted
+from vsacli.base.units import in_header
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.tolerances import MonteCarlo
 
@@ -130,10 +131,8 @@ class Sensitivity(Published):
 
     def as_text(self) -> ReportText:
         """Return the report in parts; the first table is that of tolerances, if there are any."""
-        ranking = self._rows() if self.top else []
-        band, findings = self._band_rows(), list(self._findings())
-        tables = [band, ranking] if band else [ranking]
-        return ReportText(self.title, tables[0], list(self._lines()), findings, tables[1:])
+        tables = [self._band_rows(), self._rows() if self.top else []]
+        return ReportText(self.title, list(self._findings()), tables, list(self._lines()))
 
     def _findings(self) -> Iterator[str]:
         if self.failed:
@@ -154,7 +153,7 @@ class Sensitivity(Published):
         return tuple(each for each in self.parameters[:SHOWN] if each.most is not None)
 
     def _rows(self) -> list[tuple[str, ...]]:
-        units = " | ".join(dict.fromkeys(self.units[each.most[0]] for each in self.top if each.most))
+        units = in_header(self.units[each.most[0]] for each in self.top if each.most)
         rows: list[tuple[str, ...]] = [
             (
                 "parameter",
@@ -206,7 +205,7 @@ class Sensitivity(Published):
         """Return the table of the effects of tolerances on each joint; empty without tolerances."""
         if not self.band:
             return []
-        units = " | ".join(dict.fromkeys(self.units[joint] for joint in self.band))
+        units = in_header(self.units[joint] for joint in self.band)
         drawn = self.monte_carlo
         header = (
             "joint",

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, cell, headline
 from vsacli.base.texts import counted
-from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, time_text, units_of
+from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, in_header, time_text, units_of
 from vsacli.studies.sizing.choices import CRITERIA, Choice
 from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
 from vsacli.studies.sizing.motor_sizing import MotorSizing
@@ -84,13 +84,12 @@ class Sizing(Published):
             demand_rows(known, several=several) if self.catalog else [],
             spring_rows(self.springs, several=several),
         ]
-        first, *others = [table for table in tables if len(table) > 1] or [[]]
         found = [
             *lacking(self.lacking),
             *left_out(self.outcomes),
             *warnings_and_notes(self.warnings, self.notes),
         ]
-        return ReportText(self._headline(), first, [], found, others)
+        return ReportText(self._headline(), found, [table for table in tables if len(table) > 1])
 
     @property
     def title(self) -> str:
@@ -173,11 +172,11 @@ def demand_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[s
         rows.append(
             (
                 motor.name,
-                _number(asked.load.value),
+                cell(asked.load.value),
                 _when(asked.load, several=several),
-                _number(asked.rms_load),
-                _number(asked.velocity.value),
-                _number(asked.acceleration),
+                cell(asked.rms_load),
+                cell(asked.velocity.value),
+                cell(asked.acceleration),
             )
         )
     return rows
@@ -186,7 +185,7 @@ def demand_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[s
 def own_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[str, ...]]:
     """Return the table of the robot's own motors, on the joint side if gears are unknown."""
     torque, velocity = (
-        (" | ".join(dict.fromkeys(units)) for units in zip(*(motor.units for motor in motors), strict=True))
+        (in_header(units) for units in zip(*(motor.units for motor in motors), strict=True))
         if motors
         else ("", "")
     )
@@ -212,14 +211,14 @@ def own_rows(motors: Sequence[MotorSizing], *, several: bool) -> list[tuple[str,
             (
                 motor.name + (" (joint side)" if on_joint else ""),
                 *_most(motor.own.shares),
-                _number(points.torque.value),
+                cell(points.torque.value),
                 _when(points.torque, several=several),
-                _number(points.rms_torque),
-                _number(points.velocity.value),
-                _number(points.power),
-                _number(points.current),
-                _number(points.voltage),
-                _number(points.copper_loss),
+                cell(points.rms_torque),
+                cell(points.velocity.value),
+                cell(points.power),
+                cell(points.current),
+                cell(points.voltage),
+                cell(points.copper_loss),
             )
         )
     return _without_empty(rows)
@@ -248,7 +247,7 @@ def choice_rows(motors: Sequence[MotorSizing]) -> list[tuple[str, ...]]:
                 best.motor if best.does else f"none, nearest {best.motor}",
                 f"{best.ratio:.4g}",
                 *(_percentage(best.shares.get(name, math.nan)) for name in used),
-                _number(best.copper_loss),
+                cell(best.copper_loss),
                 _gears(best),
                 f"{sum(choice.does for choice in motor.choices)}",
             )
@@ -301,10 +300,10 @@ def spring_rows(springs: Sequence[SpringDemand], *, several: bool) -> list[tuple
 def _spring_row(spring: SpringDemand, *, several: bool) -> tuple[str, ...]:
     return (
         f"{spring.joint} {spring.spring}",
-        _number(spring.energy.value),
+        cell(spring.energy.value),
         _when(spring.energy, several=several),
-        _number(spring.torque.value),
-        _number(spring.deflection.value),
+        cell(spring.torque.value),
+        cell(spring.deflection.value),
         _percentage(spring.share),
     )
 
@@ -335,12 +334,8 @@ def _most(shares: dict[str, float]) -> tuple[str, str]:
     return _percentage(shares[name]), WORDS[name]
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "-"
-
-
 def _percentage(share: float) -> str:
-    return f"{100 * share:.3g}" if math.isfinite(share) else "-"
+    return cell(100 * share)
 
 
 def _share(share: float) -> str:

@@ -103,7 +103,7 @@ class StudySummary(Stored):
         if len(self.failures) > MOST_ERRORS:
             others = counted(len(self.failures) - MOST_ERRORS, "other run")
             lines.append(f"{others} failed; the column error of the table says why")
-        return ReportText(self.title, self._rows(), lines, list(self._findings()))
+        return ReportText(self.title, list(self._findings()), [self._rows()], lines)
 
     def _findings(self) -> Iterator[str]:
         without = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))

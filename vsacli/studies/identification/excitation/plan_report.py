@@ -134,10 +134,8 @@ class Excitation(Published):
             *([] if self.active else ["active limits: none"]),
             f"seed of the search: {self.seed}",
         ]
-        rows = self._numbers() if self.planned.numbers else []
-        return ReportText(
-            headline(self.verdict, self.title), rows, lines, list(self._findings()), [self._conditions()]
-        )
+        tables = [self._numbers() if self.planned.numbers else [], self._conditions()]
+        return ReportText(headline(self.verdict, self.title), list(self._findings()), tables, lines)
 
     def _findings(self) -> Iterator[str]:
         for whose, useful in (("the plan", self.planned), ("the given motion", self.own)):
