@@ -19,7 +19,7 @@ from vsacli.actuators.reach import LimitCheck, OfJoint, Reach
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, single_motor
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag, has
 from vsacli.documents.fields import POSITIVE, OneOf, Record, check_fields, number, value
@@ -132,7 +132,7 @@ class Elastic(Actuator):
             ddtheta=command.ddq + command.ddtau_e / stiffness,
             tau_transmission=command.tau_e,
             elastic_energy=phi * command.tau_e / 2,
-            flags=np.zeros(command.q.shape, dtype=np.uint32),
+            flags=np.zeros(command.q.shape, dtype=FLAG_TYPE),
         )
 
     def _nonlinear(self, command: Command) -> OfJoint:

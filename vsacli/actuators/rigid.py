@@ -12,7 +12,7 @@ from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, single_motor
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.documents.fields import Record, check_fields, value
 
 
@@ -55,7 +55,7 @@ class Rigid(Actuator):
             ddtheta=command.ddq,
             tau_transmission=command.tau_e,
             elastic_energy=still * command.tau_e / 2,
-            flags=np.zeros(still.shape, dtype=np.uint32),
+            flags=np.zeros(still.shape, dtype=FLAG_TYPE),
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:

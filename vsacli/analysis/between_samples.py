@@ -24,7 +24,7 @@ from vsacli.analysis.minima import (
     clearances,
     narrowed,
 )
-from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, IndexArray
+from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
@@ -113,7 +113,7 @@ class Between:
         self._trajectory, self._compute, self._judged = trajectory, compute, judged
         self._joints = len(robot.joints)
         self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
-        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=np.uint32)
+        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
         self._flagged = np.array([0.0 if quantity.limit else min_margin for quantity in self.quantities])
         self._lowest = [np.empty(0)] * len(self.quantities)
         self._least_at_steps = np.full(len(self.quantities), np.inf)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.actuators.reach import ALLOWED_DEVIATIONS, margin
 from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
-from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
+from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
 from vsacli.compute.engine import NUMPY, Engine
@@ -114,7 +114,7 @@ class RunUncertainty:
     def _judge_limits(self, block: Block, index: int) -> None:
         """Clear the bits of limits where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
-        seen, exceeded = np.zeros((2, len(block.time)), dtype=np.uint32)
+        seen, exceeded = np.zeros((2, len(block.time)), dtype=FLAG_TYPE)
         for check in limit_checks(joint):
             seeming, known = check.flags(values), check.flags(values, check.allowance(values))
             seen |= seeming

@@ -17,10 +17,13 @@ from vsacli.base.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike  # numpy.typing takes as long to import as all of this package's types
 
+FLAG_TYPE = np.uint32
+"""Type of flags in arrays and files."""
+
 _AnyShape = tuple[Any, ...]
 FloatArray = np.ndarray[_AnyShape, np.dtype[np.float64]]
 BoolArray = np.ndarray[_AnyShape, np.dtype[np.bool_]]
-FlagArray = np.ndarray[_AnyShape, np.dtype[np.uint32]]
+FlagArray = np.ndarray[_AnyShape, np.dtype[FLAG_TYPE]]
 IndexArray = np.ndarray[_AnyShape, np.dtype[np.intp]]
 AnyArray = np.ndarray[_AnyShape, np.dtype[Any]]
 

@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 
 SINGULAR_MARGIN = 1e-9
@@ -94,13 +94,13 @@ LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 
 def has(flags: FlagArray, bits: Flag) -> BoolArray:
     """Return where any of the bits is set."""
-    hit: BoolArray = (flags & np.uint32(bits)) != 0
+    hit: BoolArray = (flags & FLAG_TYPE(bits)) != 0
     return hit
 
 
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
     """Return an array with the bit set where the condition holds, else 0."""
-    return where.astype(np.uint32) * np.uint32(flag)
+    return where.astype(FLAG_TYPE) * FLAG_TYPE(flag)
 
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from vsacli.base.renamed import successor
+from vsacli.base.renamed import now_called
 
 
 class LazyRegistry(Mapping[str, Any]):
@@ -68,8 +68,7 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         if name == "__all__":
             return sorted(homes())
         if name not in (homes() if listed is None else listed):
-            new = successor(name, get("__all__"))
-            hint = f"; it is now {new!r}" if new else ""
+            hint = now_called(name, get("__all__"))
             raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
         home = homes()[name]
         if home == package:  # a submodule

@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
+from vsacli.base.arrays import FLAG_TYPE, AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.json_records import Stored
@@ -258,7 +258,7 @@ def block_of(
         rows[name] = np.ascontiguousarray(of_joints)
     found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
     computed = {name: over_time(array) for name, array in found.items()}
-    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint32)}
+    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(FLAG_TYPE)}
     return kernel.block(**arrays)
 
 

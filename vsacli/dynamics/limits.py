@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
-from vsacli.base.arrays import BoolArray, FlagArray
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING
 from vsacli.robot.joint import Joint
@@ -43,7 +43,7 @@ def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
 
     A value is beyond a limit there, but none by more than the largest allowance.
     """
-    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=np.uint32)
+    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=FLAG_TYPE)
     for check in limit_checks(joint):
         if check.variable in of_joint:
             beyond |= check.flags(of_joint)

@@ -137,7 +137,7 @@ ARRANGING: frozenset[Callable[..., Any]] = frozenset(
 
 def _where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
     if any(np.asarray(argument).dtype.kind == "u" for argument in (a, b)):
-        raise NotImplementedError("bits are recorded as set or not: truth.astype(numpy.uint16) * bits")
+        raise NotImplementedError("bits are recorded as set or not: truth.astype(FLAG_TYPE) * bits")
     return each_entry(lambda *entries: _choice(tape, *entries), truth, a, b)
 
 

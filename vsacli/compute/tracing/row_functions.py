@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.compute.aligned_rows import aligned_rows
 from vsacli.compute.tracing.calls import Workspace
 from vsacli.compute.tracing.program import CHOOSING, Kind, Operand, Program, Symbol, kind_of
@@ -23,7 +23,7 @@ from vsacli.compute.tracing.python_functions import compiled, defined
 RowSpace = tuple[npt.NDArray[Any], ...]
 """Rows for intermediate values: of real numbers, of Booleans, of bits."""
 
-DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint32}
+DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: FLAG_TYPE}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
 _NONE_ON_ROWS = {"loop", "branch", "item", "take"}
 _SELECTIONS = {"where": "{1}, {2}", "bits": "{1}, 0"}

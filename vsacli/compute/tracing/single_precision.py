@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.compute.rounding import single
 from vsacli.compute.tracing.program import (
     FUNCTIONS,
@@ -33,7 +33,7 @@ Results = dict[int, Any]
 _DTYPES: dict[Kind, type[np.generic]] = {
     Kind.REAL: np.float32,
     Kind.TRUTH: np.bool_,
-    Kind.BITS: np.uint32,
+    Kind.BITS: FLAG_TYPE,
     Kind.INDEX: np.intp,
 }
 
@@ -119,7 +119,7 @@ def _entries(table: Table) -> FloatArray:
 
 
 _MEANING: dict[str, Callable[..., Any]] = {
-    "bits": lambda truth, mask: np.where(truth, mask, np.uint32(0)),
+    "bits": lambda truth, mask: np.where(truth, mask, FLAG_TYPE(0)),
     "branch": _branch,
     "call": _call,
     "item": lambda results, number: results[number],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FlagArray, FloatArray, of_joint
+from vsacli.base.arrays import FLAG_TYPE, FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import COMMANDS, ERRORS, SIMULATION_VARIABLES, TRACKED, error
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import add
@@ -188,9 +188,9 @@ def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
 
 def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
     """Return flags of exceeded limits, of actual values and commanded torques, and of an early end."""
-    flags = np.zeros(values["q"].shape, dtype=np.uint32)
+    flags = np.zeros(values["q"].shape, dtype=FLAG_TYPE)
     for index, joint in enumerate(robot.joints):
         flags[:, index] = limit_flags(joint, of_joint(values, index), flags[:, index])
     if ending is not None and ending.joint is not None and ending.flag is not None:
-        flags[-1, ending.joint] |= np.uint32(ending.flag)
+        flags[-1, ending.joint] |= FLAG_TYPE(ending.flag)
     return flags

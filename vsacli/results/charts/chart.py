@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.units import TIME
 from vsacli.results.charts.reduction import Curve
@@ -107,7 +107,7 @@ class Failures:
         if "flags" not in result.variables:
             none = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
             return cls(time, none, none, none)
-        flags = np.ascontiguousarray(result.read("flags").T, dtype=np.uint32)
+        flags = np.ascontiguousarray(result.read("flags").T, dtype=FLAG_TYPE)
         return cls(time, *(has(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR)))
 
     def among(self, joints: Sequence[int]) -> tuple[BoolArray, BoolArray]:

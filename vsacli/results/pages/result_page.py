@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import evenly
+from vsacli.base.arrays import FLAG_TYPE, evenly
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.progress import Progress, unseen
@@ -182,7 +182,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     """Return the time intervals (s) of each kind of trouble present, for each joint."""
     if "flags" not in result.variables:
         return {}
-    flags = np.asarray(result.read("flags"), dtype=np.uint32)
+    flags = np.asarray(result.read("flags"), dtype=FLAG_TYPE)
     marked = {kind: has(flags, bits) for kind, bits in TROUBLES.items()}
     return {
         kind: [marked_spans(result.time, of_joint).tolist() for of_joint in where.T]

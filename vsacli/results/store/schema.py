@@ -7,6 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.flags import Flag
 from vsacli.base.units import Quantity, WrenchQuantity
 from vsacli.base.variables import MOTORS, Variable
@@ -53,7 +54,7 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
     if variable.name == "flags":
-        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=np.uint32)
+        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=FLAG_TYPE)
         attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
     return attributes
 
@@ -61,7 +62,7 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     """Return the little-endian type of a variable in a file of some precision; times are always double."""
     if variable.name == "flags":
-        return np.dtype("<u4")
+        return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
 
 

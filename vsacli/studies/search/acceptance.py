@@ -18,7 +18,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import OfJoint, margin
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
-from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray, of_joint
+from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, of_joint
 from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.signals import STIFFNESS, Signal
@@ -208,7 +208,7 @@ class Acceptance:
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
     ) -> Trouble | None:
         """Return the worst violation of the first limit that the given variables exceed, if there is one."""
-        flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint32))
+        flags = limit_flags(joint, values, np.zeros(len(time), dtype=FLAG_TYPE))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
         for check in limit_checks(joint):
@@ -292,7 +292,7 @@ class RecordedLimits:
         if steps.size:
             rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
             uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
-            flags[steps] &= ~np.uint32(LIMITS)
+            flags[steps] &= ~FLAG_TYPE(LIMITS)
             flags[steps] = limit_flags(joint, {**rows, **uncertain}, flags[steps])
         return flags
 

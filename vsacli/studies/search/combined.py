@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import BoolArray, FloatArray, evenly
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
@@ -180,7 +180,7 @@ class CombinedSearch:
             if index in acceptance.ignored:
                 continue
             path = {"q": load.command.q, "dq": load.command.dq}
-            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=np.uint32)) != 0
+            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=FLAG_TYPE)) != 0
             if STIFFNESS.key not in joint.actuator.commanded:
                 impossible |= acceptance.refused_steps(joint, load)
             elif len(choices) == 1:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.units import TORQUE
 from vsacli.robot.model import Robot
@@ -69,7 +69,7 @@ class Effects:
         self.motor = np.ones(shape, dtype=int)
         self.smallest = Smallest(np.full(joints, np.inf), np.zeros(joints), np.zeros(shape))
         self.failed = 0
-        self._flags = np.zeros(1, dtype=np.uint32)
+        self._flags = np.zeros(1, dtype=FLAG_TYPE)
 
     def add(self, part: Derivatives) -> None:
         """Include the next block."""
