@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from vsacli.base.renamed import now_called
-
 MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
 
@@ -22,6 +20,8 @@ def nearest(word: str, valid: Iterable[str]) -> str | None:
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
     """Return a clause to append to an error: `; it is now 'x'`, `; did you mean 'x'?`, or all valid words."""
+    from vsacli.base.renamed import now_called  # loaded for error messages only
+
     options = list(valid)
     if hint := now_called(word, options):
         return hint
@@ -50,7 +50,7 @@ def _proposal(path: Path) -> str:
 
 def _similar(missing: Path) -> Path | None:
     """Return the entry of the same folder with the most similar name; None if none is close."""
-    import difflib
+    import difflib  # loaded for error messages only
 
     if not missing.parent.is_dir():
         return None

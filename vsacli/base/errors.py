@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from vsacli.base.texts import one_line
-from vsacli.base.units import Quantity
+
+if TYPE_CHECKING:
+    from vsacli.base.units import Quantity
 
 
 class VsacliError(Exception):

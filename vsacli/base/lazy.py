@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from vsacli.base.renamed import now_called
-
 
 class LazyRegistry(Mapping[str, Any]):
     """Objects by name, each imported when it is looked up; listing the names imports nothing.
@@ -47,6 +45,23 @@ class LazyRegistry(Mapping[str, Any]):
         return len(self.homes)
 
 
+class _MissingNameError(AttributeError):
+    """A name that a package does not export; the message is composed when it is shown.
+
+    Imports of submodules ask for names that are missing, and drop the error.
+    """
+
+    def __init__(self, package: str, name: str) -> None:
+        super().__init__(package, name)
+
+    def __str__(self) -> str:
+        from vsacli.base.renamed import now_called
+
+        package, name = self.args
+        exported = sys.modules[package].__all__
+        return f"module {package!r} has no attribute {name!r}{now_called(name, exported)}"
+
+
 def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return `__getattr__` and `__dir__` of a package that imports its exports at first use (PEP 562).
 
@@ -68,8 +83,7 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
         if name == "__all__":
             return sorted(homes())
         if name not in (homes() if listed is None else listed):
-            hint = now_called(name, get("__all__"))
-            raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
+            raise _MissingNameError(package, name)
         home = homes()[name]
         if home == package:  # a submodule
             return importlib.import_module(f"{package}.{name}")

@@ -8,6 +8,8 @@ from html import escape
 from itertools import zip_longest
 from typing import NamedTuple
 
+from vsacli.base.texts import verdict_words
+
 BETWEEN_CELLS = "   "
 """Separator of cells; no other text of a report contains it, so tables are recognized by it."""
 
@@ -46,11 +48,6 @@ class ReportText(NamedTuple):
         tables = ("\n".join(line.rstrip() for line in aligned(rows)) for rows in self.tables if rows)
         parts = ("\n".join([self.headline, *self.findings]), *tables, "\n".join(self.lines))
         return "\n\n".join(filter(None, parts))
-
-
-def verdict_words(verdict: str) -> str:
-    """Return a verdict as the first line of a report shows it."""
-    return verdict.upper().replace("_", " ")
 
 
 def headline(verdict: str, title: str) -> str:

@@ -58,6 +58,11 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or noun + 's'}"
 
 
+def verdict_words(verdict: str) -> str:
+    """Return a verdict as the first line of a report shows it."""
+    return verdict.upper().replace("_", " ")
+
+
 FEWEST_IN_A_ROW = 3
 """Length from which a run of consecutive names is shortened to the first and the last."""
 

@@ -12,7 +12,6 @@ from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.renamed import now_called
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
@@ -233,6 +232,8 @@ class Block:
     def __getattr__(self, name: str) -> Any:
         if name in self.declared:
             return None
+        from vsacli.base.renamed import now_called  # loaded for error messages only
+
         hint = now_called(name, self.declared)
         raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}{hint}")
 

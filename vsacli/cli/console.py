@@ -19,8 +19,7 @@ import click
 
 from vsacli.base.errors import StorageError
 from vsacli.base.progress import NoBar, unseen
-from vsacli.base.tables import verdict_words
-from vsacli.base.texts import for_terminal
+from vsacli.base.texts import for_terminal, verdict_words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs

@@ -15,7 +15,6 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
-from vsacli.base.renamed import successor
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
@@ -162,6 +161,8 @@ def run(arguments: Sequence[str]) -> int:
 def _with_successor(error: click.ClickException) -> click.ClickException:
     """Return the error of an unknown option that was renamed with its present name; any other as it is."""
     if isinstance(error, click.NoSuchOption) and error.ctx:
+        from vsacli.base.renamed import successor  # loaded for error messages only
+
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
             return click.UsageError(f"{error.option_name} is now {new}.", error.ctx)

@@ -8,8 +8,6 @@ from typing import Any
 import click
 from click.types import FloatParamType
 
-from vsacli.base.renamed import successor
-
 
 class ShareType(FloatParamType):
     """A share: `2 %`, `2%` and `0.02` are the same number."""
@@ -35,6 +33,10 @@ class Words(click.Choice[str]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """See `click.Choice.convert`."""
+        if value in self.choices:
+            return super().convert(value, param, ctx)
+        from vsacli.base.renamed import successor  # loaded for error messages only
+
         if new := successor(value, self.choices):
             self.fail(f"{value!r} is now {new!r}.", param, ctx)
         return super().convert(value, param, ctx)
