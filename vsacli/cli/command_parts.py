@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 from click.core import ParameterSource
 
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
@@ -172,12 +173,13 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
         InputError: with every problem of the robot, or else of the trajectory; or a change that cannot be
             made.
     """
+    from vsacli.documents.reading import ChangeError
     from vsacli.trajectory.file import load_trajectory
 
     if robot_path == trajectory_path == STANDARD:
         twice = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
         raise InputError.one(f"{twice}; give a file name for one of them")
-    with _naming_option():
+    with naming_option("--set", ChangeError):
         of_robot, of_trajectory = _divided(changes)
         robot = read_robot(robot_path, of_robot)
         with naming_kind("TRAJECTORY", trajectory_path, ("trajectory", "table")):
@@ -199,66 +201,6 @@ def read_robot(path: str, changes: Changes | None = None) -> Robot:
 
     with naming_kind("ROBOT", path, ("robot",)):
         return load_robot(path, changes or {})
-
-
-_KINDS = {
-    "table": "CSV table",
-    "poles": "poles file",
-    "columns": "columns file",
-    "table of a study": "study table",
-}
-"""Kinds of files in the words of an error, where they differ."""
-
-_ADVICE = {
-    **dict.fromkeys(
-        ("result", "simulation", "table of a study"),
-        "vsacli info FILE --extract FOLDER gives the files that it was computed from",
-    ),
-    "trajectory": "are ROBOT and TRAJECTORY swapped?",
-    "robot": "are ROBOT and TRAJECTORY swapped?",
-}
-"""What to do with a file of a kind that a command does not read as a robot or trajectory."""
-
-
-@contextmanager
-def naming_kind(argument: str, path: str, expected: tuple[str, ...]) -> Iterator[None]:
-    """Raise one error that says what a file is, if it cannot be read since it is of another kind.
-
-    Args:
-        argument: name of the argument in the help.
-        path: path of the file.
-        expected: kinds that the argument may be, the usual one first; as in `FileKind`.
-    """
-    try:
-        yield
-    except InputError as error:
-        kind = None if path == STANDARD else _recognized(path)
-        if kind is None or kind in ("urdf", *expected):  # readers say more of XML files
-            raise
-        message = f"is a {_KINDS.get(kind, kind)}, but {argument} must be a {expected[0]}"
-        advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""
-        raise InputError.one(message + advice, path) from error
-
-
-def _recognized(path: str) -> str | None:
-    """Return the kind of a file; None if it is of none that is known, or cannot be read."""
-    from vsacli.files.file_kinds import recognize
-
-    try:
-        return recognize(path).value
-    except (InputError, StorageError):
-        return None
-
-
-@contextmanager
-def _naming_option() -> Iterator[None]:
-    """Add the name of the option `--set` to errors of changes."""
-    from vsacli.documents.reading import ChangeError
-
-    try:
-        yield
-    except ChangeError as error:
-        raise InputError(each._replace(message=f"--set: {each.message}") for each in error.problems) from None
 
 
 def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
