@@ -27,7 +27,7 @@ def test_a_joint_without_stiffness_has_torques_alone():
     figure = drawn(change_sheet([joint("soft", limit=100.0), joint("stiff", np.nan)], "arm", along_path=True))
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["soft", "soft: motors", "stiff: motors"]
-    assert texts(figure) == ["as commanded", "optimum", "reachable", "limit"]
+    assert texts(figure) == ["as commanded", "optimum", "attainable", "limit"]
     labels = [axes.get_xlabel() for axes in figure.axes]
     assert labels == ["place on the path [s]", "", "place on the path [s]"]
 

@@ -93,25 +93,59 @@ def test_a_comparison_cuts_off_peaks_and_those_of_the_differences() -> None:
     assert apart.texts[0].get_text() == f"{peak:.0f}"
 
 
-def test_limits_in_sight_are_drawn_and_within_the_panel() -> None:
-    result = rest_to_rest(401)
-    result.bounds["tau_motor"] = np.tile([-120.0, 120.0], (3, 2, 1))
-    result.bounds["q"] = np.array([[[-np.inf, 1.6]], [[-40.0, 40.0]], [[np.nan, np.nan]]])
-    figures = plot_stored(result)
-    first, second = figures["motor-torque"].axes
-    assert limit_lines(first) == [120.0] * 3
-    assert first.get_ylim()[1] > 120
-    assert limit_lines(second) == [-120.0] * 3
-    assert limit_lines(figures["motion"].axes[0]) == [1.6]
-    assert "limit" in legend(figures["motion"])
+def test_a_peak_next_to_an_infeasible_sample_is_cut_off_as_well() -> None:
+    result = peaked(flags=0)
+    result.read("flags")[105:110, 0] = Flag.INFEASIBLE
+    figure = torques(result)
+    assert figure.axes[0].get_ylim()[1] < 200
+    assert "cut off, near-singular" in legend(figure)
 
 
-def test_limits_far_off_do_not_flatten_curves() -> None:
+def values(axes: Axes, color: str) -> np.ndarray:
+    (line,) = (line for line in axes.lines if line.get_color() == color and len(line.get_xdata()) > 2)
+    return np.asarray(line.get_ydata())
+
+
+def test_limits_of_joints_that_share_a_panel_are_drawn_as_their_utilization() -> None:
     result = rest_to_rest(401)
+    result.bounds["tau_motor"] = np.array([[[-120.0, 120.0]] * 2, [[-300.0, 300.0]] * 2, [[np.nan] * 2] * 2])
+    figure = plot_stored(result)["motor-torque"]
+    first, _, used, _ = figure.axes
+    assert limit_lines(first) == []
+    assert limit_lines(used) == [100.0]
+    assert used.get_ylim()[0] == 0
+    assert used.get_ylim()[1] > 100
+    assert used.get_ylabel() == "utilization [%]"
+    curves = [line for line in used.lines if len(line.get_xdata()) > 2]
+    assert len(curves) == 2  # the elbow has no limit
+    torque = result.read("tau_motor")
+    np.testing.assert_allclose(values(used, "black"), np.abs(torque[:, 0, 0]) / 120 * 100)
+    np.testing.assert_allclose(values(used, "#d8261c"), np.abs(torque[:, 1, 0]) / 300 * 100)
+
+
+def test_the_utilization_of_a_position_range_is_0_in_its_middle_and_100_at_its_ends() -> None:
+    result = rest_to_rest(401)
+    result.bounds["q"] = np.array([[[0.0, np.pi / 2]], [[-40.0, 40.0]], [[np.nan, np.nan]]])
+    used = plot_stored(result)["motion"].axes[1]
+    q = result.read("q")[:, 0]
+    np.testing.assert_allclose(values(used, "black"), np.abs(q - np.pi / 4) / (np.pi / 4) * 100)
+
+
+def test_a_limit_on_one_side_stays_a_line() -> None:
+    result = rest_to_rest(401)
+    result.bounds["q"] = np.array([[[-np.inf, 1.6]], [[np.nan, np.nan]], [[np.nan, np.nan]]])
+    figure = plot_stored(result)["motion"]
+    assert limit_lines(figure.axes[0]) == [1.6]
+    assert "limit" in legend(figure)
+
+
+def test_distant_limits_of_one_joint_are_written_and_do_not_flatten_its_curve() -> None:
+    result = rest_to_rest(401, "R")
     before = torques(result).axes[0].get_ylim()
-    result.bounds["tau_motor"] = np.tile([-1000.0, 1000.0], (3, 2, 1))
+    result.bounds["tau_motor"] = np.array([[[-1000.0, 1000.0]] * 2])
     figure = torques(result)
     assert figure.axes[0].get_ylim() == before
+    assert [text.get_text() for text in figure.axes[0].texts] == ["limits beyond the axis: -1000, 1000"]
     assert "limit" not in legend(figure)
 
 

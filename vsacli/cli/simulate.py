@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from collections.abc import Callable
@@ -221,7 +222,11 @@ def simulate(
         figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
         found = _run(partial(simulation, engine=engine, tell=talk.note), inputs.trajectory, talk)
         talk.detail(_computed_by(**found.provenance))
-        provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **found.provenance}
+        provenance = {
+            "command_line": shlex.join(["vsacli", *sys.argv[1:]]),
+            "options": json.dumps(choices),
+            **found.provenance,
+        }
         sensed = simulation.keywords["sensors"] is not None
         with SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance) as writer:
             writer.write(found.history)

@@ -23,11 +23,15 @@ PANEL_WIDTH = 3.0
 """Width of a panel, inches: with fonts of 10 pt, two panels side by side stay readable in a column of a
 paper."""
 
-DIFFERENCE = -1
-"""Look of the difference of two curves, distinct from the looks of both."""
+DIFFERENCE, LIMIT_LOOK = -1, -2
+"""Look of the difference of two curves, distinct from the looks of both; and of a limit of all joints."""
 
-REACHABLE, UNCERTAIN = "reachable", "two standard deviations"
+ATTAINABLE, UNCERTAIN = "attainable", "two standard deviations"
 """Meanings of bands."""
+
+APPROACH = 0.02
+"""Time before and after a failing or near-singular sample in which quantities may already be very large,
+relative to the duration."""
 
 DEVIATIONS = 2
 """Half-width of the band around a curve, in standard deviations."""
@@ -110,18 +114,21 @@ class Failures:
         flags = np.ascontiguousarray(result.read("flags").T, dtype=FLAG_TYPE)
         return cls(time, *(has(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR)))
 
-    def among(self, joints: Sequence[int]) -> tuple[BoolArray, BoolArray]:
-        """Return where any of these joints is infeasible, and where any is singular; each (samples,)."""
-        chosen = list(joints)
-        return np.any(self.infeasible[chosen], axis=0), np.any(self.singular[chosen], axis=0)
-
     def calm(self, joint: int, time: FloatArray) -> BoolArray:
-        """Return where a joint is not near-singular at the samples next to these times; (points,)."""
+        """Return where no sample of a joint fails or is near-singular within `APPROACH`; (points,).
+
+        Torques grow towards a singularity already at samples whose margin is still large enough.
+        """
+        near = self.infeasible[joint] | self.singular[joint] | self.near_singular[joint]
+        count = np.append(0, np.cumsum(near))
+        width = APPROACH * (self.time[-1] - self.time[0])
         last = self.time.size - 1
+        # The samples next to each time are included, however far apart samples are.
         before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, last)
         after = np.minimum(np.searchsorted(self.time, time), last)
-        near = self.near_singular[joint]
-        calm: BoolArray = ~(near[before] | near[after])
+        first = np.minimum(np.searchsorted(self.time, time - width), before)
+        end = np.maximum(np.searchsorted(self.time, time + width, side="right"), after + 1)
+        calm: BoolArray = count[end] == count[first]
         return calm
 
 
@@ -141,7 +148,8 @@ class Chart:
         band: meaning of the bands around curves.
         from_zero: whether the value axis begins at 0.
         zero: whether a line marks 0, as for differences.
-        failures: failures to shade, each with the joints concerned.
+        failures: failures to mark, of each file, each with the joints concerned.
+        note: sentence on curves that are missing; empty for none.
     """
 
     title: str
@@ -156,6 +164,7 @@ class Chart:
     from_zero: bool = False
     zero: bool = False
     failures: Sequence[tuple[Failures, Sequence[int]]] = ()
+    note: str = ""
 
 
 Legend: TypeAlias = Mapping[str, int]

@@ -16,7 +16,7 @@ import numpy as np
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.simulation_variables import COMMANDS, SIMULATION_VARIABLES
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
-from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet, folding
+from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet, folding
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
 from vsacli.results.store.reader import StoredResult
 
@@ -24,6 +24,9 @@ JOINTS_PER_PANEL = 7
 
 GROUP_HEIGHT, LEGEND_WIDTH = 2.3, 1.3
 """Height of the panels of a group, and width of the names next to them, inches."""
+
+UTILIZATION = 0.55
+"""Height of the panels of the utilization of limits, relative to those of the values above."""
 
 NARROW_WIDTH, LOW_HEIGHT = 2.5, 1.4
 """Size of a stiffness panel next to the positions if there are several columns of them, inches."""
@@ -63,9 +66,22 @@ def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
 
 
 def result_title(result: StoredResult) -> str:
-    """Return robot and trajectory, once if their names are equal, and the end of an incomplete run."""
+    """Return robot and trajectory, the conditions of a simulation, and the end of an incomplete run.
+
+    Names of robot and trajectory that are equal are written once.
+    """
+    names = ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name)))
     ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
-    return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
+    return f"{names}{_conditions(result)}{ending}"
+
+
+def _conditions(result: StoredResult) -> str:
+    """Return what distinguishes a simulation from the plan: controller, and error of its model."""
+    if result.kind != "simulation":
+        return ""
+    controller = str(result.report_json["controller"]).replace("-", " ")
+    error = result.provenance()["options"].get("perturb", 0.0)
+    return f": simulation, {controller}" + (f", model error {100 * error:.3g} %" if error else "")
 
 
 def axis_label(words: str, unit: str, joint_type: str, column: int) -> str:
@@ -84,9 +100,14 @@ def grouped(charts: StoredCharts, *parts: Part, words: str = "") -> Sheet:
     blocks = [_groups(charts, part, named=part == parts[-1]) for part in parts]
     columns = [len(block.rows[0]) for block in blocks]
     width = PANEL_WIDTH * sum(columns) if len(blocks) > 1 else 2 * PANEL_WIDTH + legend_width(charts)
-    height = GROUP_HEIGHT * max(len(block.rows) for block in blocks) + 1
+    height = max(_height(block) for block in blocks) + 1
     title = ": ".join(filter(None, (result_title(charts.first), words)))
-    return Sheet(title, (width, height), _legend(charts), blocks, columns)
+    return Sheet(title, (width, height), _legend(charts, blocks), blocks, columns)
+
+
+def _height(block: Block) -> float:
+    """Return the height of the panels of a block of `_groups`, inches."""
+    return GROUP_HEIGHT * len(block.rows) * sum(block.heights) / len(block.heights)
 
 
 def _of_parts(*parts: Part) -> Drawing:
@@ -94,7 +115,10 @@ def _of_parts(*parts: Part) -> Drawing:
 
 
 def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
-    """Return a row of panels for each group of joints with the variable."""
+    """Return a row of panels for each group of joints with the variable.
+
+    Limits of several joints in one panel could not be told apart: their utilization has a row of its own.
+    """
     name, words = part
     there = charts.existing(charts.first.declared[name])
     groups = [group for group in panel_groups(charts.first.joint_types) if there[group].any()]
@@ -109,9 +133,36 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
         axis = axis_label(words, chart.unit, charts.first.joint_types[group[0]], column)
         return replace(chart, axis=axis, failures=[(each, group) for each in charts.failures])
 
-    rows = [[panel(group, column) for column in columns] for group in groups]
-    beside = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
-    return Block(charts.first.time, rows, beside=beside if named and legend_width(charts) else ())
+    rows: list[Row] = [[panel(group, column) for column in columns] for group in groups]
+    used: list[Row] = [
+        [
+            charts.utilization(chart, column) if chart and len(group) > 1 else None
+            for chart, column in zip(row, columns, strict=True)
+        ]
+        for row, group in zip(rows, groups, strict=True)
+    ]
+    beside: list[Legend] = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
+    heights: tuple[float, ...] = (1.0,)
+    if any(chart for row in used for chart in row):
+        heights = (1.0, UTILIZATION)
+        rows = [row for pair in zip(map(_without_limits, rows, used), used, strict=True) for row in pair]
+        beside = [legend for each in beside for legend in (each, {})]
+    return Block(
+        charts.first.time, rows, heights=heights, beside=beside if named and legend_width(charts) else ()
+    )
+
+
+def _without_limits(row: Row, used: Row) -> Row:
+    """Return charts without the limits whose utilization is drawn below."""
+    return [
+        replace(
+            chart,
+            limits=[each for each in chart.limits if each.joint not in {line.joint for line in below.lines}],
+        )
+        if chart and below
+        else chart
+        for chart, below in zip(row, used, strict=True)
+    ]
 
 
 def legend_width(charts: StoredCharts) -> float:
@@ -119,9 +170,19 @@ def legend_width(charts: StoredCharts) -> float:
     return LEGEND_WIDTH if len(charts.first.joint_names) > JOINTS_PER_PANEL else 0.0
 
 
-def _legend(charts: StoredCharts) -> dict[str, int]:
-    """Return the legend of the joints; empty if their names are next to the panels."""
-    return {} if legend_width(charts) else {name: at for at, name in enumerate(charts.first.joint_names)}
+def _legend(charts: StoredCharts, blocks: Sequence[Block]) -> dict[str, int]:
+    """Return the legend of the joints with a curve; empty if their names are next to the panels."""
+    drawn = {
+        line.joint
+        for block in blocks
+        for row in block.rows
+        for chart in row
+        if chart
+        for line in chart.lines
+        if np.isfinite(line.curve.values).any()
+    }
+    names = enumerate(charts.first.joint_names)
+    return {} if legend_width(charts) else {name: joint for joint, name in names if joint in drawn}
 
 
 def _corridors(charts: StoredCharts, most_rows: int) -> Block:
@@ -157,12 +218,13 @@ def _motion(charts: StoredCharts) -> Sheet:
     if not charts.compliant:
         return grouped(charts, part)
     positions = _groups(charts, part)
-    left = GROUP_HEIGHT * len(positions.rows)
+    left = _height(positions)
     stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(left / LOW_HEIGHT)))
     rows, folds = stiffness.folding
     widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
     size = (sum(widths) + legend_width(charts), max(left, LOW_HEIGHT * rows) + 1)
-    return Sheet(result_title(charts.first), size, _legend(charts), [positions, stiffness], widths)
+    blocks = [positions, stiffness]
+    return Sheet(result_title(charts.first), size, _legend(charts, blocks), blocks, widths)
 
 
 _PARTS: dict[str, tuple[Part, ...]] = {

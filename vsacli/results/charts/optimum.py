@@ -11,9 +11,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.units import STIFFNESS, TIME, TORQUE
 from vsacli.base.variables import MOTORS
 from vsacli.results.charts.chart import (
+    ATTAINABLE,
     DEVIATIONS,
     PANEL_WIDTH,
-    REACHABLE,
     Band,
     Block,
     Chart,
@@ -91,7 +91,7 @@ class JointChange(NamedTuple):
             lines=[self.before.stiffness_line(BEFORE), self.after.stiffness_line(AFTER)],
             axis=rf"$\sigma$ [{unit}]",
             shown=visible_range(both, self.after.lower, self.after.upper),
-            band=REACHABLE,
+            band=ATTAINABLE,
         )
 
     @property

@@ -19,12 +19,26 @@ from vsacli.base.simulation_variables import COMMANDS, SIMULATED, measured
 from vsacli.base.units import WrenchQuantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, deviation
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.results.charts.chart import REACHABLE, Band, Chart, Failures, Limit, Line
-from vsacli.results.charts.reduction import BLOCK, GROWING, Sampled, calm_range, read_curves, visible_range
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart, Failures, Limit, Line
+from vsacli.results.charts.reduction import (
+    BLOCK,
+    GROWING,
+    Curve,
+    Sampled,
+    calm_range,
+    read_curves,
+    visible_range,
+)
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.joint import existing
 
 BOUNDS = ("stiffness_min", "stiffness_max")
+
+FULL = 100.0
+"""Utilization of a limit that is reached, %."""
+
+SPARE = 1.06
+"""Upper end of an axis of utilizations, relative to the largest value shown."""
 
 By: TypeAlias = Literal["joint", "file", "role"]
 """Property that the looks of the lines of a chart distinguish."""
@@ -168,8 +182,51 @@ class StoredCharts:
         lines = signals.lines(column, joints, by)
         shown = self.calm(lines) if name in GROWING else None
         unit = self.first.declared[name].quantity.unit(self.first.joint_types[joints[0]])
-        limits = self._limits(name, column, joints)
-        return Chart("", unit, lines, name=name, limits=limits, shown=shown, cut_off=shown is not None)
+        return Chart(
+            "",
+            unit,
+            lines,
+            name=name,
+            limits=self._limits(name, column, joints),
+            shown=shown,
+            cut_off=shown is not None,
+            note=self._undefined(lines),
+        )
+
+    def utilization(self, chart: Chart, column: int) -> Chart | None:
+        """Return the utilization of the limits of a chart; None if no joint has a lower and an upper limit.
+
+        0 % is the middle between both limits, 100 % either of them, so that all joints share one limit line.
+        """
+        bounds = self.first.limits(chart.name)
+        bounds = bounds[:, column % bounds.shape[1]]
+        lines = []
+        for line in chart.lines:
+            low, high = bounds[line.joint].tolist()
+            if np.isfinite(high - low) and high > low:
+                share = np.abs(2 * line.curve.values - high - low) / (high - low)
+                lines.append(line._replace(curve=Curve(line.curve.time, FULL * share), band=None))
+        if not lines:
+            return None
+        shown = self.calm(lines) if chart.name in GROWING else None
+        peaks = [np.nanmax(line.curve.values, initial=0) for line in lines] if shown is None else [shown[1]]
+        return Chart(
+            "",
+            "%",
+            lines,
+            axis="utilization [%]",
+            name=chart.name,
+            limits=[Limit(LIMIT_LOOK, 0, FULL)],
+            shown=(0.0, SPARE * max(FULL, *peaks)),
+            cut_off=shown is not None,
+        )
+
+    def _undefined(self, lines: Sequence[Line]) -> str:
+        """Return a sentence that names the joints without a value at any time; empty if there are none."""
+        missing = [line for line in lines if not np.isfinite(line.curve.values).any()]
+        failed = any(self.failures[line.file].infeasible[line.joint].any() for line in missing)
+        names = ", ".join(dict.fromkeys(line.label for line in missing))
+        return f"undefined{' because of infeasible samples' if failed else ''}: {names}" if missing else ""
 
     def calm(self, lines: Sequence[Line], *others: int) -> tuple[float, float] | None:
         """Return the range of an axis without near-singular peaks; None if they do not matter.
@@ -207,7 +264,7 @@ class StoredCharts:
                 name="stiffness",
                 limits=self._limits("stiffness", 0, [joint]),
                 shown=visible_range(command, *edges),
-                band=REACHABLE,
+                band=ATTAINABLE,
             )
 
     def _limits(self, name: str, column: int, joints: Sequence[int]) -> list[Limit]:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vsacli.base.json_records import json_value
-from vsacli.results.charts.chart import REACHABLE, Band, Chart
+from vsacli.results.charts.chart import ATTAINABLE, Band, Chart
 
 BEYOND = 5.0
 """Height up to which the attainable range extends beyond the initial view, in heights of that view."""
 
-CUT_OFF = "peaks of near-singular steps are cut off; Ctrl and the wheel show them"
+CUT_OFF = "peaks of near-singular samples are cut off; Ctrl and the wheel show them"
 
 
 class Packed:
@@ -70,13 +70,13 @@ class Packed:
             "limits": [{"joint": limit.joint, "value": limit.value} for limit in chart.limits],
             "shown": chart.shown,
             "band": chart.band if any(line.band for line in chart.lines) else "",
-            "note": CUT_OFF if chart.cut_off else "",
+            "note": "; ".join(filter(None, [CUT_OFF if chart.cut_off else "", chart.note])),
         }
 
     def _band(self, band: Band, chart: Chart) -> tuple[int, int]:
         """Return the numbers of lower and upper edge; an attainable range is cut off far outside the view."""
         low, high = band.low, band.high
-        if chart.band == REACHABLE and chart.shown is not None:
+        if chart.band == ATTAINABLE and chart.shown is not None:
             spare = BEYOND * (chart.shown[1] - chart.shown[0])
             low, high = np.maximum(low, chart.shown[0] - spare), np.minimum(high, chart.shown[1] + spare)
         return self.add(low), self.add(high)

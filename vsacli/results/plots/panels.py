@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.results.charts.chart import REACHABLE, UNCERTAIN, Chart, Limit, Line
+from vsacli.results.charts.chart import ATTAINABLE, UNCERTAIN, Chart, Failures, Limit, Line
 from vsacli.results.charts.reduction import Curve, marked_spans
 from vsacli.results.plots.styles import LineStyle, line_style, shortened
 
@@ -41,6 +42,17 @@ _EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
 _INFEASIBLE = {"facecolor": "0.8", "edgecolor": "0.8", "linewidth": 1.5, "zorder": 0.5}
 _SINGULAR = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
+MARK_DEPTH = 0.03
+"""Distance of the mark of a peak from the edge of the panel, relative to the panel."""
+
+STRIP = 0.03
+"""Height of the strip that marks failures of one of several joints, relative to the panel."""
+
+NOTE_LENGTH = 24
+"""Longest line of a note inside a panel, characters."""
+
+_SMALL: dict[str, Any] = {"fontsize": "small", "color": "0.35"}
+_NOTE: dict[str, Any] = {**_SMALL, "ha": "center", "va": "center"}
 _MARK: dict[str, Any] = {"markersize": 6, "linestyle": ""}
 _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5}
 
@@ -49,25 +61,36 @@ def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
     """Draw a chart into an empty panel; return the legend entries besides those of its lines."""
     if chart.zero:
         axes.axhline(0.0, **ZERO)
-    corridors = _draw_corridors(axes, chart) if chart.band == REACHABLE else None
+    corridors = _draw_corridors(axes, chart) if chart.band == ATTAINABLE else None
     handles: list[Artist] = []
     for line in chart.lines:
         handles += draw_curve(axes, line.curve, line_style(line.look), line.look)
     handles += _draw_spreads(axes, chart.lines) if corridors is None else corridors
     if chart.shown is not None:
         axes.set_ylim(chart.shown)
-    if chart.cut_off:
-        handles += _mark_peaks(axes, chart.lines)
     if chart.from_zero:
         axes.set_ylim(bottom=0.0)
     handles += _draw_limits(axes, chart.limits)
-    for failures, joints in chart.failures:
-        handles += _shade(axes, failures.time, *failures.among(joints))
+    floor = axes.get_ylim()[0]
+    handles += _mark_failures(axes, chart)
+    if chart.cut_off:
+        handles += _mark_peaks(axes, chart.lines, floor)
+    if chart.note:
+        _write_note(
+            axes, chart.note, empty=not any(np.isfinite(line.curve.values).any() for line in chart.lines)
+        )
     if chart.title:
         add_title(axes, chart.title)
     if chart.axis:
         axes.set_ylabel(chart.axis)
     return handles
+
+
+def _write_note(axes: Axes, note: str, *, empty: bool) -> None:
+    """Write a note into the middle of a panel, and remove the ticks of values if it is empty."""
+    axes.text(0.5, 0.5, textwrap.fill(note, NOTE_LENGTH), **_NOTE, transform=axes.transAxes)
+    if empty:
+        axes.set_yticks([])
 
 
 def add_title(axes: Axes, title: str) -> None:
@@ -133,44 +156,93 @@ def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
         axes.fill_between(time, *area, ~np.isnan(low), **_AREA)
         for edge in (low, high):
             axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **_EDGE)
-    return [Patch(**_AREA, label=REACHABLE)] if bands else []
+    return [Patch(**_AREA, label=ATTAINABLE)] if bands else []
 
 
 def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
-    """Draw bounds of curves already drawn; extend the axis for bounds nearly in sight, omit others."""
+    """Draw bounds of curves already drawn; extend the axis for bounds nearly in sight, write distant ones."""
     low, high = axes.get_ylim()
     reach = LIMIT_SIGHT * (high - low)
-    seen = {(limit.look, limit.value) for limit in limits if low - reach <= limit.value <= high + reach}
-    for look, value in sorted(seen):
+    bounds = sorted({(limit.look, limit.value) for limit in limits})
+    seen = [(look, value) for look, value in bounds if low - reach <= value <= high + reach]
+    for look, value in seen:
         axes.axhline(value, color=line_style(look).color, **_LIMIT)
         low, high = min(low, value - LIMIT_ROOM * reach), max(high, value + LIMIT_ROOM * reach)
     if seen:
         axes.set_ylim(low, high)
+    distant = [value for bound in bounds if bound not in seen for value in bound[1:]]
+    if distant:
+        words = "limits" if len(distant) > 1 else "limit"
+        text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
+        axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, **_SMALL)
     return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
 
 
-def _shade(axes: Axes, time: FloatArray, infeasible: BoolArray, singular: BoolArray) -> list[Artist]:
-    """Draw full-height bands at samples that are infeasible (gray) or singular (hatched).
+class _Failing(NamedTuple):
+    """Failures of one joint in one file, with the color of its curve."""
+
+    time: FloatArray
+    infeasible: BoolArray
+    singular: BoolArray
+    color: str
+
+    @classmethod
+    def of(cls, failures: Failures, joint: int, color: str) -> _Failing:
+        return cls(failures.time, failures.infeasible[joint], failures.singular[joint], color)
+
+
+def _mark_failures(axes: Axes, chart: Chart) -> list[Artist]:
+    """Mark infeasible and singular samples: behind the curve of one joint, below curves of several joints.
+
+    A band over the full height would make all joints of the panel look infeasible.
+    """
+    colors = {(line.file, line.joint): line_style(line.look).color for line in chart.lines}
+    several = [
+        _Failing.of(failures, joint, colors[file, joint])
+        for file, (failures, joints) in enumerate(chart.failures)
+        for joint in joints
+        if (file, joint) in colors
+    ]
+    failing = [each for each in several if each.infeasible.any() or each.singular.any()]
+    if len(several) == 1:
+        return [handle for each in failing for handle in _shade(axes, each, (0.0, 1.0), _INFEASIBLE)]
+    low, high = axes.get_ylim()
+    if failing:
+        axes.set_ylim(
+            low - (high - low) * STRIP * (len(failing) + 1) / (1 - STRIP * (len(failing) + 1)), high
+        )
+    handles: list[Artist] = []
+    for at, each in enumerate(reversed(failing)):
+        look = {**_INFEASIBLE, "facecolor": each.color, "edgecolor": each.color, "linewidth": 0.8}
+        handles += _shade(axes, each, (STRIP * (at + 0.1), STRIP * 0.8), look, ", by color of joint")
+    return handles
+
+
+def _shade(
+    axes: Axes, failing: _Failing, place: tuple[float, float], infeasible: dict[str, Any], whose: str = ""
+) -> list[Artist]:
+    """Draw bands at samples that are infeasible (filled) or singular (hatched).
 
     Args:
         axes: panel to draw into.
-        time: times, (samples,), s.
-        infeasible: marks, (samples,).
-        singular: marks, (samples,).
+        failing: failures to mark.
+        place: lower edge and height of the bands, relative to the height of the panel.
+        infeasible: appearance of infeasible samples.
+        whose: clause on the color, for the legend.
 
     Returns:
         Legend entries of the bands.
     """
     handles: list[Artist] = []
-    kinds: tuple[tuple[BoolArray, dict[str, Any], str], ...] = (
-        (infeasible, _INFEASIBLE, "infeasible"),
-        (singular, _SINGULAR, "singular"),
+    kinds: tuple[tuple[BoolArray, dict[str, Any], dict[str, Any], str], ...] = (
+        (failing.infeasible, infeasible, _INFEASIBLE, "infeasible"),
+        (failing.singular, _SINGULAR, _SINGULAR, "singular"),
     )
-    for marked, look, label in kinds:
+    for marked, look, of_legend, label in kinds:
         if marked.any():
-            extents = [(start, end - start) for start, end in marked_spans(time, marked).tolist()]
-            axes.broken_barh(extents, (0, 1), transform=axes.get_xaxis_transform(), label=label, **look)
-            handles.append(Patch(**look, label=label))
+            extents = [(start, end - start) for start, end in marked_spans(failing.time, marked).tolist()]
+            axes.broken_barh(extents, place, transform=axes.get_xaxis_transform(), label=label, **look)
+            handles.append(Patch(**of_legend, label=label + whose))
     return handles
 
 
@@ -182,14 +254,16 @@ class _Peak(NamedTuple):
     color: str
 
 
-def _mark_peaks(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
-    """Mark the peaks of near-singular samples that are cut off at the edge of a panel."""
+def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]:
+    """Mark the peaks of near-singular samples that are cut off; `floor` is the lower end of the curves."""
     time = lines[0].curve.time
     middle = (time[0] + time[-1]) / 2
-    for sign, end in zip((-1, 1), axes.get_ylim(), strict=True):
+    low, high = axes.get_ylim()
+    edges = ((floor - low) / (high - low) + MARK_DEPTH, 1 - MARK_DEPTH)
+    for sign, end, edge in zip((-1, 1), (floor, high), edges, strict=True):
         peaks = [peak for line in lines for peak in _peaks(line, sign, end)]
         if peaks:
-            _mark(axes, peaks, sign, middle)
+            _mark(axes, peaks, sign, middle, edge)
     return [Line2D([], [], marker="^", color="0.4", **_MARK, label="cut off, near-singular")]
 
 
@@ -203,9 +277,9 @@ def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
     return [_Peak(float(time[at]), float(values[at]), color) for at in points]
 
 
-def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float) -> None:
-    """Draw a triangle for each peak at the edge of the panel, and write the value of the largest."""
-    place, edge = axes.get_xaxis_transform(), 0.97 if sign > 0 else 0.03
+def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: float) -> None:
+    """Draw a triangle for each peak at an edge of the panel, and write the value of the largest."""
+    place = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"
     for peak in peaks:
         axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **_MARK)
@@ -219,7 +293,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float) -> None:
         textcoords="offset points",
         ha="right" if at_right else "left",
         va="top" if sign > 0 else "bottom",
-        fontsize=8,
+        fontsize="small",
         color=farthest.color,
         bbox=_BACKGROUND,
     )

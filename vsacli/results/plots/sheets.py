@@ -18,6 +18,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.units import TIME
 from vsacli.results.charts import chart as charts
 from vsacli.results.charts.chart import Block, Sheet
+from vsacli.results.charts.look import current_look
+from vsacli.results.plots.arrangement import arranged
 from vsacli.results.plots.panels import draw_chart
 from vsacli.results.plots.styles import house_style, line_handle, line_style, make_legible, shortened
 
@@ -39,12 +41,16 @@ AxesGrid = npt.NDArray[Any]
 
 def drawn(sheet: Sheet) -> Figure:
     """Draw a sheet as a figure."""
-    with house_style():
-        figure = Figure(sheet.size, layout="constrained")
-        places = figure.add_gridspec(1, len(sheet.blocks), width_ratios=list(sheet.widths))
+    with house_style(sheet.size):
+        arrangement = arranged(sheet)
+        figure = Figure(arrangement.size, layout="constrained")
+        if arrangement.stacked:
+            places = figure.add_gridspec(len(arrangement.blocks), 1, height_ratios=arrangement.shares)
+        else:
+            places = figure.add_gridspec(1, len(arrangement.blocks), width_ratios=arrangement.shares)
         handles = line_handles(sheet.legend)
-        for column, block in enumerate(sheet.blocks):
-            handles += _draw_block(places[column], block)
+        for place, block in enumerate(arrangement.blocks):
+            handles += _draw_block(places[place], block)
         return complete(figure, sheet.title, handles)
 
 
@@ -61,8 +67,9 @@ def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
         for axes, chart in zip(of_row, row, strict=True):
             handles += [] if chart is None else draw_chart(axes, chart)
     for of_row, row, lines in zip(panels, block.rows, block.beside, strict=False):
-        last = max(column for column, chart in enumerate(row) if chart is not None)
-        _name_beside(of_row[last], line_handles(lines))
+        if lines:
+            last = max(column for column, chart in enumerate(row) if chart is not None)
+            _name_beside(of_row[last], line_handles(lines))
     return handles
 
 
@@ -84,6 +91,8 @@ def _panels(place: SubplotSpec, block: Block) -> AxesGrid:
         for column, there in zip(panels[fold].T, present[fold].T, strict=True):
             if there.any():
                 share_time(column[there], block.time, block.xlabel)
+                if len(column) < rows * each:  # labels use the empty place below, else they tear rows apart
+                    column[there][-1].xaxis.set_in_layout(False)
     return panels
 
 
@@ -111,11 +120,13 @@ def _name_beside(axes: Axes, handles: Sequence[Artist]) -> None:
 
 def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
     """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
-    figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=11, parse_math=False)
+    look = current_look()
+    if look.title:
+        figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=1.1 * look.font_size, parse_math=False)
     by_label = {str(handle.get_label()): handle for handle in handles}
     if by_label:
         labels = [shortened(label) for label in by_label]
-        width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
+        width = look.scale * (_INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels)))
         rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
         columns = math.ceil(len(labels) / rows)
         legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)

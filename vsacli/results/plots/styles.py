@@ -20,7 +20,8 @@ from matplotlib.font_manager import FontEntry, findfont, fontManager, get_font
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from vsacli.results.charts.chart import DIFFERENCE
+from vsacli.results.charts.chart import DIFFERENCE, LIMIT_LOOK
+from vsacli.results.charts.look import current_look, drawing_with
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -51,6 +52,15 @@ SETTINGS: dict[RcKeyType, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "vsacli",
 }
+
+SCALED: tuple[RcKeyType, ...] = (
+    "font.size",
+    *("axes.titlesize", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize"),
+    *("lines.linewidth", "lines.markersize", "lines.markeredgewidth", "axes.linewidth", "grid.linewidth"),
+    *("xtick.major.size", "ytick.major.size", "xtick.major.width", "ytick.major.width", "patch.linewidth"),
+    *("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"),
+)
+"""Settings that follow the font size of the look."""
 
 LONGEST_LABEL = 36
 """Maximum length of a name in a legend, characters."""
@@ -89,6 +99,8 @@ def line_style(index: int) -> LineStyle:
     """Return the style of a look: 0 solid black, 1 dashed red, 2 blue with +, and so on."""
     if index == DIFFERENCE:
         return LineStyle(_COLORS[2], "-", "")
+    if index == LIMIT_LOOK:
+        return LineStyle("0.3", "-", "")
     return LineStyle(_COLORS[index % len(_COLORS)], *_STROKES[index % len(_STROKES)])
 
 
@@ -99,12 +111,23 @@ def shortened(name: str, length: int = LONGEST_LABEL) -> str:
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
-    """Draw with these settings alone, regardless of a matplotlibrc on this machine."""
-    with matplotlib.rc_context():
+def house_style(natural: tuple[float, float] | None = None) -> Iterator[None]:
+    """Draw with these settings and the current look alone, regardless of a matplotlibrc on this machine.
+
+    Args:
+        natural: size of the figure at the usual font size, inches, to which the font is fitted.
+    """
+    look = current_look() if natural is None else current_look().fitted(natural)
+    with matplotlib.rc_context(), drawing_with(look):
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
+        matplotlib.rcParams.update({name: look.scale * matplotlib.rcParams[name] for name in SCALED})
         yield
+
+
+def blank_figure(natural: tuple[float, float]) -> Figure:
+    """Return an empty figure with the current look; `natural` is its size at the usual font size, inches."""
+    return Figure(current_look().size(natural), layout="constrained")
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
