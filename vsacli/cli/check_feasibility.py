@@ -23,7 +23,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
-from vsacli.cli.option_types import SHARE
+from vsacli.cli.option_types import SHARE, Whole
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     "--write-fix",
     "number",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole("the number of a fix as --fixes lists it, e.g. 1", least=1),
     help="Write fix N of the list to the file of -o; implies --fixes.",
 )
 @click.option(

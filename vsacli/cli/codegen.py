@@ -7,6 +7,7 @@ import click
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
+from vsacli.cli.option_types import Words
 
 
 @click.command(
@@ -18,7 +19,7 @@ from vsacli.cli.file_names import FOLDER
 @click.option("-o", "--output", type=FOLDER, required=True, help="Folder for the generated code.")
 @click.option(
     "--precision",
-    type=click.Choice(["double", "float"]),
+    type=Words(["double", "float"], {"single": "float"}),
     default="double",
     show_default=True,
     help="Floating-point type of the code; float is refused if rounding would make results too inaccurate.",
@@ -26,7 +27,7 @@ from vsacli.cli.file_names import FOLDER
 @click.option(
     "--wrench",
     metavar="FRAME",
-    type=click.Choice(["end_effector", "base"]),
+    type=Words(["end_effector", "base"]),
     help="Add a wrench at the end effector as an input, in the axes of this frame.",
 )
 @click.option(

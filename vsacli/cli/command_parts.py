@@ -16,7 +16,7 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
-from vsacli.cli.option_types import Words
+from vsacli.cli.option_types import SEED, Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -54,18 +54,6 @@ def variables_option(default: str) -> Callable[[Any], Any]:
     )
 
 
-def numbers(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, ...] | None:
-    """Convert numbers separated by commas, as a click callback."""
-    if written is None:
-        return None
-    try:
-        return tuple(float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
-
-
 def example(command: str) -> str:
     """Return the epilog of a help text: a command line that works."""
     return f"\b\nExample:\n  {command}"
@@ -92,7 +80,7 @@ columns_option = click.option(
 format_option = click.option(
     "--format",
     "file_format",
-    type=click.Choice(["png", "pdf", "svg", "html"]),
+    type=Words(["png", "pdf", "svg", "html"]),
     default="png",
     show_default=True,
     help="Format of the figures; html writes everything to one page.",
@@ -115,7 +103,7 @@ def seed_option(use: str) -> Callable[[Any], Any]:
     return click.option(
         "--seed",
         metavar="N",
-        type=click.IntRange(min=0),
+        type=SEED,
         default=0,
         show_default=True,
         help=f"Seed of the random {use}.",
@@ -135,7 +123,7 @@ def check_plotted(folder: str | None) -> None:
 
 engine_option = click.option(
     "--engine",
-    type=click.Choice(["numpy", "c", "auto"]),
+    type=Words(["numpy", "c", "auto"]),
     default="auto",
     show_default=True,
     help="Backend of the computation: NumPy, or compiled C; auto chooses the faster one.",
@@ -146,7 +134,7 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options `--engine` and `--threads`."""
     threads = click.option(
         "--threads",
-        type=click.IntRange(min=1),
+        type=Whole("a number of threads, e.g. 4", least=1),
         metavar="N",
         help="Number of threads of the compiled code.",
         show_default="number of CPU cores",

@@ -18,6 +18,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.option_types import TIME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +43,7 @@ overflows."""
 @click.option(
     "--time-offset",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="Time in the recording at which the result begins; positive if the recording starts earlier.",
     show_default="estimated from the signals",
 )

@@ -20,6 +20,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
 from vsacli.cli.file_names import FILE, KNOWN, ending_of
+from vsacli.cli.option_types import RATE, Words
 from vsacli.results.exports import FORMATS as OF_RESULTS
 from vsacli.robot.models import FORMATS as OF_ROBOTS
 
@@ -54,7 +55,7 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 @click.option(
     "--format",
     "form",
-    type=click.Choice((*OF_RESULTS, *OF_ROBOTS)),
+    type=Words((*OF_RESULTS, *OF_ROBOTS)),
     help="Format. Results: CSV, MATLAB file, Parquet, or JointTrajectory of ROS 2. Robots: URDF, or "
     "MJCF, the XML format of MuJoCo.",
     show_default="extension of the output file, else csv",
@@ -65,14 +66,14 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 @click.option(
     "--rate",
     metavar="HZ",
-    type=float,
+    type=RATE,
     help="Sampling rate of the exported values; a motion known only at its samples requires an "
     "integer fraction of the stored rate.",
     show_default="all stored samples",
 )
 @click.option(
     "--side",
-    type=click.Choice(["joint", "motor"]),
+    type=Words(["joint", "motor"]),
     default="joint",
     show_default=True,
     help="Side of the gear at which motor motion and torque are given.",

@@ -12,7 +12,6 @@ from vsacli.cli.command_parts import (
     example,
     format_option,
     json_option,
-    numbers,
     overwrite_option,
     read_robot,
     robot_argument,
@@ -21,6 +20,7 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
+from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
 
 
 @click.command(
@@ -41,7 +41,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--bandwidth",
     metavar="HZ",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number("a frequency in Hz, e.g. 10", positive=True),
     help="Bandwidth of the filter that is applied to all signals.",
     show_default="1.5 times the bandwidth of the motion",
 )
@@ -55,14 +55,14 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--duration",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="Duration of the planned trajectory.",
     show_default=f"{USUAL_DURATION:g}",
 )
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
-    callback=numbers,
+    type=SENSOR_NOISE,
     help="With --plan: standard deviation of measured positions in rad and of measured motor torques "
     "in N m, from which standard errors are predicted.",
     show_default="2e-5 and 0.5% of the peak torque of each motor",
@@ -70,7 +70,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--seed",
     metavar="N",
-    type=click.IntRange(min=0),
+    type=SEED,
     help="With --plan: seed of the random search.",
     show_default="0",
 )

@@ -10,18 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
-
-
-def _spring(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, float] | None:
-    if written is None:
-        return None
-    try:
-        k, k_c = (float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected two numbers, k and k_c, e.g. 400,2000") from None
-    return k, k_c
+from vsacli.cli.option_types import Number, Numbers, Words
 
 
 def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
@@ -61,7 +50,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 )
 @click.option(
     "--actuator",
-    type=click.Choice(tuple(ACTUATORS)),
+    type=Words(ACTUATORS),
     default="antagonistic",
     show_default=True,
     help="Placeholder: kind of actuator of every joint.",
@@ -69,14 +58,14 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--motor-inertia",
     metavar="KG_M2",
-    type=float,
+    type=Number("an inertia in kg m^2 (kg), e.g. 0.1", positive=True),
     help="Placeholder: inertia of each motor in kg m^2 (kg), joint side of the gear.",
     show_default="half the inertia that the joint carries",
 )
 @click.option(
     "--stiffness",
     metavar="NM/RAD",
-    type=float,
+    type=Number("a stiffness in N m/rad (N/m), e.g. 300", positive=True),
     help="Placeholder: stiffness of elastic joints in N m/rad (N/m), and middle of the attainable "
     "range of serial ones.",
     show_default="from the load that the joint carries",
@@ -84,7 +73,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--spring",
     metavar="K,KC",
-    callback=_spring,
+    type=Numbers("two coefficients k and k_c, e.g. 400,2000", [2]),
     help="Placeholder: coefficients of the cubic springs of antagonistic joints, in N m/rad and N m/rad^3.",
     show_default="from the load that the joint carries",
 )
@@ -100,7 +89,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--snap",
     metavar="RAD",
-    type=click.FloatRange(0, 0.1),
+    type=Number("an angle in rad, e.g. 1e-4", least=0.0, most=0.1),
     default=1e-4,
     show_default=True,
     help="Largest angle between axes that are made parallel if their common normal is far away.",

@@ -28,6 +28,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, HDF5_FILE
+from vsacli.cli.option_types import RATE, Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 @click.option(
     "--rate",
     metavar="HZ",
-    type=float,
+    type=RATE,
     help="Sampling rate of the trajectory, or of its recording if that has no time column; same as "
     "--set rate=HZ.",
 )
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
 @click.option(
     "--store-precision",
     "precision",
-    type=click.Choice(["double", "single"]),
+    type=Words(["double", "single"], {"float": "single"}),
     default="double",
     show_default=True,
     help="Storage precision; single (7 digits) halves the file. Computation is always in double precision.",

@@ -165,7 +165,7 @@ def _with_successor(error: click.ClickException) -> click.ClickException:
 
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
-            return click.UsageError(f"{error.option_name} is now {new}.", error.ctx)
+            return click.UsageError(f"{error.option_name} is now {new}", error.ctx)
     return error
 
 

@@ -13,6 +13,7 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.option_types import Words
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
@@ -41,7 +42,7 @@ def new() -> None:
 )
 @click.option(
     "--actuator",
-    type=click.Choice((*ACTUATORS, *MECHANISMS)),
+    type=Words((*ACTUATORS, *MECHANISMS)),
     default="antagonistic",
     show_default=True,
     help="Kind of actuator of every joint, or mechanism of serial actuators.",

@@ -57,7 +57,7 @@ CHANGE, PACE = "optimum", "pace"
 )
 @click.option(
     "--vary",
-    type=click.Choice(["stiffness", "timing", "both"]),
+    type=Words(["stiffness", "timing", "both"]),
     help="Decision variables: stiffness profile, timing, or both.",
     show_default="stiffness; timing for --minimize time",
 )

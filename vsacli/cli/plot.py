@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.option_types import TIME
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -43,12 +44,12 @@ RECORDING = "recording"
     "--from",
     "start",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="First time to draw.",
     show_default="start of the file",
 )
 @click.option(
-    "--to", "end", metavar="SECONDS", type=float, help="Last time to draw.", show_default="end of the file"
+    "--to", "end", metavar="SECONDS", type=TIME, help="Last time to draw.", show_default="end of the file"
 )
 @click.option(
     "--joints",

@@ -24,6 +24,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.option_types import Whole
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -62,7 +63,7 @@ SHOWN_FROM = 20_000
     "--monte-carlo",
     "runs",
     metavar="N",
-    type=click.IntRange(min=2),
+    type=Whole("a number of robots, at least 2, e.g. 1000", least=2),
     help="Number of robots drawn at random from the tolerances and computed as well.",
 )
 @seed_option("draws of --monte-carlo")

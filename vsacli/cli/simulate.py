@@ -19,7 +19,6 @@ from vsacli.cli.command_parts import (
     example,
     json_option,
     load_inputs,
-    numbers,
     overwrite_option,
     robot_argument,
     run_stem,
@@ -28,7 +27,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
-from vsacli.cli.option_types import SHARE
+from vsacli.cli.option_types import SEED, SENSOR_NOISE, SHARE, Number, Numbers, Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -74,7 +73,7 @@ class Options(NamedTuple):
 @set_option
 @click.option(
     "--controller",
-    type=click.Choice(["feedforward", FEEDBACK_LINEARIZATION]),
+    type=Words(["feedforward", FEEDBACK_LINEARIZATION]),
     default="feedforward",
     show_default=True,
     help="Controller that computes the motor torques.",
@@ -101,7 +100,7 @@ class Options(NamedTuple):
     "--initial-error",
     metavar="RAD",
     default="0",
-    callback=numbers,
+    type=Numbers("a value in rad (m), or one for each joint, e.g. 0.01,0,-0.02"),
     help="Initial position error in rad (m), for all joints or for each.",
     show_default=True,
 )
@@ -109,7 +108,7 @@ class Options(NamedTuple):
     "--initial-stiffness-error",
     metavar="NM/RAD",
     default="0",
-    callback=numbers,
+    type=Numbers("a value in N m/rad (N/m), or one for each joint, e.g. 10,0,-20"),
     help="Initial stiffness error in N m/rad (N/m), for all joints or for each.",
     show_default=True,
 )
@@ -123,28 +122,28 @@ class Options(NamedTuple):
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
-    callback=numbers,
+    type=SENSOR_NOISE,
     help="Standard deviation of measured positions in rad and of measured motor torques in N m, e.g. "
     "2e-5,0.5; adds q_measured, theta_measured and tau_motor_measured to the result.",
 )
 @click.option(
     "--encoder-bits",
     metavar="N",
-    type=int,
+    type=Whole("a number of bits, e.g. 16", least=1),
     help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds "
     "q_measured and theta_measured to the result.",
 )
 @click.option(
     "--seed",
     metavar="N",
-    type=int,
+    type=SEED,
     default=0,
     show_default=True,
     help="Seed of the random model errors and sensor noise.",
 )
 @click.option(
     "--feedback",
-    type=click.Choice(["state", "positions"]),
+    type=Words(["state", "positions"]),
     default="state",
     show_default=True,
     help="Feedback of the controller: the full state, or sampled positions with filtered differences "
@@ -159,15 +158,23 @@ class Options(NamedTuple):
     "or a number in rad (m).",
 )
 @click.option(
-    "--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance of the integrator."
+    "--rtol",
+    type=Number("a relative tolerance, e.g. 1e-9", positive=True),
+    default=1e-9,
+    show_default=True,
+    help="Relative tolerance of the integrator.",
 )
 @click.option(
-    "--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance of the integrator."
+    "--atol",
+    type=Number("an absolute tolerance in rad (m), e.g. 1e-10", positive=True),
+    default=1e-10,
+    show_default=True,
+    help="Absolute tolerance of the integrator.",
 )
 @click.option(
     "--budget",
     metavar="N",
-    type=int,
+    type=Whole("a number of evaluations, e.g. 200000", least=1),
     help="Maximum number of evaluations of the equations of motion; a run that needs more ends incomplete.",
     show_default="200000, or 100 per sample if larger",
 )

@@ -14,6 +14,7 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
+from vsacli.cli.option_types import Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.results.store.study_table import StoredStudy
@@ -40,7 +41,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option(
     "--processes",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole("a number of processes, e.g. 4", least=1),
     help="Number of worker processes; the table does not depend on it.",
     show_default="number of CPU cores",
 )
@@ -61,7 +62,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option("--merge", is_flag=True, help="Merge tables of all parts, given in place of STUDY.")
 @click.option(
     "--engine",
-    type=click.Choice(["numpy", "c", "auto"]),
+    type=Words(["numpy", "c", "auto"]),
     default="numpy",
     show_default=True,
     help="Backend of the computation: NumPy, or C code compiled for each robot; auto chooses the "
