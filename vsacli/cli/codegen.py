@@ -7,6 +7,7 @@ import click
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
+from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Words
 
 
@@ -59,8 +60,11 @@ def codegen(
     """
     from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
+    from vsacli.robot.parameters import parameters
 
     arm = read_robot(robot)
+    with naming_option("--parameters"):
+        parameters(arm, patterns)
     project = generate(arm, precision, wrench, patterns, loops=not no_loops)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
         write(project, output, outputs)

@@ -245,6 +245,8 @@ def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(command)
     def talking(*args: Any, quiet: bool, verbose: bool, **kwargs: Any) -> Any:
         _refuse_empty_texts(click.get_current_context())
+        if quiet and verbose:
+            raise click.UsageError("--quiet and --verbose exclude each other; give one")
         return command(*args, talk=Talk(quiet, verbose), **kwargs)
 
     return talking
@@ -254,12 +256,13 @@ def _refuse_empty_texts(context: click.Context) -> None:
     """Refuse empty arguments: they come from shell variables that are not set.
 
     Raises:
-        click.BadParameter: an argument is empty.
+        click.UsageError: an argument is empty.
     """
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
         if value == "" or (isinstance(value, tuple) and "" in value):
-            raise click.BadParameter("is empty; say what is meant", context, parameter)
+            name = parameter.get_error_hint(context)
+            raise click.UsageError(f"{name} is empty; is a shell variable in the command unset?")
 
 
 @contextmanager

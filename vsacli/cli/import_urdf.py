@@ -7,10 +7,25 @@ from pathlib import Path
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
+from vsacli.base.errors import InvalidRecordError
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Number, Numbers, Words
+
+
+def _check_placeholders(actuator: str, stiffness: float | None, spring: tuple[float, float] | None) -> None:
+    """Refuse constants that the chosen kind of actuator does not have.
+
+    Raises:
+        click.UsageError: with the option, and the one that has an effect.
+    """
+    if spring is not None and actuator != "antagonistic":
+        raise click.UsageError(f"--spring needs --actuator antagonistic, not {actuator}")
+    if stiffness is not None and actuator not in ("elastic", "serial"):
+        hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
+        raise click.UsageError(f"--stiffness needs --actuator elastic or serial, not {actuator}{hint}")
 
 
 def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
@@ -123,14 +138,17 @@ def import_urdf(
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:
-        raise click.UsageError("--group is one of a file that --srdf names")
+        raise click.UsageError("--group needs --srdf FILE")
     if srdf is not None and (base or tip):
-        raise click.UsageError("--srdf says base and tip; leave out --base and --tip")
+        raise click.UsageError("--srdf names base and tip; leave out --base and --tip")
+    _check_placeholders(actuator, stiffness, spring)
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
     with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
-        file = outputs.file(path)
-        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
+        with naming_kind("URDF", urdf, ("urdf",)):
+            file = outputs.file(path)
+            with naming_option("--spring", InvalidRecordError):  # constants from the load are valid
+                conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
         file.write_text(conversions.robot_text(conversion))
     click.echo(str(conversion))
     talk.wrote(outputs)

@@ -69,6 +69,14 @@ class SectionedGroup(click.Group):
         """Return the names of all commands."""
         return [name for names in self.sections.values() for name in names]
 
+    def resolve_command(
+        self, context: click.Context, words: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """See `click.Group.resolve_command`."""
+        if words[0] == "help":
+            raise click.UsageError("No such command 'help'; did you mean --help?", context)
+        return super().resolve_command(context, words)
+
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a list for each section, with aligned columns."""
         width = max(map(len, self.list_commands(context)))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import (
     Inputs,
     engine_option,
@@ -27,13 +26,14 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, SHARE, Number, Numbers, Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.base.variables import Variable
     from vsacli.control.gains import Gains
-    from vsacli.control.simulation import Sensors, Simulation
+    from vsacli.control.simulation import InitialError, Sensors, Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.results.plots import FigureFiles
     from vsacli.robot.model import Robot
@@ -255,7 +255,6 @@ def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFi
 def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
     from vsacli.control.simulation import (
         GoalTolerance,
-        InitialError,
         Tolerances,
         check_feedback,
         perturbed,
@@ -263,19 +262,46 @@ def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
     )
 
     gains = _gains(inputs.robot, options)
-    check_feedback(options.feedback, gains)
+    with naming_option("--feedback"):
+        check_feedback(options.feedback, gains)
+    with naming_option("--perturb"):
+        model = perturbed(inputs.robot, options.perturb, options.seed)
+    with naming_option("--goal-tolerance"):
+        goal_tolerance = GoalTolerance.from_text(options.goal_tolerance)
+    with naming_option("--rtol"):
+        Tolerances(options.rtol)
+    with naming_option("--atol"):
+        tolerances = Tolerances(options.rtol, options.atol)
     return partial(
         simulate,
         *inputs,
         gains=gains,
-        model=perturbed(inputs.robot, options.perturb, options.seed),
-        initial_error=InitialError(options.initial_error, options.initial_stiffness_error),
+        model=model,
+        initial_error=_initial_error(inputs, options),
         feedback=options.feedback,
         sensors=_sensors(options),
-        goal_tolerance=GoalTolerance.from_text(options.goal_tolerance),
-        tolerances=Tolerances(options.rtol, options.atol),
+        goal_tolerance=goal_tolerance,
+        tolerances=tolerances,
         budget=options.budget,
     )
+
+
+def _initial_error(inputs: Inputs, options: Options) -> InitialError:
+    """Return the error of the initial state, after a check that the robot can start there."""
+    from vsacli.control.simulation import InitialError
+    from vsacli.control.simulation.simulate import start_state
+
+    of_position = InitialError(options.initial_error)
+    error = replace(of_position, stiffness=options.initial_stiffness_error)
+    given = {
+        "--initial-error": (options.initial_error, of_position),
+        "--initial-stiffness-error": (options.initial_stiffness_error, error),
+    }
+    for option, (values, state) in given.items():
+        if values != (0.0,):
+            with naming_option(option):
+                start_state(*inputs, state)
+    return error
 
 
 def _sensors(options: Options) -> Sensors | None:
@@ -283,12 +309,11 @@ def _sensors(options: Options) -> Sensors | None:
 
     if options.sensor_noise is None and options.encoder_bits is None:
         return None
-    position, torque, *more = (*(options.sensor_noise or ()), 0.0, 0.0)
-    if len(more) > 2:
-        raise InputError.one(
-            "--sensor-noise: expected RAD or RAD,NM: one for positions, one for motor torques"
-        )
-    return Sensors(position, torque, options.encoder_bits, options.seed)
+    position, torque, *_ = (*(options.sensor_noise or ()), 0.0, 0.0)
+    with naming_option("--sensor-noise"):
+        Sensors(position, torque)
+    with naming_option("--encoder-bits"):
+        return Sensors(position, torque, options.encoder_bits, options.seed)
 
 
 def _gains(robot: Robot, options: Options) -> Gains | None:
@@ -297,14 +322,27 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
 
     poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
     if options.controller != FEEDBACK_LINEARIZATION:
-        if poles is not None or stiffness_poles is not None or integral:
-            raise InputError.one(f"poles and integral action need --controller {FEEDBACK_LINEARIZATION}")
+        for option, given in {
+            "poles": poles,
+            "stiffness-poles": stiffness_poles,
+            "integral": integral,
+        }.items():
+            if given:
+                raise click.UsageError(f"--{option} needs --controller {FEEDBACK_LINEARIZATION}")
         return None
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:
-            raise InputError.one("--stiffness-poles: the poles file holds these too", poles)
-        return load_gains(poles, robot, integral=integral)
-    return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral)
+            raise click.UsageError(
+                f"--poles {poles} holds the poles of both errors; leave out --stiffness-poles"
+            )
+        with naming_kind("--poles", poles, ("poles",)):
+            return load_gains(poles, robot, integral=integral)
+    with naming_option("--poles"):
+        gains = gains_from_text(robot, poles or DEFAULT, DEFAULT, integral=integral)
+    if stiffness_poles is None:
+        return gains
+    with naming_option("--stiffness-poles"):
+        return gains_from_text(robot, poles or DEFAULT, stiffness_poles, integral=integral)
 
 
 def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk) -> Simulation:
