@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.texts import alternatives
 from vsacli.cli.command_parts import (
     compute,
     deflection_solver_option,
@@ -187,6 +188,6 @@ def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Tal
     else:
         count = len(found.fixes)
         there = f"are {count} fixes" if count > 1 else "is 1 fix"
-        choice = " or ".join(dict.fromkeys(("1", str(count)))) if count < 3 else f"1 to {count}"
+        choice = alternatives(map(str, range(1, count + 1)))
         reason = f"there {there}, no fix {number}; give --write-fix {choice}"
     talk.note(f"{path} is not written: {reason}")

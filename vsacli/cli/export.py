@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
+from vsacli.base.texts import alternatives
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -147,7 +148,7 @@ def _endings(form: str) -> tuple[str, ...]:
 
 def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
     """Return the format named by --format or by the ending of the output; CSV without either."""
-    words, name = _either(formats), output or ""
+    words, name = alternatives(formats), output or ""
     if form is not None and form not in formats:
         others = "robots" if formats is OF_RESULTS else "results"
         raise InputError.one(f"--format {form} is for {others}; a {kind} is written as {words}", file)
@@ -164,15 +165,9 @@ def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind:
             raise InputError.one(message, name)
         return form
     if len(able) != 1 and formats is not OF_RESULTS:
-        options = _either([f"--format {each}" for each in formats])
+        options = alternatives([f"--format {each}" for each in formats])
         raise InputError.one(f"is a {kind}; choose its format: {options}", file)
     return able[0] if able else "csv"
-
-
-def _either(words: Iterable[str]) -> str:
-    """Return words as alternatives: `a, b or c`."""
-    *others, last = words
-    return f"{', '.join(others)} or {last}"
 
 
 def _check_options(names: Iterable[str], subject: str) -> None:
@@ -234,6 +229,7 @@ def _export_result(
     from vsacli.base.variables import select_variables
     from vsacli.files.repetition import at_rate
     from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
+    from vsacli.results.exports.selection import stride_of
     from vsacli.results.store.reader import open_stored
 
     try:
@@ -246,6 +242,7 @@ def _export_result(
             if options["rate"] is not None:
                 with naming_option("--rate"):
                     stored = stack.enter_context(at_rate(stored, options["rate"]))
+                    stride_of(stored, options["rate"])
             if output is None:
                 export_result(stored, sys.stdout, form, **options)
                 sys.stdout.flush()

@@ -11,9 +11,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import click
+from click.types import FloatParamType, StringParamType
 
 
-class Number(click.ParamType):
+class Number(FloatParamType):
     """A finite number.
 
     Args:
@@ -81,18 +82,22 @@ class Share(Number):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""
-        share = super().convert(value, param, ctx)
+        if not isinstance(value, str):
+            return value
+        try:
+            share = self.read(value.strip())
+        except ValueError:
+            share = math.nan
         if not 0 <= share <= 1:
             self.fail(f"{value!r}: expected {self.expected}", param, ctx)
         return share
 
     def read(self, text: str) -> float:
         """See `Number.read`."""
-        number = text.strip()
-        return float(number[:-1]) / 100 if number.endswith("%") else float(number)
+        return float(text[:-1]) / 100 if text.endswith("%") else float(text)
 
 
-class Numbers(click.ParamType):
+class Numbers(StringParamType):
     """Finite numbers separated by commas.
 
     Args:
@@ -148,7 +153,7 @@ class Words(click.Choice[str]):
 
 RATE = Number("samples per second, e.g. 1000", positive=True)
 TIME = Number("a time in seconds, e.g. 2.5")
-SEED = Whole("a whole number from 0, e.g. 0", least=0)
+SEED = Whole("a seed, e.g. 0", least=0)
 SHARE = Share()
 SENSOR_NOISE = Numbers(
     "one value for positions (rad) or two, for positions and motor torques (rad,N m), e.g. 2e-5,0.5", [1, 2]

@@ -226,11 +226,19 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
 
 
 def _are_studies(paths: list[Path]) -> bool:
-    """Return whether the first file is a study table; then all files must be."""
+    """Return whether all files are study tables, or none is.
+
+    Raises:
+        click.UsageError: only some are.
+    """
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    return stored_format(paths[0]) == FORMAT
+    are = [stored_format(path) == FORMAT for path in paths]
+    if any(are) and not all(are):
+        table, other = paths[are.index(True)], paths[are.index(False)]
+        raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
+    return any(are)
 
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:
