@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from vsacli.base.texts import alternatives
+
 MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
 
@@ -26,7 +28,7 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     if hint := now_called(word, options):
         return hint
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
-        return f"; did you mean {' or '.join(map(repr, near))}?"
+        return f"; did you mean {alternatives(map(repr, near))}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""
 
 
@@ -64,8 +66,10 @@ def _similar(missing: Path) -> Path | None:
 
 
 def _near(word: str, options: list[str]) -> list[str]:
-    """Return the most similar word, or else all words that begin with this one."""
+    """Return the few words that begin with this one, or else the most similar word."""
     import difflib  # loaded for error messages only
 
-    close = difflib.get_close_matches(word, options, n=1, cutoff=0.6)
-    return close or [option for option in options if word and option.startswith(word)]
+    longer = [option for option in options if word and option.startswith(word)]
+    if 0 < len(longer) <= MOST_NEAR:
+        return longer
+    return difflib.get_close_matches(word, options, n=1, cutoff=0.6) or longer

@@ -110,7 +110,7 @@ class Outputs:
         if self._in_new_folder(target) is None:
             there = [each for each in self._inputs if os.path.exists(each)]
             if os.path.exists(path) and any(os.path.samefile(path, each) for each in there):
-                message = "is read by this command; choose another name for its output"
+                message = "is an input of this command; choose another name for the output"
                 raise InputError.one(message, path)
             with reporting_storage_errors(path):
                 _check_target(path, target, overwrite=self._overwrite)

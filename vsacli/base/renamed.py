@@ -19,12 +19,14 @@ class Renaming(NamedTuple):
         old: the name before.
         new: the name now.
         place: command, file or function that has it.
+        usage: how an option is written now, if its value has changed as well.
     """
 
     kind: str
     old: str
     new: str
     place: str
+    usage: str = ""
 
 
 _STORED = "results and simulations, `--variables`, Python, generated C"
@@ -57,7 +59,13 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("key of reports", "doubtful", "unreliable", "columns of `fits`"),
     Renaming("option", "--suggest", "--fixes", "`check-feasibility`"),
     Renaming("option", "--remedy", "--write-fix", "`check-feasibility`"),
-    Renaming("option", "--write-fixed", "--write-fix", "`check-feasibility`; FILE is that of `-o` now"),
+    Renaming(
+        "option",
+        "--write-fixed",
+        "--write-fix",
+        "`check-feasibility`; FILE is that of `-o` now",
+        usage="--write-fix N -o FILE",
+    ),
     Renaming("key of reports", "suggestions", "fixes", "`check-feasibility --fixes`"),
     Renaming("key of reports", "remedies", "fixes", "`check-feasibility --fixes`"),
     Renaming("Python name", "suggest", "fixes", "`vsacli`"),
@@ -103,6 +111,11 @@ def successor(word: str, valid: Iterable[str]) -> str | None:
     """Return the present name of a renamed word, or of a column with one, if it is valid, else None."""
     options = set(valid)
     return next((new for each in RENAMINGS if (new := _replaced(each, word)) in options), None)
+
+
+def usage(option: str) -> str:
+    """Return how an option that was renamed is written now, if that is more than its name; else empty."""
+    return next((each.usage for each in RENAMINGS if each.old == option), "")
 
 
 def now_called(word: str, valid: Iterable[str]) -> str:

@@ -30,6 +30,7 @@ UNCHECKED_BYTES = 2**24
 """Size (bytes) below which free space is not checked, since writing such a file takes less time."""
 
 _REASON = {
+    errno.ENOENT: "no such file or folder",
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is exhausted",
     errno.EFBIG: "the file would exceed the largest file size allowed here",
@@ -50,7 +51,7 @@ def reporting_storage_errors(path: str | Path) -> Iterator[None]:
 
 def storage_error(path: str | Path, error: OSError) -> StorageError:
     """Return the StorageError for an OSError raised while writing `path`."""
-    return StorageError(path, f"cannot be written: {reason(error)}; nothing was changed there")
+    return StorageError(path, f"cannot be written: {reason(error)}")
 
 
 @contextlib.contextmanager

@@ -267,10 +267,16 @@ def select_variables(
     unknown = sorted(wanted - set(declared))
     if unknown:
         raise InputError(
-            Problem("", 0, f"no variable is called {name!r}{did_you_mean(name, declared)}")
+            Problem("", 0, f"no variable is called {name!r}{did_you_mean(name, _like(name, declared))}")
             for name in unknown
         )
     return tuple(variable for name, variable in declared.items() if name in wanted and variable.dims)
+
+
+def _like(name: str, declared: Iterable[str]) -> list[str]:
+    """Return the names of which one may be meant: standard deviations only if this is one."""
+    ending = deviation("")
+    return [each for each in declared if name.endswith(ending) or not each.endswith(ending)]
 
 
 def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:

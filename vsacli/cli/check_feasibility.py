@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.texts import alternatives
 from vsacli.cli.command_parts import (
     compute,
     deflection_solver_option,
@@ -23,7 +24,8 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
-from vsacli.cli.option_types import SHARE
+from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import SHARE, Whole
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
     "--write-fix",
     "number",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole("the number of a fix as --fixes lists it, e.g. 1", least=1),
     help="Write fix N of the list to the file of -o; implies --fixes.",
 )
 @click.option(
@@ -101,14 +103,17 @@ def check_feasibility(
     trajectory with fix N of the list.
     """
     _check_fix_options(number, output, changes)
+    from vsacli.base.flags import MIN_MARGIN, check_min_margin
+
+    options = () if min_margin is None else ("--min-margin", f"{100 * min_margin:g}%")
+    min_margin = MIN_MARGIN if min_margin is None else min_margin
+    with naming_option("--min-margin"):
+        check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
-    from vsacli.base.flags import MIN_MARGIN, check_min_margin
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import check_fixed_target, fixes
 
-    min_margin = MIN_MARGIN if min_margin is None else min_margin
-    check_min_margin(min_margin)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
@@ -130,7 +135,7 @@ def check_feasibility(
         if found is not None and output is not None and number is not None:
             _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)
-    return show_report(report, as_json, (robot, trajectory), changes, found)
+    return show_report(report, as_json, (robot, trajectory), changes, found, options)
 
 
 def _check_fix_options(number: int | None, output: str | None, changes: tuple[str, ...]) -> None:
@@ -178,6 +183,11 @@ def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Tal
         return
     if found.slow_down is None:
         reason = "nothing needs to change"
+    elif not found.fixes:
+        reason = "nothing that was tried fixes the task"
     else:
-        reason = f"there is no fix {number}" if found.fixes else "nothing that was tried fixes the task"
+        count = len(found.fixes)
+        there = f"are {count} fixes" if count > 1 else "is 1 fix"
+        choice = alternatives(map(str, range(1, count + 1)))
+        reason = f"there {there}, no fix {number}; give --write-fix {choice}"
     talk.note(f"{path} is not written: {reason}")

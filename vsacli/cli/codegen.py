@@ -7,6 +7,8 @@ import click
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
+from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import Words
 
 
 @click.command(
@@ -18,7 +20,7 @@ from vsacli.cli.file_names import FOLDER
 @click.option("-o", "--output", type=FOLDER, required=True, help="Folder for the generated code.")
 @click.option(
     "--precision",
-    type=click.Choice(["double", "float"]),
+    type=Words(["double", "float"], {"single": "float"}),
     default="double",
     show_default=True,
     help="Floating-point type of the code; float is refused if rounding would make results too inaccurate.",
@@ -26,7 +28,7 @@ from vsacli.cli.file_names import FOLDER
 @click.option(
     "--wrench",
     metavar="FRAME",
-    type=click.Choice(["end_effector", "base"]),
+    type=Words(["end_effector", "base"]),
     help="Add a wrench at the end effector as an input, in the axes of this frame.",
 )
 @click.option(
@@ -58,8 +60,11 @@ def codegen(
     """
     from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
+    from vsacli.robot.parameters import parameters
 
     arm = read_robot(robot)
+    with naming_option("--parameters"):
+        parameters(arm, patterns)
     project = generate(arm, precision, wrench, patterns, loops=not no_loops)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
         write(project, output, outputs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +17,7 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
-from vsacli.cli.option_types import Words
+from vsacli.cli.option_types import SEED, Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -54,18 +55,6 @@ def variables_option(default: str) -> Callable[[Any], Any]:
     )
 
 
-def numbers(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, ...] | None:
-    """Convert numbers separated by commas, as a click callback."""
-    if written is None:
-        return None
-    try:
-        return tuple(float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
-
-
 def example(command: str) -> str:
     """Return the epilog of a help text: a command line that works."""
     return f"\b\nExample:\n  {command}"
@@ -92,7 +81,7 @@ columns_option = click.option(
 format_option = click.option(
     "--format",
     "file_format",
-    type=click.Choice(["png", "pdf", "svg", "html"]),
+    type=Words(["png", "pdf", "svg", "html"]),
     default="png",
     show_default=True,
     help="Format of the figures; html writes everything to one page.",
@@ -115,7 +104,7 @@ def seed_option(use: str) -> Callable[[Any], Any]:
     return click.option(
         "--seed",
         metavar="N",
-        type=click.IntRange(min=0),
+        type=SEED,
         default=0,
         show_default=True,
         help=f"Seed of the random {use}.",
@@ -135,7 +124,7 @@ def check_plotted(folder: str | None) -> None:
 
 engine_option = click.option(
     "--engine",
-    type=click.Choice(["numpy", "c", "auto"]),
+    type=Words(["numpy", "c", "auto"]),
     default="auto",
     show_default=True,
     help="Backend of the computation: NumPy, or compiled C; auto chooses the faster one.",
@@ -143,15 +132,22 @@ engine_option = click.option(
 
 
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options `--engine` and `--threads`."""
+    """Add the options `--engine` and `--threads`, and refuse threads of NumPy."""
+
+    @wraps(command)
+    def checked(*args: Any, engine: str, threads: int | None, **kwargs: Any) -> Any:
+        if threads is not None and engine == "numpy":
+            raise click.UsageError("--threads needs --engine c or auto; NumPy uses one thread")
+        return command(*args, engine=engine, threads=threads, **kwargs)
+
     threads = click.option(
         "--threads",
-        type=click.IntRange(min=1),
+        type=Whole("a number of threads, e.g. 4", least=1),
         metavar="N",
         help="Number of threads of the compiled code.",
         show_default="number of CPU cores",
     )
-    return engine_option(threads(command))
+    return engine_option(threads(checked))
 
 
 class Inputs(NamedTuple):
@@ -174,7 +170,6 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
             made.
     """
     from vsacli.documents.reading import ChangeError
-    from vsacli.trajectory.file import load_trajectory
 
     if robot_path == trajectory_path == STANDARD:
         twice = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
@@ -182,25 +177,36 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
     with naming_option("--set", ChangeError):
         of_robot, of_trajectory = _divided(changes)
         robot = read_robot(robot_path, of_robot)
-        with naming_kind("TRAJECTORY", trajectory_path, ("trajectory", "table")):
-            trajectory = load_trajectory(trajectory_path, robot, of_trajectory, progress=talk.fitting)
+        trajectory = read_trajectory(trajectory_path, robot, of_trajectory, talk)
     talk.detail(
-        f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} steps over "
+        f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} samples over "
         f"{trajectory.duration:g} s"
     )
     return Inputs(robot, trajectory)
 
 
-def read_robot(path: str, changes: Changes | None = None) -> Robot:
-    """Read the robot file of an argument ROBOT.
+def read_robot(path: str, changes: Changes | None = None, *, argument: str = "ROBOT") -> Robot:
+    """Read the robot file of an argument, ROBOT if nothing else is said.
 
     Raises:
         InputError: every problem of the file; or what it is, if it is no robot.
     """
     from vsacli.robot.file import load_robot
 
-    with naming_kind("ROBOT", path, ("robot",)):
+    with naming_kind(argument, path, ("robot",)):
         return load_robot(path, changes or {})
+
+
+def read_trajectory(path: str, robot: Robot, changes: Changes | None, talk: Talk) -> Trajectory:
+    """Read the trajectory file of an argument TRAJECTORY, with a progress bar over fits.
+
+    Raises:
+        InputError: every problem of the file; or what it is, if it is no trajectory.
+    """
+    from vsacli.trajectory.file import load_trajectory
+
+    with naming_kind("TRAJECTORY", path, ("trajectory", "table")):
+        return load_trajectory(path, robot, changes or {}, progress=talk.fitting)
 
 
 def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
@@ -237,7 +243,7 @@ def run_stem(robot_path: str, trajectory_path: str) -> str:
 def result_line(result: StoredResult) -> str:
     """Return a summary of a result file on one line, for `--verbose`."""
     names = f"{result.robot_name}, {result.trajectory_name}"
-    return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
+    return f"{result.path}: {names}, {result.samples} samples, {result.verdict}"
 
 
 MOST_CHANGES = 3
@@ -253,6 +259,7 @@ def show_report(
     files: tuple[str, str],
     changes: Sequence[str],
     fixes: Fixes | None = None,
+    options: Sequence[str] = (),
 ) -> Exit:
     """Print the report, with fixes if there are any; the exit code follows from the verdict.
 
@@ -264,22 +271,23 @@ def show_report(
         files: paths of robot and trajectory.
         changes: changes to these, as `--set` gave them.
         fixes: fixes, if they were searched.
+        options: further options that the search for fixes needs.
     """
     if as_json:
         extra = {} if fixes is None else {"fixes": fixes.as_json()}
         say_json({**report.as_json(), **extra})
     else:
-        hint = _hint(report, files, changes) if fixes is None else ""
+        hint = _hint(report, files, changes, options) if fixes is None else ""
         texts = [report.as_text(hint), *([] if fixes is None else [fixes])]
         say_text("\n\n".join(map(str, texts)), report.verdict)
     return EXIT_OF_VERDICT[report.verdict]
 
 
-def _hint(report: Report, files: tuple[str, str], changes: Sequence[str]) -> str:
+def _hint(report: Report, files: tuple[str, str], changes: Sequence[str], options: Sequence[str]) -> str:
     """Return how to list fixes of a motion that cannot be executed; empty if it can."""
     if report.verdict not in FIXABLE or STANDARD in files:
         return ""  # standard input has been read, and cannot be read again
     shown = changes if len(changes) <= MOST_CHANGES else ()
-    words = [*files, *(word for change in shown for word in ("--set", change)), "--fixes"]
+    words = [*files, *(word for change in shown for word in ("--set", change)), *options, "--fixes"]
     others = "" if shown == changes else ", with the same --set options"
     return f"to list fixes{others}: vsacli check-feasibility {shlex.join(words)}"

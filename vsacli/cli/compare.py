@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.input_errors import naming_kind
+from vsacli.cli.option_types import TIME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +45,7 @@ overflows."""
 @click.option(
     "--time-offset",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="Time in the recording at which the result begins; positive if the recording starts earlier.",
     show_default="estimated from the signals",
 )
@@ -85,7 +88,11 @@ def compare(
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         stem = f"{Path(result).stem}-{Path(recording).stem}"
         page = page_asked_for(folder, file_format, f"{stem}-comparison", outputs)
-        with open_stored(result) as stored:
+        with ExitStack() as stack:
+            stack.enter_context(naming_kind("--columns", columns, ("columns",)))
+            stack.enter_context(naming_kind("RECORDING", recording, ("table",)))
+            with naming_kind("RESULT", result, ("result", "simulation")):
+                stored = stack.enter_context(open_stored(result))
             talk.detail(result_line(stored))
             comparison = compared(stored, recording, time_offset, columns)
             if page is not None:

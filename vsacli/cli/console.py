@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TextIO, cast
 
 import click
 
-from vsacli.base.errors import StorageError
+from vsacli.base.errors import InputError, StorageError, VsacliError
 from vsacli.base.progress import NoBar, unseen
 from vsacli.base.texts import for_terminal, verdict_words
 
@@ -211,7 +211,7 @@ class Talk:
 
     def detail(self, message: str) -> None:
         """Print a message only with `--verbose`."""
-        if self.verbose and not self.quiet:
+        if message and self.verbose and not self.quiet:
             tell(message)
 
     def progress(
@@ -245,21 +245,36 @@ def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(command)
     def talking(*args: Any, quiet: bool, verbose: bool, **kwargs: Any) -> Any:
         _refuse_empty_texts(click.get_current_context())
-        return command(*args, talk=Talk(quiet, verbose), **kwargs)
+        if quiet and verbose:
+            raise click.UsageError("--quiet and --verbose exclude each other; give one")
+        talk = Talk(quiet, verbose)
+        try:
+            return command(*args, talk=talk, **kwargs)
+        except InputError as error:
+            talk.detail(_origin(error))
+            raise
 
     return talking
+
+
+def _origin(error: BaseException) -> str:
+    """Return the message of a library that an error stems from, on one line; empty if there is none."""
+    while isinstance(error, VsacliError) and error.__cause__ is not None:
+        error = error.__cause__
+    return "" if isinstance(error, VsacliError) else f"cause: {' '.join(str(error).split())}"
 
 
 def _refuse_empty_texts(context: click.Context) -> None:
     """Refuse empty arguments: they come from shell variables that are not set.
 
     Raises:
-        click.BadParameter: an argument is empty.
+        click.UsageError: an argument is empty.
     """
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
         if value == "" or (isinstance(value, tuple) and "" in value):
-            raise click.BadParameter("is empty; say what is meant", context, parameter)
+            name = parameter.get_error_hint(context)
+            raise click.UsageError(f"{name} is empty; is a shell variable in the command unset?")
 
 
 @contextmanager

@@ -35,6 +35,8 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
     from vsacli.files.examples import copy_examples
     from vsacli.files.examples import examples as shipped
 
+    if folder is None and overwrite:
+        raise click.UsageError("--overwrite needs --copy FOLDER")
     if folder is None:
         click.echo("\n".join(line for each in shipped(names) for line in _lines(each)))
         talk.note("get them with vsacli examples --copy FOLDER, or vsacli examples ROBOT... --copy FOLDER")

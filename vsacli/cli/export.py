@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
+from vsacli.base.texts import alternatives
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -20,10 +21,14 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
 from vsacli.cli.file_names import FILE, KNOWN, ending_of
+from vsacli.cli.input_errors import in_words, naming_kind, naming_option
+from vsacli.cli.option_types import RATE, Words
 from vsacli.results.exports import FORMATS as OF_RESULTS
 from vsacli.robot.models import FORMATS as OF_ROBOTS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from vsacli.base.outputs import Staged
     from vsacli.files.file_kinds import FileKind
     from vsacli.results.exports.result_format import ResultFormat
@@ -41,6 +46,12 @@ ENDINGS = {
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 """Options that do not apply to robots."""
 
+_INSTEAD = {
+    "trajectory": "; compute it first: vsacli invdyn ROBOT {}",
+    "table of a study": "; its columns are read with h5py or pandas",
+}
+"""What to do with a file of another kind, by the kind."""
+
 
 @click.command(
     "export",
@@ -54,7 +65,7 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 @click.option(
     "--format",
     "form",
-    type=click.Choice((*OF_RESULTS, *OF_ROBOTS)),
+    type=Words((*OF_RESULTS, *OF_ROBOTS)),
     help="Format. Results: CSV, MATLAB file, Parquet, or JointTrajectory of ROS 2. Robots: URDF, or "
     "MJCF, the XML format of MuJoCo.",
     show_default="extension of the output file, else csv",
@@ -65,14 +76,14 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 @click.option(
     "--rate",
     metavar="HZ",
-    type=float,
+    type=RATE,
     help="Sampling rate of the exported values; a motion known only at its samples requires an "
     "integer fraction of the stored rate.",
     show_default="all stored samples",
 )
 @click.option(
     "--side",
-    type=click.Choice(["joint", "motor"]),
+    type=Words(["joint", "motor"]),
     default="joint",
     show_default=True,
     help="Side of the gear at which motor motion and torque are given.",
@@ -117,16 +128,16 @@ def export(
     kind = recognize(file)
     output = None if output == STANDARD else output
     if kind is FileKind.ROBOT:
-        _check_options()
+        _check_options(ONLY_OF_RESULTS, "results")
         name = _chosen(form, OF_ROBOTS, output, file, kind)
         return _export_robot(file, output, name, start, overwrite, talk)
     if kind not in {FileKind.RESULT, FileKind.SIMULATION}:
-        raise InputError.one(f"is a {kind}; export takes a result, a simulation or a robot", file)
-    if start is not None:
-        raise InputError.one("--start is for robots; leave it out", file)
+        message = f"is {in_words(kind)}; export needs a result, a simulation or a robot"
+        raise InputError.one(message + _INSTEAD.get(kind, "").format(file), file)
+    _check_options(("start",), "MJCF of a robot")
     name = _chosen(form, OF_RESULTS, output, file, kind)
     if OF_RESULTS[name].binary and output is None:
-        raise InputError.one(f"a {name} file is no text; name it with -o")
+        raise click.UsageError(f"--format {name} needs -o FILE: the file is binary")
     options = {**of_results, "progress": talk.writing}
     return _export_result(file, output, OF_RESULTS[name], options, overwrite, talk)
 
@@ -137,9 +148,10 @@ def _endings(form: str) -> tuple[str, ...]:
 
 def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
     """Return the format named by --format or by the ending of the output; CSV without either."""
-    words, name = ", ".join(formats), output or ""
+    words, name = alternatives(formats), output or ""
     if form is not None and form not in formats:
-        raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
+        others = "robots" if formats is OF_RESULTS else "results"
+        raise InputError.one(f"--format {form} is for {others}; a {kind} is written as {words}", file)
     able = [each for each in formats if ending_of(name) in _endings(each)]
     if ending_of(name) and not able and (form is None or ending_of(name) in KNOWN):
         endings = ", ".join(dict.fromkeys(ending for each in formats for ending in _endings(each)))
@@ -148,21 +160,23 @@ def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind:
         raise InputError.one(message, name)
     if form is not None:
         if able and form not in able:
-            message = f"--format {form} makes no file of this name; name it {_endings(form)[0]}"
+            named = f"name the file {_endings(form)[0]} or leave out --format"
+            message = f"--format {form} does not match the ending {ending_of(name)}; {named}"
             raise InputError.one(message, name)
         return form
     if len(able) != 1 and formats is not OF_RESULTS:
-        raise InputError.one(f"is a {kind}; say by --format as what to write it: {words}", file)
+        options = alternatives([f"--format {each}" for each in formats])
+        raise InputError.one(f"is a {kind}; choose its format: {options}", file)
     return able[0] if able else "csv"
 
 
-def _check_options() -> None:
-    """Refuse options that apply to results only."""
+def _check_options(names: Iterable[str], subject: str) -> None:
+    """Refuse options, by the names of their parameters, that apply to another subject only."""
     context = click.get_current_context()
-    for name in ONLY_OF_RESULTS:
+    for name in names:
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
             option = f"--{name.replace('_', '-')}"
-            raise click.UsageError(f"{option} is for results, and says nothing of a robot; leave it out")
+            raise click.UsageError(f"{option} is only for {subject}; leave it out")
 
 
 def _export_robot(
@@ -172,10 +186,12 @@ def _export_robot(
     from vsacli.robot.file import load_robot
 
     robot = load_robot(file)
+    if form != "mjcf":
+        _check_options(("start",), "--format mjcf")
     model = OF_ROBOTS[form](robot, None if start is None else _read_start(start, robot))
     if output is None:
         if model.forces is not None:
-            raise InputError.one("a Python file with forces belongs to this model; name both with -o", file)
+            raise InputError.one("this model includes a Python file with forces; give -o FILE", file)
         click.echo(model.text.rstrip("\n"))
     else:
         with Outputs(overwrite=overwrite, inputs=_inputs(robot, start)) as outputs:
@@ -199,7 +215,7 @@ def _read_start(path: str, robot: Robot) -> Start:
     from vsacli.results.store.reader import StoredResult
     from vsacli.robot.models.mjcf_drives import Start
 
-    with StoredResult.open(path) as result:
+    with naming_kind("--start", path, ("result",)), StoredResult.open(path) as result:
         if result.joint_names != robot.joint_names:
             joints = f"{', '.join(result.joint_names)}, not {', '.join(robot.joint_names)}"
             raise InputError.one(f"is of another robot, with the joints {joints}", path)
@@ -210,16 +226,23 @@ def _export_result(
     file: str, output: str | None, form: ResultFormat, options: dict[str, Any], overwrite: bool, talk: Talk
 ) -> int:
     from vsacli.base.outputs import Outputs
+    from vsacli.base.variables import select_variables
     from vsacli.files.repetition import at_rate
     from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
+    from vsacli.results.exports.selection import stride_of
     from vsacli.results.store.reader import open_stored
 
     try:
         with ExitStack() as stack:
             stored = stack.enter_context(open_stored(file))
             talk.detail(result_line(stored))
+            if options["variables"] is not None:
+                with naming_option("--variables"):
+                    select_variables(options["variables"], stored.declared)
             if options["rate"] is not None:
-                stored = stack.enter_context(at_rate(stored, options["rate"]))
+                with naming_option("--rate"):
+                    stored = stack.enter_context(at_rate(stored, options["rate"]))
+                    stride_of(stored, options["rate"])
             if output is None:
                 export_result(stored, sys.stdout, form, **options)
                 sys.stdout.flush()

@@ -84,10 +84,12 @@ class FolderType(NameType):
         """See `click.ParamType.convert`."""
         name = super().convert(value, param, ctx)
         ending = ending_of(name)
-        if ending in KNOWN and not Path(name).is_dir():
+        if ending and not Path(name).is_dir():
+            option = param.opts[-1] if param is not None else ""
             chosen = ctx is not None and any(each.name == "file_format" for each in ctx.command.params)
-            advice = f", and the format by --format {ending[1:]}" if chosen and ending in FIGURES else ""
-            self.fail(f"{name!r} is the name of a file; name a folder{advice}", param, ctx)
+            shown = f" --format {ending[1:]}" if chosen and ending in FIGURES else ""
+            advice = f"e.g. {option} {PurePath(name).with_suffix('')}{shown}"
+            self.fail(f"{name!r} looks like a file name, expected a folder; {advice}", param, ctx)
         return name
 
 

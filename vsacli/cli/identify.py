@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -12,7 +13,6 @@ from vsacli.cli.command_parts import (
     example,
     format_option,
     json_option,
-    numbers,
     overwrite_option,
     read_robot,
     robot_argument,
@@ -21,6 +21,8 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
+from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
 
 
 @click.command(
@@ -41,7 +43,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--bandwidth",
     metavar="HZ",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number("a frequency in Hz, e.g. 10", positive=True),
     help="Bandwidth of the filter that is applied to all signals.",
     show_default="1.5 times the bandwidth of the motion",
 )
@@ -55,14 +57,14 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--duration",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="Duration of the planned trajectory.",
     show_default=f"{USUAL_DURATION:g}",
 )
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
-    callback=numbers,
+    type=SENSOR_NOISE,
     help="With --plan: standard deviation of measured positions in rad and of measured motor torques "
     "in N m, from which standard errors are predicted.",
     show_default="2e-5 and 0.5% of the peak torque of each motor",
@@ -70,7 +72,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "--seed",
     metavar="N",
-    type=click.IntRange(min=0),
+    type=SEED,
     help="With --plan: seed of the random search.",
     show_default="0",
 )
@@ -122,7 +124,7 @@ def identify(
     if planned:
         _check_options(
             {"--fit": fit, "--bandwidth": bandwidth, "--columns": columns, "--plot": folder},
-            "goes without --plan",
+            "cannot be used with --plan; leave one out",
         )
         return plan(
             robot,
@@ -143,13 +145,20 @@ def identify(
     from vsacli.cli.plot_page import page_asked_for
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
+    from vsacli.studies.identification.motor_equations import check_fit
 
     loaded = read_robot(robot)
     inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
         page = page_asked_for(folder, file_format, f"{Path(robot).stem}-identification", outputs)
-        found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
+        with naming_option("--fit"):
+            check_fit(loaded, fit or WORDS, WORDS)
+        with ExitStack() as stack:
+            stack.enter_context(naming_kind("--columns", columns, ("columns",)))
+            for path in recordings:
+                stack.enter_context(naming_kind("RECORDING", path, ("table",)))
+            found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if page is not None:

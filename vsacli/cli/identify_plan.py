@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import read_robot
+from vsacli.cli.command_parts import read_robot, read_trajectory
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say, tell
-
-if TYPE_CHECKING:
-    from vsacli.studies.identification.excitation import Noise
 
 USUAL_DURATION = 20.0
 """Default duration of the excitation, s."""
@@ -35,19 +31,26 @@ def plan(
 ) -> int:
     """Plan an excitation, compare it with the user's trajectory if one is given, and write it."""
     if len(own_paths) > 1:
-        raise click.UsageError("--plan compares with one trajectory at most")
+        raise click.UsageError(
+            f"--plan: expected at most one TRAJECTORY to compare with, found {len(own_paths)}"
+        )
     from vsacli.base.outputs import Outputs
     from vsacli.studies.identification.excitation import (
         TRIALS,
+        USUAL_NOISE,
         ImpossibleError,
+        Noise,
         excitation_text,
         plan_excitation,
     )
-    from vsacli.trajectory.file import load_trajectory
+    from vsacli.studies.identification.excitation.plan import SHORTEST
 
-    sensors = _noise(noise)
+    if duration < SHORTEST:
+        hint = f"must be at least {SHORTEST:g} s, not {duration:g} s"
+        raise click.BadParameter(hint, param_hint="--duration")
+    sensors = USUAL_NOISE if noise is None else Noise(*noise)
     robot = read_robot(robot_path)
-    own = load_trajectory(own_paths[0], robot) if own_paths else None
+    own = read_trajectory(own_paths[0], robot, None, talk) if own_paths else None
     inputs = [*robot.sources, *(() if own is None else own.sources)]
     with Outputs(overwrite=overwrite, inputs=[source.path for source in inputs]) as outputs:
         file = None if output is None else outputs.file(Path(output))
@@ -67,15 +70,3 @@ def plan(
     if output is None:
         talk.note("the excitation was not written; name a file for it: -o excitation.yaml")
     return EXIT_OF_VERDICT[found.verdict]
-
-
-def _noise(given: tuple[float, ...] | None) -> Noise:
-    from vsacli.studies.identification.excitation import USUAL_NOISE, Noise
-
-    if given is None:
-        return USUAL_NOISE
-    if len(given) > len(Noise._fields):
-        raise click.BadParameter(
-            "expected RAD or RAD,NM: one for positions, one for motor torques", param_hint="--sensor-noise"
-        )
-    return Noise(*given)

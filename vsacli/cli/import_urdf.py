@@ -7,21 +7,25 @@ from pathlib import Path
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
+from vsacli.base.errors import InvalidRecordError
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.option_types import Number, Numbers, Words
 
 
-def _spring(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, float] | None:
-    if written is None:
-        return None
-    try:
-        k, k_c = (float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected two numbers, k and k_c, e.g. 400,2000") from None
-    return k, k_c
+def _check_placeholders(actuator: str, stiffness: float | None, spring: tuple[float, float] | None) -> None:
+    """Refuse constants that the chosen kind of actuator does not have.
+
+    Raises:
+        click.UsageError: with the option, and the one that has an effect.
+    """
+    if spring is not None and actuator != "antagonistic":
+        raise click.UsageError(f"--spring needs --actuator antagonistic, not {actuator}")
+    if stiffness is not None and actuator not in ("elastic", "serial"):
+        hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
+        raise click.UsageError(f"--stiffness needs --actuator elastic or serial, not {actuator}{hint}")
 
 
 def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
@@ -61,7 +65,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 )
 @click.option(
     "--actuator",
-    type=click.Choice(tuple(ACTUATORS)),
+    type=Words(ACTUATORS),
     default="antagonistic",
     show_default=True,
     help="Placeholder: kind of actuator of every joint.",
@@ -69,14 +73,14 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--motor-inertia",
     metavar="KG_M2",
-    type=float,
+    type=Number("an inertia in kg m^2 (kg), e.g. 0.1", positive=True),
     help="Placeholder: inertia of each motor in kg m^2 (kg), joint side of the gear.",
     show_default="half the inertia that the joint carries",
 )
 @click.option(
     "--stiffness",
     metavar="NM/RAD",
-    type=float,
+    type=Number("a stiffness in N m/rad (N/m), e.g. 300", positive=True),
     help="Placeholder: stiffness of elastic joints in N m/rad (N/m), and middle of the attainable "
     "range of serial ones.",
     show_default="from the load that the joint carries",
@@ -84,7 +88,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--spring",
     metavar="K,KC",
-    callback=_spring,
+    type=Numbers("two coefficients k and k_c, e.g. 400,2000", [2]),
     help="Placeholder: coefficients of the cubic springs of antagonistic joints, in N m/rad and N m/rad^3.",
     show_default="from the load that the joint carries",
 )
@@ -100,7 +104,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option(
     "--snap",
     metavar="RAD",
-    type=click.FloatRange(0, 0.1),
+    type=Number("an angle in rad, e.g. 1e-4", least=0.0, most=0.1),
     default=1e-4,
     show_default=True,
     help="Largest angle between axes that are made parallel if their common normal is far away.",
@@ -134,14 +138,17 @@ def import_urdf(
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:
-        raise click.UsageError("--group is one of a file that --srdf names")
+        raise click.UsageError("--group needs --srdf FILE")
     if srdf is not None and (base or tip):
-        raise click.UsageError("--srdf says base and tip; leave out --base and --tip")
+        raise click.UsageError("--srdf names base and tip; leave out --base and --tip")
+    _check_placeholders(actuator, stiffness, spring)
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
     with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
-        file = outputs.file(path)
-        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
+        with naming_kind("URDF", urdf, ("urdf",)):
+            file = outputs.file(path)
+            with naming_option("--spring", InvalidRecordError):  # constants from the load are valid
+                conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
         file.write_text(conversions.robot_text(conversion))
     click.echo(str(conversion))
     talk.wrote(outputs)

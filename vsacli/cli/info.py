@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.option_types import RATE
 
 
 @click.command(
@@ -25,7 +26,7 @@ from vsacli.cli.file_names import FILE, FOLDER
 @click.option(
     "--rate",
     metavar="HZ",
-    type=float,
+    type=RATE,
     help="Sampling rate of a recording without a time column.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the description as JSON.")

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from vsacli.base.errors import InputError, InvalidRecordError, Problem, StorageError
 from vsacli.base.storage import STANDARD
+from vsacli.base.texts import alternatives
 
 
 @contextmanager
@@ -27,9 +28,13 @@ def naming_option(option: str, kind: type[InputError] = InputError) -> Iterator[
             problems = [Problem("", 0, str(field)) for field in error.fields]
         else:
             problems = list(error.problems)
-        raise InputError(
-            each if each.file else each._replace(message=f"{option}: {each.message}") for each in problems
-        ) from error
+        raise InputError(each if each.file else _named(option, each) for each in problems) from error
+
+
+def _named(option: str, problem: Problem) -> Problem:
+    """Return a problem that names the option, once."""
+    named = problem.message.startswith(option)
+    return problem if named else problem._replace(message=f"{option}: {problem.message}")
 
 
 _KINDS = {
@@ -37,42 +42,57 @@ _KINDS = {
     "poles": "poles file",
     "columns": "columns file",
     "table of a study": "study table",
+    "urdf": "URDF file",
 }
 """Kinds of files in the words of an error, where they differ."""
 
-_ADVICE = {
-    **dict.fromkeys(
-        ("result", "simulation", "table of a study"),
-        "vsacli info FILE --extract FOLDER gives the files that it was computed from",
-    ),
-    "trajectory": "are ROBOT and TRAJECTORY swapped?",
-    "robot": "are ROBOT and TRAJECTORY swapped?",
-}
-"""What to do with a file of a kind that a command does not read as a robot or trajectory."""
+_COMPUTED = ("result", "simulation", "table of a study")
+"""Kinds of files that commands compute."""
+
+_INPUTS = ("ROBOT", "TRAJECTORY")
+"""Arguments of commands that compute."""
 
 
 @contextmanager
-def naming_kind(argument: str, path: str, expected: tuple[str, ...]) -> Iterator[None]:
+def naming_kind(argument: str, path: str | None, expected: tuple[str, ...]) -> Iterator[None]:
     """Raise one error that says what a file is, if it cannot be read since it is of another kind.
 
     Args:
-        argument: name of the argument in the help.
-        path: path of the file.
+        argument: name of the argument in the help, or of the option.
+        path: path of the file; None if the option is not given.
         expected: kinds that the argument may be, the usual one first; as in `FileKind`.
     """
     try:
         yield
     except InputError as error:
-        kind = None if path == STANDARD else _recognized(path)
-        if kind is None or kind in ("urdf", *expected):  # readers say more of XML files
+        kind = None if path in (None, STANDARD) else recognized(path)
+        if path is None or kind is None or kind in expected:
             raise
-        message = f"is a {_KINDS.get(kind, kind)}, but {argument} must be a {expected[0]}"
-        advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""
-        raise InputError.one(message + advice, path) from error
+        if kind == "urdf" and argument in _INPUTS:  # readers of these say more of XML files
+            raise
+        needed = alternatives(map(in_words, expected))
+        message = f"is {in_words(kind)}, but {argument} must be {needed}"
+        raise InputError.one(message + _advice(kind, argument, path, expected), path) from error
 
 
-def _recognized(path: str) -> str | None:
-    """Return the kind of a file; None if it is of none that is known, or cannot be read."""
+def in_words(kind: str) -> str:
+    """Return a kind of `FileKind` with its article."""
+    return f"a {_KINDS.get(kind, kind)}"
+
+
+def _advice(kind: str, argument: str, path: str, expected: tuple[str, ...]) -> str:
+    """Return a clause that says what to do with a file of a kind that is not the expected one."""
+    if kind in _COMPUTED and argument in _INPUTS:
+        return "; vsacli info FILE --extract FOLDER gives the files that it was computed from"
+    if kind in ("robot", "trajectory") and argument in _INPUTS:
+        return "; are ROBOT and TRAJECTORY swapped?"
+    if kind == "trajectory" and "result" in expected:
+        return f"; compute one first: vsacli invdyn ROBOT {path}"
+    return ""
+
+
+def recognized(path: str) -> str | None:
+    """Return the kind of a file, as in `FileKind`; None if it is of none that is known, or cannot be read."""
     from vsacli.files.file_kinds import recognize
 
     try:

@@ -28,6 +28,8 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, HDF5_FILE
+from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import RATE, Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--rate",
     metavar="HZ",
-    type=float,
+    type=RATE,
     help="Sampling rate of the trajectory, or of its recording if that has no time column; same as "
     "--set rate=HZ.",
 )
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
 @click.option(
     "--store-precision",
     "precision",
-    type=click.Choice(["double", "single"]),
+    type=Words(["double", "single"], {"float": "single"}),
     default="double",
     show_default=True,
     help="Storage precision; single (7 digits) halves the file. Computation is always in double precision.",
@@ -101,13 +103,18 @@ def invdyn(
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     if rate is not None:
+        _check_one_rate(rate, changes)
         changes = (*changes, f"rate={rate!r}")
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
+    from vsacli.base.variables import select_variables
     from vsacli.results.store.writer import ResultWriter
 
+    if variables is not None:
+        with naming_option("--variables"):
+            select_variables(variables)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         figures = (
@@ -134,6 +141,17 @@ def invdyn(
     code = show_report(report, as_json, (robot, trajectory), changes)
     talk.wrote(outputs)
     return code
+
+
+def _check_one_rate(rate: float, changes: tuple[str, ...]) -> None:
+    """Refuse `--rate` next to a change of the rate.
+
+    Raises:
+        click.UsageError: the change of `--set` is there.
+    """
+    for change in changes:
+        if change.partition("=")[0].strip() == "rate":
+            raise click.UsageError(f"--rate {rate:g} contradicts --set {change}; give one")
 
 
 def _figures(

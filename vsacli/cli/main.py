@@ -69,6 +69,14 @@ class SectionedGroup(click.Group):
         """Return the names of all commands."""
         return [name for names in self.sections.values() for name in names]
 
+    def resolve_command(
+        self, context: click.Context, words: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """See `click.Group.resolve_command`."""
+        if words[0] == "help":
+            raise click.UsageError("No such command 'help'; did you mean --help?", context)
+        return super().resolve_command(context, words)
+
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a list for each section, with aligned columns."""
         width = max(map(len, self.list_commands(context)))
@@ -136,7 +144,7 @@ def run(arguments: Sequence[str]) -> int:
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
     except click.ClickException as error:
         shown = io.StringIO()
-        _with_successor(error).show(shown)
+        _advised(error).show(shown)
         return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
     except Interrupted as error:
         return _interrupted(error)
@@ -158,14 +166,26 @@ def run(arguments: Sequence[str]) -> int:
     return int(code or Exit.OK)
 
 
-def _with_successor(error: click.ClickException) -> click.ClickException:
-    """Return the error of an unknown option that was renamed with its present name; any other as it is."""
+def _advised(error: click.ClickException) -> click.ClickException:
+    """Return the error of a renamed option with its present name, of a missing input with what is there.
+
+    Any other error is returned as it is.
+    """
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from vsacli.base.renamed import successor  # loaded for error messages only
+        from vsacli.base.renamed import successor, usage  # loaded for error messages only
 
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
-            return click.UsageError(f"{error.option_name} is now {new}.", error.ctx)
+            return click.UsageError(
+                f"{error.option_name} is now {usage(error.option_name) or new}", error.ctx
+            )
+    if isinstance(error, click.MissingParameter) and error.ctx and (path := error.ctx.params.get("robot")):
+        from vsacli.cli.input_errors import in_words, recognized
+
+        if (kind := recognized(path)) in ("result", "simulation"):
+            missing = error.format_message().rstrip(".")
+            hint = f"{path} is {in_words(kind)}: vsacli info {path} shows its report"
+            return click.UsageError(f"{missing}; {hint}", error.ctx)
     return error
 
 

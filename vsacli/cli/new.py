@@ -10,9 +10,11 @@ import click
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.storage import STANDARD
-from vsacli.cli.command_parts import example, overwrite_option
+from vsacli.cli.command_parts import example, overwrite_option, read_robot
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import Words
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
@@ -41,7 +43,7 @@ def new() -> None:
 )
 @click.option(
     "--actuator",
-    type=click.Choice((*ACTUATORS, *MECHANISMS)),
+    type=Words((*ACTUATORS, *MECHANISMS)),
     default="antagonistic",
     show_default=True,
     help="Kind of actuator of every joint, or mechanism of serial actuators.",
@@ -59,7 +61,8 @@ def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk:
     from vsacli.files.examples import example_tables
     from vsacli.files.templates import robot_template
 
-    text = robot_template(joints, actuator)
+    with naming_option("--joints"):
+        text = robot_template(joints, actuator)
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
 
 
@@ -85,9 +88,8 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     revolute joints.
     """
     from vsacli.files.templates import trajectory_template
-    from vsacli.robot.file import load_robot
 
-    robot = None if robot_path is None else load_robot(robot_path)
+    robot = None if robot_path is None else read_robot(robot_path, argument="--robot")
     inputs = () if robot is None else [source.path for source in robot.sources]
     _write(trajectory_template(robot), output, overwrite, talk, inputs)
 

@@ -22,6 +22,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Words
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.results.charts.optimum import Moved
     from vsacli.robot.joint import Joint
+    from vsacli.robot.model import Robot
     from vsacli.studies.search import Optimum
     from vsacli.trajectory.trajectory import Trajectory
 
@@ -57,7 +59,7 @@ CHANGE, PACE = "optimum", "pace"
 )
 @click.option(
     "--vary",
-    type=click.Choice(["stiffness", "timing", "both"]),
+    type=Words(["stiffness", "timing", "both"]),
     help="Decision variables: stiffness profile, timing, or both.",
     show_default="stiffness; timing for --minimize time",
 )
@@ -103,13 +105,18 @@ def optimize(
     all limits. The result is a local optimum; the report gives the number of initial guesses that led to it.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next
+    from vsacli.base.flags import MIN_MARGIN, check_min_margin
+
+    min_margin = MIN_MARGIN if min_margin is None else min_margin
+    with naming_option("--min-margin"):
+        check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
-    from vsacli.base.flags import MIN_MARGIN
     from vsacli.base.outputs import Outputs
     from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
 
     vary = vary or ("timing" if minimize == "time" else "stiffness")
+    _check_objective(inputs.robot, minimize, vary)
     names, stem = (CHANGE,) if vary == "stiffness" else (CHANGE, PACE), run_stem(robot, trajectory)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
@@ -124,7 +131,7 @@ def optimize(
                 *inputs,
                 minimize,
                 vary,
-                min_margin=MIN_MARGIN if min_margin is None else min_margin,
+                min_margin=min_margin,
                 seed=seed,
                 progress=progress.update,
             )
@@ -137,6 +144,27 @@ def optimize(
     talk.wrote(outputs)
     say(found, as_json)
     return Exit.OK if found.possible else Exit.VERDICT
+
+
+def _check_objective(robot: Robot, minimize: str, vary: str) -> None:
+    """Refuse an objective that the robot has no parameters for, or decision variables that it does not have.
+
+    Raises:
+        InputError: with the option.
+    """
+    from vsacli.studies.search.cheapest_stiffness import (
+        check_timing_varies,
+        checked_criterion,
+        varied_joints,
+    )
+
+    with naming_option("--vary"):
+        varied = varied_joints(robot, vary)
+    with naming_option("--minimize"):
+        if minimize == "time":
+            check_timing_varies(vary)
+        else:
+            checked_criterion(robot, minimize, varied if vary == "stiffness" else range(len(robot.joints)))
 
 
 def _draw(

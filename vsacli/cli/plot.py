@@ -10,9 +10,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from vsacli.base.errors import InputError, StorageError
-from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
+from vsacli.cli.command_parts import (
+    example,
+    format_option,
+    overwrite_option,
+    read_robot,
+    result_line,
+    words_of,
+)
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.option_types import TIME
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -27,6 +36,9 @@ if TYPE_CHECKING:
 
 RECORDING = "recording"
 """Name of the figure of recorded signals, with their splines and the noise found in them."""
+
+DRAWN = ("result", "simulation", "table of a study", "table")
+"""Kinds of files of which figures are drawn, as in `FileKind`."""
 
 
 @click.command(
@@ -43,12 +55,12 @@ RECORDING = "recording"
     "--from",
     "start",
     metavar="SECONDS",
-    type=float,
+    type=TIME,
     help="First time to draw.",
     show_default="start of the file",
 )
 @click.option(
-    "--to", "end", metavar="SECONDS", type=float, help="Last time to draw.", show_default="end of the file"
+    "--to", "end", metavar="SECONDS", type=TIME, help="Last time to draw.", show_default="end of the file"
 )
 @click.option(
     "--joints",
@@ -104,15 +116,22 @@ def plot(
     from vsacli.base.outputs import Outputs
 
     shown = _Shown(joints or (), _span(start, end), variables)
+    if twice := next((file for file in files if files.count(file) > 1), None):
+        raise click.UsageError(f"{twice} is given twice; give each result once")
     with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
         target = _Target(Path(folder), file_format, outputs)
         if any(map(is_recording, files)):
             _check_recording(files, shown, file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
-            raise click.UsageError("--robot is the robot of a recording; results name theirs")
+            raise click.UsageError(
+                "--robot is only for recordings; leave it out, results contain their robot"
+            )
         else:
-            _draw_computed([Path(file) for file in files], shown, target, talk)
+            with ExitStack() as stack:
+                for file in files:
+                    stack.enter_context(naming_kind("FILE", file, DRAWN))
+                _draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
 
 
@@ -149,12 +168,12 @@ def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk
     """Draw results, simulations or study tables."""
     studies = _are_studies(paths)
     if studies and shown != _EVERYTHING:
-        raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
+        raise click.UsageError(f"{shown.option} cannot be used with study tables; leave it out")
     if target.file_format == "html":
         from vsacli.cli.plot_page import write_page
 
-        if shown._replace(span=_EVERYTHING.span) != _EVERYTHING:
-            raise click.UsageError("a page shows all joints and variables; leave these options out")
+        if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
+            raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
         write_page(paths, None if studies else shown.span, target.folder, target.outputs, talk)
     elif studies:
         _draw_studies(paths, target)
@@ -170,6 +189,18 @@ class _Shown(NamedTuple):
     joints: tuple[str, ...]
     span: tuple[float, float]
     variables: tuple[str, ...] | None
+
+    @property
+    def option(self) -> str:
+        """Name of an option that selects something; empty if everything is to be drawn."""
+        first, last = (math.isfinite(end) for end in self.span)
+        given = {
+            "--variables": self.variables is not None,
+            "--joints": self.joints,
+            "--from": first,
+            "--to": last,
+        }
+        return next((option for option, chosen in given.items() if chosen), "")
 
     def of(self, stored: StoredResult) -> StoredResult:
         """Return the selected part of an open file; the file itself if all of it is selected."""
@@ -190,16 +221,24 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
     """
     span = (-math.inf if start is None else start, math.inf if end is None else end)
     if not span[0] <= span[1]:
-        raise click.UsageError(f"--from {span[0]:g} has to lie before --to {span[1]:g}")
+        raise click.UsageError(f"--from {span[0]:g} must be before --to {span[1]:g}")
     return span
 
 
 def _are_studies(paths: list[Path]) -> bool:
-    """Return whether the first file is a study table; then all files must be."""
+    """Return whether all files are study tables, or none is.
+
+    Raises:
+        click.UsageError: only some are.
+    """
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    return stored_format(paths[0]) == FORMAT
+    are = [stored_format(path) == FORMAT for path in paths]
+    if any(are) and not all(are):
+        table, other = paths[are.index(True)], paths[are.index(False)]
+        raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
+    return any(are)
 
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:
@@ -226,7 +265,8 @@ def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
         part = shown.of(stored)
-        names = chosen_figures(part, shown.variables)
+        with naming_option("--variables"):
+            names = chosen_figures(part, shown.variables)
         recorded = shown.variables is None and has_recording(stored, talk)
         figures = target.figures([*names, RECORDING] if recorded else names, path.stem)
         _draw(part, path, figures, talk, shown.variables)
@@ -276,6 +316,7 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
         opened = [stack.enter_context(open_stored(path)) for path in paths]
         for each in opened:
             talk.detail(result_line(each))
+        stack.enter_context(naming_option("--variables"))
         files.save(compare_files([shown.of(each) for each in opened], shown.variables))
 
 
@@ -315,18 +356,19 @@ def draw_recording(
     from vsacli.documents.source import is_table
     from vsacli.files.placeholder_robot import placeholder_robot
     from vsacli.files.recordings.fit_curves import table_profiles
-    from vsacli.robot.file import load_robot
     from vsacli.trajectory.file import load_trajectory
 
-    robot = placeholder_robot(path).robot if robot_path is None else load_robot(robot_path)
+    robot = (
+        placeholder_robot(path).robot if robot_path is None else read_robot(robot_path, argument="--robot")
+    )
     figures = staged([RECORDING], Path(path).stem)
     if is_table(path):
         profiles = table_profiles(path, robot, talk.fitting)
     else:
         profiles = [*load_trajectory(path, robot, progress=talk.fitting).estimates.values()]
     if not any(profile.fitted for profile in profiles):
-        reason = "its signals are not recorded, or recorded with all derivatives"
-        raise InputError.one(f"has no spline to be shown: {reason}; plot the result of `vsacli invdyn`", path)
+        advice = f"compute a result first: vsacli invdyn ROBOT {path}, then vsacli plot"
+        raise InputError.one(f"has no recorded signals to plot; {advice}", path)
     figures.save(recording_figure(robot, profiles, path, joints, span))
 
 

@@ -24,6 +24,8 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import SHARE, Whole
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -33,6 +35,13 @@ if TYPE_CHECKING:
 
 SHOWN_FROM = 20_000
 """Number of samples from which a progress bar is shown; each costs some twenty times that of a run."""
+
+
+def _share_or_file(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
+    """Refuse a share beyond 100 %, as a click callback."""
+    if text is not None and text.rstrip().endswith("%"):
+        SHARE.convert(text, parameter, context)
+    return text
 
 
 @click.command(
@@ -55,6 +64,7 @@ SHOWN_FROM = 20_000
     "--tolerances",
     metavar="SHARE|FILE",
     type=FILE,
+    callback=_share_or_file,
     help="Uncertainty of the parameters: a share for all, e.g. 5%, or a YAML file with lines such as "
     "'joints.*.link.mass: {normal: 2 %}'.",
 )
@@ -62,7 +72,7 @@ SHOWN_FROM = 20_000
     "--monte-carlo",
     "runs",
     metavar="N",
-    type=click.IntRange(min=2),
+    type=Whole("a number of robots, at least 2, e.g. 1000", least=2),
     help="Number of robots drawn at random from the tolerances and computed as well.",
 )
 @seed_option("draws of --monte-carlo")
@@ -119,13 +129,17 @@ def _analyzed(
     talk: Talk,
 ) -> Sensitivity:
     """Run the analysis; write the derivatives block by block if there is a file for them."""
+    from vsacli.robot.parameters import parameters
     from vsacli.studies.sensitivities import SensitivityRun, analyzed
 
+    with naming_option("--parameters"):
+        parameters(inputs.robot, patterns)
     run = SensitivityRun(*inputs, patterns)
     with ExitStack() as stack:
         writer = None if file is None else stack.enter_context(_writer(file, run))
         steps = inputs.trajectory.samples + runs
         progress = stack.enter_context(talk.progress(steps, shown_from=SHOWN_FROM))
+        stack.enter_context(naming_option("--tolerances"))  # all else has been checked
         found = analyzed(
             run,
             tolerances,

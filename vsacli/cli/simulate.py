@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import (
     Inputs,
     engine_option,
     example,
     json_option,
     load_inputs,
-    numbers,
     overwrite_option,
     robot_argument,
     run_stem,
@@ -29,13 +27,14 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
-from vsacli.cli.option_types import SHARE
+from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.option_types import SEED, SENSOR_NOISE, SHARE, Number, Numbers, Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.base.variables import Variable
     from vsacli.control.gains import Gains
-    from vsacli.control.simulation import Sensors, Simulation
+    from vsacli.control.simulation import InitialError, Sensors, Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.results.plots import FigureFiles
     from vsacli.robot.model import Robot
@@ -75,7 +74,7 @@ class Options(NamedTuple):
 @set_option
 @click.option(
     "--controller",
-    type=click.Choice(["feedforward", FEEDBACK_LINEARIZATION]),
+    type=Words(["feedforward", FEEDBACK_LINEARIZATION]),
     default="feedforward",
     show_default=True,
     help="Controller that computes the motor torques.",
@@ -102,7 +101,7 @@ class Options(NamedTuple):
     "--initial-error",
     metavar="RAD",
     default="0",
-    callback=numbers,
+    type=Numbers("a value in rad (m), or one for each joint, e.g. 0.01,0,-0.02"),
     help="Initial position error in rad (m), for all joints or for each.",
     show_default=True,
 )
@@ -110,7 +109,7 @@ class Options(NamedTuple):
     "--initial-stiffness-error",
     metavar="NM/RAD",
     default="0",
-    callback=numbers,
+    type=Numbers("a value in N m/rad (N/m), or one for each joint, e.g. 10,0,-20"),
     help="Initial stiffness error in N m/rad (N/m), for all joints or for each.",
     show_default=True,
 )
@@ -124,28 +123,28 @@ class Options(NamedTuple):
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
-    callback=numbers,
+    type=SENSOR_NOISE,
     help="Standard deviation of measured positions in rad and of measured motor torques in N m, e.g. "
     "2e-5,0.5; adds q_measured, theta_measured and tau_motor_measured to the result.",
 )
 @click.option(
     "--encoder-bits",
     metavar="N",
-    type=int,
+    type=Whole("a number of bits, e.g. 16", least=1),
     help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds "
     "q_measured and theta_measured to the result.",
 )
 @click.option(
     "--seed",
     metavar="N",
-    type=int,
+    type=SEED,
     default=0,
     show_default=True,
     help="Seed of the random model errors and sensor noise.",
 )
 @click.option(
     "--feedback",
-    type=click.Choice(["state", "positions"]),
+    type=Words(["state", "positions"]),
     default="state",
     show_default=True,
     help="Feedback of the controller: the full state, or sampled positions with filtered differences "
@@ -160,15 +159,23 @@ class Options(NamedTuple):
     "or a number in rad (m).",
 )
 @click.option(
-    "--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance of the integrator."
+    "--rtol",
+    type=Number("a relative tolerance, e.g. 1e-9", positive=True),
+    default=1e-9,
+    show_default=True,
+    help="Relative tolerance of the integrator.",
 )
 @click.option(
-    "--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance of the integrator."
+    "--atol",
+    type=Number("an absolute tolerance in rad (m), e.g. 1e-10", positive=True),
+    default=1e-10,
+    show_default=True,
+    help="Absolute tolerance of the integrator.",
 )
 @click.option(
     "--budget",
     metavar="N",
-    type=int,
+    type=Whole("a number of evaluations, e.g. 200000", least=1),
     help="Maximum number of evaluations of the equations of motion; a run that needs more ends incomplete.",
     show_default="200000, or 100 per sample if larger",
 )
@@ -253,7 +260,6 @@ def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFi
 def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
     from vsacli.control.simulation import (
         GoalTolerance,
-        InitialError,
         Tolerances,
         check_feedback,
         perturbed,
@@ -261,19 +267,46 @@ def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
     )
 
     gains = _gains(inputs.robot, options)
-    check_feedback(options.feedback, gains)
+    with naming_option("--feedback"):
+        check_feedback(options.feedback, gains)
+    with naming_option("--perturb"):
+        model = perturbed(inputs.robot, options.perturb, options.seed)
+    with naming_option("--goal-tolerance"):
+        goal_tolerance = GoalTolerance.from_text(options.goal_tolerance)
+    with naming_option("--rtol"):
+        Tolerances(options.rtol)
+    with naming_option("--atol"):
+        tolerances = Tolerances(options.rtol, options.atol)
     return partial(
         simulate,
         *inputs,
         gains=gains,
-        model=perturbed(inputs.robot, options.perturb, options.seed),
-        initial_error=InitialError(options.initial_error, options.initial_stiffness_error),
+        model=model,
+        initial_error=_initial_error(inputs, options),
         feedback=options.feedback,
         sensors=_sensors(options),
-        goal_tolerance=GoalTolerance.from_text(options.goal_tolerance),
-        tolerances=Tolerances(options.rtol, options.atol),
+        goal_tolerance=goal_tolerance,
+        tolerances=tolerances,
         budget=options.budget,
     )
+
+
+def _initial_error(inputs: Inputs, options: Options) -> InitialError:
+    """Return the error of the initial state, after a check that the robot can start there."""
+    from vsacli.control.simulation import InitialError
+    from vsacli.control.simulation.simulate import start_state
+
+    of_position = InitialError(options.initial_error)
+    error = replace(of_position, stiffness=options.initial_stiffness_error)
+    given = {
+        "--initial-error": (options.initial_error, of_position),
+        "--initial-stiffness-error": (options.initial_stiffness_error, error),
+    }
+    for option, (values, state) in given.items():
+        if values != (0.0,):
+            with naming_option(option):
+                start_state(*inputs, state)
+    return error
 
 
 def _sensors(options: Options) -> Sensors | None:
@@ -281,12 +314,11 @@ def _sensors(options: Options) -> Sensors | None:
 
     if options.sensor_noise is None and options.encoder_bits is None:
         return None
-    position, torque, *more = (*(options.sensor_noise or ()), 0.0, 0.0)
-    if len(more) > 2:
-        raise InputError.one(
-            "--sensor-noise: expected RAD or RAD,NM: one for positions, one for motor torques"
-        )
-    return Sensors(position, torque, options.encoder_bits, options.seed)
+    position, torque, *_ = (*(options.sensor_noise or ()), 0.0, 0.0)
+    with naming_option("--sensor-noise"):
+        Sensors(position, torque)
+    with naming_option("--encoder-bits"):
+        return Sensors(position, torque, options.encoder_bits, options.seed)
 
 
 def _gains(robot: Robot, options: Options) -> Gains | None:
@@ -295,14 +327,27 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
 
     poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
     if options.controller != FEEDBACK_LINEARIZATION:
-        if poles is not None or stiffness_poles is not None or integral:
-            raise InputError.one(f"poles and integral action need --controller {FEEDBACK_LINEARIZATION}")
+        for option, given in {
+            "poles": poles,
+            "stiffness-poles": stiffness_poles,
+            "integral": integral,
+        }.items():
+            if given:
+                raise click.UsageError(f"--{option} needs --controller {FEEDBACK_LINEARIZATION}")
         return None
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:
-            raise InputError.one("--stiffness-poles: the poles file holds these too", poles)
-        return load_gains(poles, robot, integral=integral)
-    return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral)
+            raise click.UsageError(
+                f"--poles {poles} holds the poles of both errors; leave out --stiffness-poles"
+            )
+        with naming_kind("--poles", poles, ("poles",)):
+            return load_gains(poles, robot, integral=integral)
+    with naming_option("--poles"):
+        gains = gains_from_text(robot, poles or DEFAULT, DEFAULT, integral=integral)
+    if stiffness_poles is None:
+        return gains
+    with naming_option("--stiffness-poles"):
+        return gains_from_text(robot, poles or DEFAULT, stiffness_poles, integral=integral)
 
 
 def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk) -> Simulation:

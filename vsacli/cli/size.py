@@ -12,11 +12,13 @@ from vsacli.cli.command_parts import (
     json_option,
     overwrite_option,
     read_robot,
+    read_trajectory,
     robot_argument,
     run_stem,
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
@@ -79,20 +81,25 @@ def size(
 
     Exit code 3 if no choice meets the requirements of a motor, or if infeasible samples were ignored.
     """
-    if catalog is None and output is not None:
-        raise click.UsageError("--output is for the motors chosen from a catalog: give --catalog")
+    if catalog is None:
+        for option, given in {"--output": output, "--gear": gears, "--minimize": minimize}.items():
+            if given:
+                raise click.UsageError(f"{option} needs --catalog FILE, the motors to choose from")
     from vsacli.base.outputs import Outputs
     from vsacli.studies.sizing import size_drives, sized_text
-    from vsacli.trajectory.file import load_trajectory
+    from vsacli.studies.sizing.ratios import gears_of_joints
 
     loaded = read_robot(robot)
-    motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
+    motions = [read_trajectory(path, loaded, None, talk) for path in trajectories]
+    with naming_option("--gear"):
+        gears_of_joints(gears, loaded.joint_names)
     sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
     inputs = [*(source.path for source in sources), *([] if catalog is None else [catalog])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         if output is not None:
             outputs.check(output)
-        with talk.progress(sum(motion.samples for motion in motions)) as progress:
+        samples = sum(motion.samples for motion in motions)
+        with naming_kind("--catalog", catalog, ("table",)), talk.progress(samples) as progress:
             found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
         if output is not None and found.lacking:
             talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")
@@ -109,7 +116,7 @@ def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs, talk: Talk) -
     """Draw torque over speed for every motor with feasible samples."""
     motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
     if not motors:
-        talk.note("nothing is drawn: no step can be done")
+        talk.note("nothing is drawn: no sample is feasible")
         return
     from vsacli.results.plots import FigureFiles, torque_speed_figure
 

@@ -14,6 +14,8 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
+from vsacli.cli.input_errors import naming_kind
+from vsacli.cli.option_types import Whole, Words
 
 if TYPE_CHECKING:
     from vsacli.results.store.study_table import StoredStudy
@@ -40,7 +42,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option(
     "--processes",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole("a number of processes, e.g. 4", least=1),
     help="Number of worker processes; the table does not depend on it.",
     show_default="number of CPU cores",
 )
@@ -61,7 +63,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option("--merge", is_flag=True, help="Merge tables of all parts, given in place of STUDY.")
 @click.option(
     "--engine",
-    type=click.Choice(["numpy", "c", "auto"]),
+    type=Words(["numpy", "c", "auto"]),
     default="numpy",
     show_default=True,
     help="Backend of the computation: NumPy, or C code compiled for each robot; auto chooses the "
@@ -91,25 +93,32 @@ def study(
     if merge:
         return _merge(files, output, overwrite, as_json, talk)
     if len(files) > 1:
-        raise click.UsageError(f"expected one study, found {len(files)} files; --merge puts tables together")
+        raise click.UsageError(
+            f"expected one STUDY, found {len(files)}; to merge tables of shards give --merge"
+        )
     if files[0] == STANDARD:
         raise click.UsageError("a study is read by several processes and again when it goes on; give a file")
     if dask not in (None, "local") and processes is not None:
-        raise click.UsageError("--processes are of this machine; a cluster has workers of its own")
+        raise click.UsageError(
+            "--processes cannot be used with --dask ADDRESS; a cluster has its own workers"
+        )
     from vsacli.studies.sweeps import run_study
 
-    with run_study(
-        files[0],
-        output,
-        shard=shard,
-        processes=processes,
-        dask=dask,
-        engine=engine,
-        overwrite=overwrite,
-        command_line=_command_line(),
-        progress=partial(talk.progress, shown_from=0, label="runs"),
-        tell=talk.note,
-    ) as table:
+    with (
+        naming_kind("STUDY", files[0], ("study",)),
+        run_study(
+            files[0],
+            output,
+            shard=shard,
+            processes=processes,
+            dask=dask,
+            engine=engine,
+            overwrite=overwrite,
+            command_line=_command_line(),
+            progress=partial(talk.progress, shown_from=0, label="runs"),
+            tell=talk.note,
+        ) as table,
+    ):
         return _shown(table, as_json, talk)
 
 
@@ -119,7 +128,7 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
     from vsacli.studies.sweeps import merge
 
     if output is None:
-        raise click.UsageError("--merge needs a name for the whole table: give -o FILE")
+        raise click.UsageError("--merge needs -o FILE, the table to write")
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
         merge(files, outputs.file(output), command_line=_command_line())
     with StoredStudy(output) as table:

@@ -10,6 +10,7 @@ import click
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FILE
+from vsacli.cli.input_errors import in_words, recognized
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -42,7 +43,9 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
     from vsacli.files.validation import check_files
 
     if recompute and as_json:
-        raise click.UsageError("--recompute has no JSON form")
+        raise click.UsageError("--recompute cannot be used with --json; leave one out")
+    if recompute:
+        _check_recomputable(files)
     checked = check_files(list(dict.fromkeys(files)))
     if as_json:
         messages = [message.as_json() for file in checked for message in file.messages]
@@ -56,6 +59,18 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
     again = [file.path for file in checked if recompute and recognize(file.path) in stored]
     equal = [_recomputed(path, talk) for path in again]
     return Exit.OK if all(equal) else Exit.VERDICT
+
+
+def _check_recomputable(files: Sequence[str]) -> None:
+    """Refuse `--recompute` if no file may be a result; files that cannot be read are reported later.
+
+    Raises:
+        click.UsageError: with the kind of a file.
+    """
+    kinds = [recognized(file) for file in files]
+    if all(kind not in (None, "result", "simulation") for kind in kinds):
+        file, kind = files[0], kinds[0] or ""
+        raise click.UsageError(f"--recompute is for results; {file} is {in_words(kind)}")
 
 
 def _recomputed(path: str, talk: Talk) -> bool:

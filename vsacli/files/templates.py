@@ -113,7 +113,7 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
     kinds = [TYPES.get(letter, "") for letter in joints.upper()]
     if not all(kinds) or not 0 < len(kinds) <= MOST_JOINTS:
         expected = f"1 to {MOST_JOINTS} letters R (revolute) and P (prismatic), e.g. RRP"
-        raise InputError.one(f"joints: expected {expected}, found {joints[:MOST_JOINTS]!r}")
+        raise InputError.one(f"expected {expected}, found {joints[:MOST_JOINTS]!r}")
     values = {
         "name": name,
         "placeholder": True,

@@ -149,7 +149,7 @@ def describe_file(
     """
     kind = recognize(path)
     if rate is not None and kind is not FileKind.TABLE:
-        raise InputError.one(f"is a {kind}; the rate is said of recordings without times", path)
+        raise InputError.one(f"is a {kind}; --rate is only for recordings without a time column", path)
     match kind:
         case FileKind.ROBOT:
             return describe_robot(load_robot(path))

@@ -15,7 +15,15 @@ import numpy as np
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.simulation_variables import COMMANDS, SIMULATION_VARIABLES
-from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
+from vsacli.base.variables import (
+    MOTOR_CONSTANTS,
+    MOTORS,
+    OF_ANY_ROBOT,
+    VARIABLES,
+    Variable,
+    deviation,
+    select_variables,
+)
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet, folding
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
 from vsacli.results.store.reader import StoredResult
@@ -388,11 +396,23 @@ def _undrawable(result: StoredResult, variable: Variable) -> str:
     """Return why a variable has no curve; empty if it has one."""
     name = variable.name
     if name == "flags":
-        return "flags are bits, no curve; where steps cannot be done, figures of other variables have bands"
+        return "flags are bits, not a curve; figures of other variables mark infeasible samples by bands"
     if "joint" not in variable.dims:
-        return f"{name} is not one of joints, which are what figures show; `vsacli export` writes it"
+        return f"{name} is not a variable of joints, which figures show; `vsacli export` writes it"
     if name not in result.variables:
-        return f"holds no {name}, which the run was without, or written without (--variables)"
+        return _missing(result, variable)
     if not result.existing(variable).any():
         return f"none of {', '.join(result.joint_names)} has {name}"
     return ""
+
+
+def _missing(result: StoredResult, variable: Variable) -> str:
+    """Return why a file does not hold a variable."""
+    name, robot = variable.name, result.robot_name
+    if variable.requires in MOTOR_CONSTANTS and not result.has(variable):
+        return f"has no {name}: no motor of {robot} has a {variable.requires}"
+    if variable.requires not in OF_ANY_ROBOT and not result.has(variable):
+        return f"has no {name}: no joint of {robot} has {variable.requires}, or --variables left it out"
+    if name.endswith(ending := deviation("")) and not any(each.endswith(ending) for each in result.variables):
+        return f"has no {name}: no signal of its trajectory was recorded, or --variables left it out"
+    return f"was written without {name} (--variables); compute it again without --variables"

@@ -201,8 +201,11 @@ def check_fields(selection: Selection) -> None:
     names = {each.name for each in selection.chosen}
     strange = sorted(names - set(FIELDS.values()))
     if strange:
-        places = ", ".join(f"{variable} ({field})" for field, variable in FIELDS.items())
-        raise InputError.one(f"a JointTrajectory has no place for {', '.join(strange)}, only for {places}")
+        *others, last = FIELDS.values()
+        held = f"{', '.join(others)} and {last}"
+        raise InputError.one(
+            f"--variables: a JointTrajectory cannot hold {', '.join(strange)}; it holds {held}"
+        )
     if FIELDS["positions"] not in names:
         raise InputError.one(f"a JointTrajectory needs positions: add {FIELDS['positions']} to --variables")
     if selection.time.size and selection.time[-1] - selection.time[0] > LONGEST:

@@ -108,7 +108,9 @@ def export_result(
     selection = Selection(result, wanted, rate, side)
     form.check(selection)
     if allow_nan and form.missing is None:
-        raise InputError.one("this format cannot show that a value is missing; leave out --allow-nan")
+        raise InputError.one(
+            "--allow-nan cannot be used with joint-trajectory, which cannot represent missing values; use csv"
+        )
     gaps = [] if allow_nan else [gap for chosen in selection.chosen for gap in _gaps(selection, chosen)]
     if gaps:
         raise UndefinedSamplesError(result.path, gaps, form.missing)

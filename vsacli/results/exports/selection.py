@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.texts import alternatives
 from vsacli.base.units import WrenchQuantity, time_text
 from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
@@ -22,6 +23,9 @@ Side: TypeAlias = Literal["joint", "motor"]
 
 CELLS = 2**18
 """Number of values of a variable in memory at a time."""
+
+MOST_TRIED = 1000
+"""Number of decimation factors among which a rate that is easily typed is looked for."""
 
 RATE_TOLERANCE = 1e-6
 """Relative tolerance of a rate, for rates typed with at least six digits, such as 333.3333."""
@@ -185,8 +189,8 @@ def _check_geared(result: StoredResult) -> None:
     if any(unknown):
         joints = ", ".join(compress(result.joint_names, unknown))
         message = (
-            f"the robot file gives no gear_ratio at {joints}, so what happens on the motors' shafts is not "
-            f"known; add it (1 without a gear) and run {result.command} again, or export with --side joint"
+            f"--side motor needs the gear_ratio of {joints} in the robot file (1 without a gear); add it and "
+            f"run {result.command} again, or use --side joint"
         )
         raise InputError.one(message, result.path)
 
@@ -202,15 +206,33 @@ def stride_of(result: StoredResult, rate: float) -> int:
     ratio = stored / rate
     stride = round(ratio)
     if ratio < 1 - RATE_TOLERANCE:
-        message = f"the rate {rate:.9g} Hz exceeds the stored {stored:.9g} Hz; samples are not interpolated"
-        raise InputError.one(message, result.path)
-    if abs(ratio - stride) > RATE_TOLERANCE * ratio:
-        nearest = f"{stored / math.ceil(ratio):.9g} and {stored / math.floor(ratio):.9g} Hz"
-        message = (
-            f"the stored {stored:.9g} Hz are no whole multiple of {rate:.9g} Hz; the nearest are {nearest}"
+        raise InputError.one(
+            f"{rate:.9g} Hz exceeds the stored rate of {stored:.9g} Hz; use a lower rate, or run "
+            f"{result.command} with --set rate={rate:.9g}"
         )
-        raise InputError.one(message, result.path)
+    if abs(ratio - stride) > RATE_TOLERANCE * ratio:
+        choices = alternatives(f"{each:.9g}" for each in _near_rates(stored, ratio))
+        raise InputError.one(
+            f"the stored rate of {stored:.9g} Hz is not a multiple of {rate:.9g} Hz; use {choices} Hz"
+        )
     return stride
+
+
+def _near_rates(stored: float, ratio: float) -> list[float]:
+    """Return the nearest rates below and above stored/ratio that are easily typed; if there are none, any."""
+    least, most = math.floor(ratio), math.ceil(ratio)
+    sides = (range(most, most + MOST_TRIED), range(least, 0, -1))
+    found = [rate for strides in sides for rate in _typed(stored, strides)]
+    return found or [stored / most, stored / least]
+
+
+def _typed(stored: float, strides: Iterable[int]) -> list[float]:
+    """Return the first quotient of the stored rate that has at most four digits, if there is one."""
+    for stride in strides:
+        rate = float(f"{stored / stride:.4g}")
+        if abs(stored - rate * stride) <= RATE_TOLERANCE * stored:
+            return [rate]
+    return []
 
 
 def check_rate(rate: float) -> None:

@@ -167,9 +167,8 @@ def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
         MemoryError,
         NotImplementedError,
     ) as error:
-        reason = " ".join(str(error).split())[:200]
         subject = f"variable {what} is" if what else "is"
-        raise InputError.one(f"{subject} damaged or truncated ({reason}); compute it again", path) from error
+        raise InputError.one(f"{subject} damaged or truncated; compute it again", path) from error
 
 
 def _all_end(objects: bytes) -> bool:

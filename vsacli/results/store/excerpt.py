@@ -12,7 +12,6 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.units import time_text
 from vsacli.base.variables import OF_ANY_ROBOT, Variable
 from vsacli.results.store.reader import StoredResult
 
@@ -88,14 +87,16 @@ def steps_between(time: FloatArray, span: Span, path: str | Path) -> slice:
     """
     start, stop = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
     if start >= stop:
-        steps = f"{len(time)} steps go {_words((float(time[0]), float(time[-1])))}"
-        raise InputError.one(f"has no step {_words(span)}; its {steps}", path)
+        whole = f"it spans {time[0]:.4g} to {time[-1]:.4g} s"
+        raise InputError.one(f"has no samples {_words(span)}; {whole} (--from, --to)", path)
     return slice(int(start), int(stop))
 
 
 def _words(span: Span) -> str:
-    ends = zip(("from", "to"), span, strict=True)
-    return " ".join(f"{word} {time_text(time)}" for word, time in ends if not math.isinf(time))
+    first, last = (f"{time:.4g}" for time in span)
+    if math.isinf(span[1]):
+        return f"from t = {first} s on"
+    return f"up to t = {last} s" if math.isinf(span[0]) else f"from t = {first} to {last} s"
 
 
 def joint_numbers(names: Sequence[str], chosen: Sequence[str], path: str | Path) -> list[int]:

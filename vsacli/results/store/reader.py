@@ -20,7 +20,7 @@ import numpy as np
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
-from vsacli.base.texts import one_line, shown
+from vsacli.base.texts import alternatives, one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     SCALES,
@@ -454,15 +454,17 @@ def _format(path: str | Path, file: h5py.File) -> str | None:
 
 
 def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
-    if found is None or not found.startswith(OURS):
-        expected = " or ".join(repr(kind.format) for kind in kinds)
-        return f"is an HDF5 file, but no result file: it has no attribute format = {expected}"
-    word = found.partition("/")[0].removeprefix(OURS)
     for kind in kinds:
-        if word == kind.kind:
+        if found is not None and found.startswith(f"{OURS}{kind.kind}/"):
             return other_version(found, kind.format, kind.command)
-    expected = " or ".join(f"a {kind.kind} ({kind.format})" for kind in kinds)
-    return f"is a {word} ({found}), expected {expected}"
+    return f"is {kind_of_format(found)}, expected {alternatives(f'a {kind.kind}' for kind in kinds)}"
+
+
+def kind_of_format(found: str | None) -> str:
+    """Return the kind of an HDF5 file in words, from its attribute `format`."""
+    if found is None or not found.startswith(OURS):
+        return "an HDF5 file that vsacli has not written"
+    return f"a {found.partition('/')[0].removeprefix(OURS).replace('-', ' ')}"
 
 
 def other_version(found: str, read: str, command: str) -> str:

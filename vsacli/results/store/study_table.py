@@ -22,7 +22,7 @@ from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import NewFile
-from vsacli.results.store.reader import StoredFile
+from vsacli.results.store.reader import StoredFile, kind_of_format
 from vsacli.results.store.schema import TEXT, storable, unit_attributes
 
 FORMAT = "vsacli-study-table/1"
@@ -266,10 +266,9 @@ class StoredStudy(StoredFile):
         try:
             with reporting_damage(path):
                 self.attributes: dict[str, Any] = dict(self._file.attrs)
-                if self.attributes.get("format") != FORMAT:
-                    raise InputError.one(
-                        f"is no table of a study ({FORMAT}), as `vsacli study` writes it", path
-                    )
+                if (found := self.attributes.get("format")) != FORMAT:
+                    kind = kind_of_format(found if isinstance(found, str) else None)
+                    raise InputError.one(f"is {kind}, expected a table that vsacli study writes", path)
                 self.study_name, self.robot_name = (
                     one_line(str(self.attributes[name])) for name in ("study_name", "robot_name")
                 )

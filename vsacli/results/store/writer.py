@@ -138,9 +138,7 @@ class ResultWriter(NewFile):
         joint = f" of {self._robot.joint_names[at[1]]}" if "joint" in self._declared[name].dims else ""
         what = f"{name}{joint} is {values[at]:.3g} at t = {time_text(time[at[0]])}"
         advice = f"beyond the {np.finfo(np.float32).max:.2g} of single precision; store in double precision"
-        return StorageError(
-            self._staged.path, f"cannot be written: {what}, {advice}; nothing was changed there"
-        )
+        return StorageError(self._staged.path, f"cannot be written: {what}, {advice}")
 
     def _complete(self, report: Mapping[str, Any]) -> None:
         text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
