@@ -23,7 +23,8 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import YAML_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Whole
 
@@ -51,12 +52,7 @@ if TYPE_CHECKING:
     show_default="1%",
 )
 @deflection_solver_option
-@click.option(
-    "--plot",
-    "plot_folder",
-    type=FOLDER,
-    help="Save figures of each stiffness within its attainable range in this folder, as PNG.",
-)
+@figure_options("--plot", purpose="Save a figure of the attainable range of each stiffness in this folder.")
 @click.option("--fixes", "list_fixes", is_flag=True, help="List fixes as well, the smallest change first.")
 @click.option(
     "--write-fix",
@@ -83,7 +79,7 @@ def check_feasibility(
     stop_on_infeasible: bool,
     min_margin: float | None,
     deflection_solver: str,
-    plot_folder: str | None,
+    figures: FigureTarget | None,
     list_fixes: bool,
     number: int | None,
     output: str | None,
@@ -127,10 +123,10 @@ def check_feasibility(
             asked=("flags",),
             tell=talk.note,
         )
-        if plot_folder is None:
+        if figures is None:
             report = compute(run, talk)
         else:
-            report = _compute_and_draw(run, plot_folder, run_stem(robot, trajectory), outputs, talk)
+            report = _compute_and_draw(run, figures, run_stem(robot, trajectory), outputs, talk)
         found = fixes(*inputs, min_margin) if list_fixes or output is not None else None
         if found is not None and output is not None and number is not None:
             _write_fix(found, number, output, outputs, talk)
@@ -148,7 +144,7 @@ def _check_fix_options(number: int | None, output: str | None, changes: tuple[st
         raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
 
 
-def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:
+def _compute_and_draw(run: Run, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> Report:
     """Compute, and draw the figure from a temporary result file."""
     from vsacli.base.outputs import Staged
     from vsacli.base.storage import temporary_folder
@@ -159,12 +155,11 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
         feasibility,
     )
     from vsacli.results.charts.stored import StoredCharts
-    from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
 
     check_drawable([joint.actuator_type for joint in run.robot.joints])
-    figures = FigureFiles([FEASIBILITY], folder, stem, "png", outputs)
+    figures = target.files([FEASIBILITY], stem, outputs)
     with temporary_folder() as place:
         file = Staged.unnamed(place / "result.h5")
         report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))

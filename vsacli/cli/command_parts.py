@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
-from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
@@ -78,14 +77,6 @@ columns_option = click.option(
     help="YAML file that maps the columns of the recording to signals, and lists columns to ignore; "
     "`vsacli info RECORDING --field mapping` prints one to begin with.",
 )
-format_option = click.option(
-    "--format",
-    "file_format",
-    type=Words(["png", "pdf", "svg", "html"]),
-    default="png",
-    show_default=True,
-    help="Format of the figures; html writes everything to one page.",
-)
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="Stop at the first infeasible sample.")
 
 
@@ -109,17 +100,6 @@ def seed_option(use: str) -> Callable[[Any], Any]:
         show_default=True,
         help=f"Seed of the random {use}.",
     )
-
-
-def check_plotted(folder: str | None) -> None:
-    """Refuse `--format` without the folder of `--plot`, in commands that draw only with `--plot`.
-
-    Raises:
-        click.UsageError: `--format` is given, but no folder.
-    """
-    source = click.get_current_context().get_parameter_source("file_format")
-    if folder is None and source is not ParameterSource.DEFAULT:
-        raise click.UsageError("--format needs --plot")
 
 
 engine_option = click.option(

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from vsacli.cli.command_parts import (
-    check_plotted,
     columns_option,
     example,
-    format_option,
     json_option,
     overwrite_option,
     result_line,
 )
 from vsacli.cli.console import Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind
 from vsacli.cli.option_types import TIME
 
@@ -51,10 +50,7 @@ overflows."""
 )
 @columns_option
 @json_option
-@click.option(
-    "--plot", "folder", type=FOLDER, help="Save figures of measured and computed signals in this folder."
-)
-@format_option
+@figure_options("--plot", purpose="Save figures of measured and computed signals in this folder.", pages=True)
 @overwrite_option
 @talk_options
 def compare(
@@ -63,8 +59,7 @@ def compare(
     time_offset: float | None,
     columns: str | None,
     as_json: bool,
-    folder: str | None,
-    file_format: str,
+    figures: FigureTarget | None,
     overwrite: bool,
     talk: Talk,
 ) -> None:
@@ -78,16 +73,14 @@ def compare(
     signal, the report gives the error, gain and offset of measured over computed values, and the lag relative
     to the other signals, each with its standard error.
     """
-    check_plotted(folder)
     from vsacli.base.outputs import Outputs
-    from vsacli.cli.plot_page import page_asked_for
     from vsacli.results.pages.document import input_text
     from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare as compared
 
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         stem = f"{Path(result).stem}-{Path(recording).stem}"
-        page = page_asked_for(folder, file_format, f"{stem}-comparison", outputs)
+        page = figures and figures.page(f"{stem}-comparison", outputs)
         with ExitStack() as stack:
             stack.enter_context(naming_kind("--columns", columns, ("columns",)))
             stack.enter_context(naming_kind("RECORDING", recording, ("table",)))
@@ -97,19 +90,18 @@ def compare(
             comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
                 page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
-        if page is None and folder is not None:
-            _draw(comparison, stem, folder, file_format, outputs)
+        if page is None and figures is not None:
+            _draw(comparison, stem, figures, outputs)
     say(comparison, as_json)
     talk.wrote(outputs)
 
 
-def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outputs: Outputs) -> None:
+def _draw(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outputs) -> None:
     """Draw a figure for each measured variable."""
     from vsacli.results.charts.measured import measured_sheet
-    from vsacli.results.plots import FigureFiles
 
     curves = _curves(comparison)
-    files = FigureFiles(curves, folder, stem, file_format, outputs)
+    files = target.files(curves, stem, outputs)
     title = ", ".join(Path(path).stem for path in (comparison.result, comparison.recording))
     files.save(
         {variable: measured_sheet(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}

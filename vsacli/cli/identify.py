@@ -8,10 +8,8 @@ from pathlib import Path
 import click
 
 from vsacli.cli.command_parts import (
-    check_plotted,
     columns_option,
     example,
-    format_option,
     json_option,
     overwrite_option,
     read_robot,
@@ -19,7 +17,8 @@ from vsacli.cli.command_parts import (
     words_of,
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
@@ -82,10 +81,9 @@ from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
     type=YAML_FILE,
     help="Write the robot file with the identified parameters; with --plan, the trajectory.",
 )
-@click.option(
-    "--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques in this folder."
+@figure_options(
+    "--plot", purpose="Save figures of measured and predicted torques in this folder.", pages=True
 )
-@format_option
 @json_option
 @overwrite_option
 @talk_options
@@ -100,8 +98,7 @@ def identify(
     sensor_noise: tuple[float, ...] | None,
     seed: int | None,
     output: str | None,
-    folder: str | None,
-    file_format: str,
+    figures: FigureTarget | None,
     as_json: bool,
     overwrite: bool,
     talk: Talk,
@@ -120,10 +117,9 @@ def identify(
     identifiable, within all limits of ROBOT and from rest to rest. A TRAJECTORY after ROBOT is then compared
     with the plan.
     """
-    check_plotted(folder)
     if planned:
         _check_options(
-            {"--fit": fit, "--bandwidth": bandwidth, "--columns": columns, "--plot": folder},
+            {"--fit": fit, "--bandwidth": bandwidth, "--columns": columns, "--plot": figures},
             "cannot be used with --plan; leave one out",
         )
         return plan(
@@ -142,7 +138,6 @@ def identify(
         raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
     from vsacli.base.outputs import Outputs
     from vsacli.cli.identify_plots import draw_figures, identification_page
-    from vsacli.cli.plot_page import page_asked_for
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
     from vsacli.studies.identification.motor_equations import check_fit
@@ -151,7 +146,7 @@ def identify(
     inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        page = page_asked_for(folder, file_format, f"{Path(robot).stem}-identification", outputs)
+        page = figures and figures.page(f"{Path(robot).stem}-identification", outputs)
         with naming_option("--fit"):
             check_fit(loaded, fit or WORDS, WORDS)
         with ExitStack() as stack:
@@ -163,8 +158,8 @@ def identify(
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if page is not None:
             page.write_text(identification_page(found, columns))
-        elif folder is not None:
-            draw_figures(found, robot, folder, file_format, outputs)
+        elif figures is not None:
+            draw_figures(found, robot, figures, outputs)
     say(found, as_json, found.as_text(verbose=talk.verbose))
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
+    from vsacli.cli.figure_options import FigureTarget
     from vsacli.results.charts.measured import MeasuredCurve
     from vsacli.studies.identification import Identification
 
 
-def draw_figures(found: Identification, robot: str, folder: str, file_format: str, outputs: Outputs) -> None:
+def draw_figures(found: Identification, robot: str, target: FigureTarget, outputs: Outputs) -> None:
     """Draw a figure for each recording."""
     from vsacli.results.charts.measured import measured_sheet
-    from vsacli.results.plots import FigureFiles
 
     curves = _curves(found)
     names = {record: f"{number}-{Path(record).stem}" for number, record in enumerate(curves, 1)}
-    files = FigureFiles(names.values(), folder, Path(robot).stem, file_format, outputs)
+    files = target.files(names.values(), Path(robot).stem, outputs)
     files.save(
         {
             names[record]: measured_sheet(

@@ -27,7 +27,8 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FOLDER, HDF5_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import HDF5_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import RATE, Words
 
@@ -67,12 +68,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Storage precision; single (7 digits) halves the file. Computation is always in double precision.",
 )
-@click.option(
-    "--plot",
-    "plot_folder",
-    type=FOLDER,
-    help="Save the figures of `vsacli plot` in this folder as well, as PNG.",
-)
+@figure_options("--plot", purpose="Save the figures of `vsacli plot` in this folder as well.")
 @deflection_solver_option
 @json_option
 @overwrite_option
@@ -87,7 +83,7 @@ def invdyn(
     output: str | None,
     variables: tuple[str, ...] | None,
     precision: str,
-    plot_folder: str | None,
+    figures: FigureTarget | None,
     deflection_solver: str,
     as_json: bool,
     overwrite: bool,
@@ -117,9 +113,7 @@ def invdyn(
             select_variables(variables)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        figures = (
-            None if plot_folder is None else _figures(inputs, plot_folder, path.stem, variables, outputs)
-        )
+        drawn = None if figures is None else _figures(inputs, figures, path.stem, variables, outputs)
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
@@ -132,12 +126,12 @@ def invdyn(
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **run.provenance}
         writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
         report = compute(run, talk, writer)
-        if figures is not None:
+        if drawn is not None:
             from vsacli.cli.plot import draw_staged, recording_figure
 
-            draw_staged(file, figures, talk)
+            draw_staged(file, drawn, talk)
             if inputs.trajectory.estimates:
-                figures.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
+                drawn.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
     code = show_report(report, as_json, (robot, trajectory), changes)
     talk.wrote(outputs)
     return code
@@ -155,16 +149,15 @@ def _check_one_rate(rate: float, changes: tuple[str, ...]) -> None:
 
 
 def _figures(
-    inputs: Inputs, folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
+    inputs: Inputs, target: FigureTarget, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
     from vsacli.cli.plot import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
-    from vsacli.results.plots import FigureFiles
 
     stored = VARIABLES if variables is None else variables
     drawn = drawable_figures(result_drawings(inputs.robot.has), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)
-    return FigureFiles(drawn, folder, stem, "png", outputs)
+    return target.files(drawn, stem, outputs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -21,14 +20,15 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FOLDER, YAML_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import YAML_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Words
 
 if TYPE_CHECKING:
     from vsacli.analysis.result import Result
     from vsacli.base.arrays import FloatArray
-    from vsacli.base.outputs import Outputs
+    from vsacli.results.charts.chart import Sheet
     from vsacli.results.charts.optimum import Moved
     from vsacli.robot.joint import Joint
     from vsacli.robot.model import Robot
@@ -75,12 +75,7 @@ CHANGE, PACE = "optimum", "pace"
     type=YAML_FILE,
     help="Write the best trajectory; signals without a formula go to a CSV file next to it.",
 )
-@click.option(
-    "--plot",
-    "folder",
-    type=FOLDER,
-    help="Save figures of stiffness, torques and timing in this folder, as PNG.",
-)
+@figure_options("--plot", purpose="Save figures of stiffness, torques and timing in this folder.")
 @seed_option("initial guesses")
 @json_option
 @overwrite_option
@@ -93,7 +88,7 @@ def optimize(
     vary: str | None,
     min_margin: float | None,
     output: str | None,
-    folder: str | None,
+    figures: FigureTarget | None,
     seed: int,
     as_json: bool,
     overwrite: bool,
@@ -121,10 +116,10 @@ def optimize(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
-        if folder is not None:
-            outputs.folder(folder)
-            for name in names:
-                outputs.check(Path(folder) / f"{stem}-{name}.png")
+        paths = figures.paths(names, stem) if figures is not None else {}
+        for path in paths.values():
+            outputs.folder(path.parent)
+            outputs.check(path)
         steps = searches(inputs.robot, minimize, vary)
         with talk.progress(steps, shown_from=0, label="searching") as progress:
             found = optimized(
@@ -139,8 +134,11 @@ def optimize(
             write_fixed(Fix(0.0, inputs.robot, found.trajectory), output, outputs)
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
-        if folder is not None and found.trajectory is not None:
-            _draw(found, found.trajectory, inputs.trajectory, folder, stem, outputs)
+        if paths and found.trajectory is not None:
+            from vsacli.results.plots import FigureFiles
+
+            sheets = _sheets(found, found.trajectory, inputs.trajectory)
+            FigureFiles({name: paths[name] for name in sheets}, outputs).save(sheets)
     talk.wrote(outputs)
     say(found, as_json)
     return Exit.OK if found.possible else Exit.VERDICT
@@ -167,13 +165,10 @@ def _check_objective(robot: Robot, minimize: str, vary: str) -> None:
             checked_criterion(robot, minimize, varied if vary == "stiffness" else range(len(robot.joints)))
 
 
-def _draw(
-    found: Optimum, best: Trajectory, asked: Trajectory, folder: str, stem: str, outputs: Outputs
-) -> None:
-    """Draw the changes at each joint, and the timing if it was varied."""
+def _sheets(found: Optimum, best: Trajectory, asked: Trajectory) -> dict[str, Sheet]:
+    """Return the figures of the changes at each joint, and of the timing if it was varied."""
     from vsacli.analysis.run import inverse_dynamics
     from vsacli.results.charts.optimum import JointChange, change_sheet, pace_sheet
-    from vsacli.results.plots import FigureFiles
     from vsacli.studies.search.paced_motion import path_at
 
     before, after = (inverse_dynamics(found.robot, each) for each in (asked, best))
@@ -191,11 +186,11 @@ def _draw(
         for index, joint in enumerate(found.robot.joints)
     ]
     title = f"{found.robot_name}, {found.asked}"
-    figures = {CHANGE: change_sheet(joints, title, along_path=found.pace is not None)}
+    sheets = {CHANGE: change_sheet(joints, title, along_path=found.pace is not None)}
     if found.pace is not None:
         uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        figures[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, title)
-    FigureFiles(figures, folder, stem, "png", outputs).save(figures)
+        sheets[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, title)
+    return sheets
 
 
 def _moved(result: Result, place: FloatArray, index: int) -> Moved:

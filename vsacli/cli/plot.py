@@ -12,14 +12,14 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import (
     example,
-    format_option,
     overwrite_option,
     read_robot,
     result_line,
     words_of,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
+from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import TIME
 
@@ -47,10 +47,13 @@ DRAWN = ("result", "simulation", "table of a study", "table")
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
-@click.option(
-    "-o", "--output", "folder", type=FOLDER, default=".", help="Folder for the figures.", show_default=True
+@figure_options(
+    "-o",
+    "--output",
+    purpose="Folder for the figures.",
+    default=".",
+    pages=True,
 )
-@format_option
 @click.option(
     "--from",
     "start",
@@ -79,8 +82,7 @@ DRAWN = ("result", "simulation", "table of a study", "table")
 @talk_options
 def plot(
     files: tuple[str, ...],
-    folder: str,
-    file_format: str,
+    figures: FigureTarget,
     start: float | None,
     end: float | None,
     joints: tuple[str, ...] | None,
@@ -119,9 +121,9 @@ def plot(
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise click.UsageError(f"{twice} is given twice; give each result once")
     with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
-        target = _Target(Path(folder), file_format, outputs)
+        target = _Target(figures, outputs)
         if any(map(is_recording, files)):
-            _check_recording(files, shown, file_format)
+            _check_recording(files, shown, figures.file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
             raise click.UsageError(
@@ -136,17 +138,14 @@ def plot(
 
 
 class _Target(NamedTuple):
-    """The folder, format and staged files of figures."""
+    """Where figures are written, and the output files of the command."""
 
-    folder: Path
-    file_format: str
+    place: FigureTarget
     outputs: Outputs
 
     def figures(self, names: Iterable[str], stem: str) -> FigureFiles:
         """Stage the files of figures."""
-        from vsacli.results.plots import FigureFiles
-
-        return FigureFiles(names, self.folder, stem, self.file_format, self.outputs)
+        return self.place.files(names, stem, self.outputs)
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:
@@ -159,7 +158,7 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
         raise click.UsageError(
             "recordings are drawn one at a time; `vsacli compare` compares one with a result"
         )
-    if shown.variables is not None or file_format == "html":
+    if shown.variables is not None or file_format == PAGE:
         option = "--format html" if shown.variables is None else "--variables"
         raise click.UsageError(f"{option} needs a result, which `vsacli invdyn` computes from a recording")
 
@@ -169,12 +168,12 @@ def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk
     studies = _are_studies(paths)
     if studies and shown != _EVERYTHING:
         raise click.UsageError(f"{shown.option} cannot be used with study tables; leave it out")
-    if target.file_format == "html":
+    if target.place.file_format == PAGE:
         from vsacli.cli.plot_page import write_page
 
         if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
             raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
-        write_page(paths, None if studies else shown.span, target.folder, target.outputs, talk)
+        write_page(paths, None if studies else shown.span, *target, talk)
     elif studies:
         _draw_studies(paths, target)
     elif len(paths) == 1:

@@ -11,8 +11,9 @@ from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs, Staged
+    from vsacli.base.outputs import Outputs
     from vsacli.base.progress import Bar
+    from vsacli.cli.figure_options import FigureTarget
     from vsacli.results.pages import FixText
     from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
@@ -22,7 +23,7 @@ LONG_PAGE = 2_000_000
 
 
 def write_page(
-    paths: list[Path], span: tuple[float, float] | None, folder: Path, outputs: Outputs, talk: Talk
+    paths: list[Path], span: tuple[float, float] | None, target: FigureTarget, outputs: Outputs, talk: Talk
 ) -> None:
     """Write the page of results or simulations over a time span; without a span, the page of studies.
 
@@ -31,33 +32,9 @@ def write_page(
             need is not installed.
         StorageError: the page cannot be written.
     """
-    page = staged_page(folder, "-".join(path.stem for path in paths), outputs)
+    page = target.page("-".join(path.stem for path in paths), outputs)
+    assert page is not None, "as of a target for a page"
     page.write_text(_studies(paths) if span is None else _results(paths, span, talk))
-
-
-def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
-    """Stage the file of a page, before anything is computed for it.
-
-    Raises:
-        InputError: a library that pages need is not installed.
-        StorageError: as `Outputs.folder` and `Outputs.file`.
-    """
-    from vsacli.results.pages.document import plotting_library
-
-    plotting_library()
-    outputs.folder(folder)
-    return outputs.file(Path(folder) / f"{stem}.html")
-
-
-def page_asked_for(folder: str | None, file_format: str, stem: str, outputs: Outputs) -> Staged | None:
-    """Return the file of the page that `--plot` and `--format` request; None if they request no page.
-
-    Raises:
-        InputError, StorageError: as `staged_page`.
-    """
-    if folder is None or file_format != "html":
-        return None
-    return staged_page(folder, stem, outputs)
 
 
 def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:

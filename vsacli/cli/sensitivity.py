@@ -23,7 +23,8 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import FILE, HDF5_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Whole
 
@@ -77,12 +78,7 @@ def _share_or_file(context: click.Context, parameter: click.Parameter, text: str
 )
 @seed_option("draws of --monte-carlo")
 @click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time to this HDF5 file.")
-@click.option(
-    "--plot",
-    "folder",
-    type=FOLDER,
-    help="Save figures of the ranking and of the tolerance bands in this folder.",
-)
+@figure_options("--plot", purpose="Save figures of the ranking and of the tolerance bands in this folder.")
 @json_option
 @overwrite_option
 @talk_options
@@ -95,7 +91,7 @@ def sensitivity(
     runs: int | None,
     seed: int,
     output: str | None,
-    folder: str | None,
+    figures: FigureTarget | None,
     as_json: bool,
     overwrite: bool,
     talk: Talk,
@@ -113,8 +109,8 @@ def sensitivity(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
         found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
-        if folder is not None:
-            _draw(found, inputs.robot, folder, run_stem(robot, trajectory), outputs)
+        if figures is not None:
+            _draw(found, inputs.robot, figures, run_stem(robot, trajectory), outputs)
     say(found, as_json)
     talk.wrote(outputs)
 
@@ -165,15 +161,15 @@ def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
     return SensitivityWriter(file, run.robot, run.trajectory, numbers, run.slopes, provenance=provenance)
 
 
-def _draw(found: Sensitivity, robot: Robot, folder: str, stem: str, outputs: Outputs) -> None:
+def _draw(found: Sensitivity, robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> None:
     """Draw the ranking, and the bands of motor torques if tolerances are given."""
     from vsacli.results.charts.optimum import Torque, band_sheet
-    from vsacli.results.plots import Bar, FigureFiles, ranking_figure
+    from vsacli.results.plots import Bar, ranking_figure
 
     title = f"{found.robot}, {found.trajectory}"
     bars = [Bar(f"{each.words} of {each.path}", each.share, each.most[0]) for each in found.top if each.most]
     names = ["ranking"] if found.curves is None else ["ranking", "band"]
-    files = FigureFiles(names, folder, stem, "png", outputs)
+    files = target.files(names, stem, outputs)
     files.save({"ranking": ranking_figure(bars, title)})
     if found.curves is not None:
         time, values, deviation = found.curves

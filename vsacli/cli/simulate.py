@@ -26,7 +26,8 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import FILE, HDF5_FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, SHARE, Number, Numbers, Whole, Words
 
@@ -186,12 +187,7 @@ class Options(NamedTuple):
     help="Simulation file to write.",
     show_default="ROBOT-TRAJECTORY-simulation.h5 in the current folder",
 )
-@click.option(
-    "--plot",
-    "plot_folder",
-    type=FOLDER,
-    help="Save the figures of `vsacli plot` in this folder as well, as PNG.",
-)
+@figure_options("--plot", purpose="Save the figures of `vsacli plot` in this folder as well.")
 @json_option
 @overwrite_option
 @engine_option
@@ -201,7 +197,7 @@ def simulate(
     trajectory: str,
     changes: tuple[str, ...],
     output: str | None,
-    plot_folder: str | None,
+    figures: FigureTarget | None,
     as_json: bool,
     overwrite: bool,
     engine: str,
@@ -226,7 +222,7 @@ def simulate(
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
+        drawn = figures and _figures(inputs.robot, figures, path.stem, outputs)
         found = _run(partial(simulation, engine=engine, tell=talk.note), inputs.trajectory, talk)
         talk.detail(_computed_by(**found.provenance))
         provenance = {
@@ -238,23 +234,22 @@ def simulate(
         with SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance) as writer:
             writer.write(found.history)
             writer.finish(found.report.as_json())
-        if figures is not None:
+        if drawn is not None:
             from vsacli.cli.plot import draw_staged
 
-            draw_staged(file, figures, talk)
+            draw_staged(file, drawn, talk)
     code = _show(found.report, as_json)
     talk.wrote(outputs)
     return code
 
 
-def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFiles:
+def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> FigureFiles:
     from vsacli.results.charts.figures import simulation_drawings
-    from vsacli.results.plots import FigureFiles
 
     def drawn(variable: Variable) -> bool:
         return robot.has(variable) and any(any(joint.has(variable)) for joint in robot.joints)
 
-    return FigureFiles(simulation_drawings(drawn), folder, stem, "png", outputs)
+    return target.files(simulation_drawings(drawn), stem, outputs)
 
 
 def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:

@@ -17,7 +17,8 @@ from vsacli.cli.command_parts import (
     run_stem,
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
+from vsacli.cli.figure_options import FigureTarget, figure_options
+from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Words
 
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
     show_default="copper_loss if the catalog permits, else utilization",
 )
 @click.option("-o", "--output", type=YAML_FILE, help="Write the robot file with the chosen motors.")
-@click.option("--plot", "folder", type=FOLDER, help="Save a figure of torque over speed in this folder.")
+@figure_options("--plot", purpose="Save a figure of torque over speed in this folder.")
 @json_option
 @overwrite_option
 @talk_options
@@ -68,7 +69,7 @@ def size(
     gears: tuple[str, ...],
     minimize: str | None,
     output: str | None,
-    folder: str | None,
+    figures: FigureTarget | None,
     as_json: bool,
     overwrite: bool,
     talk: Talk,
@@ -105,22 +106,22 @@ def size(
             talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")
         elif output is not None:
             outputs.file(output).write_text(sized_text(loaded, found, Path(output).parent))
-        if folder is not None:
-            _draw(found, folder, run_stem(robot, trajectories[0]), outputs, talk)
+        if figures is not None:
+            _draw(found, figures, run_stem(robot, trajectories[0]), outputs, talk)
     say(found, as_json)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 
 
-def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs, talk: Talk) -> None:
+def _draw(found: Sizing, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> None:
     """Draw torque over speed for every motor with feasible samples."""
     motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
     if not motors:
         talk.note("nothing is drawn: no sample is feasible")
         return
-    from vsacli.results.plots import FigureFiles, torque_speed_figure
+    from vsacli.results.plots import torque_speed_figure
 
-    files = FigureFiles(["torque-speed"], folder, stem, "png", outputs)
+    files = target.files(["torque-speed"], stem, outputs)
     files.save({"torque-speed": torque_speed_figure(motors, found.title)})
 
 

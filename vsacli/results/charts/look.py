@@ -44,15 +44,13 @@ class Look:
     title: bool = True
 
     def __post_init__(self) -> None:
-        for words, value, (least, most), unit in (
-            ("width", self.width, SIZES, "cm"),
-            ("height", self.height, SIZES, "cm"),
-            ("font size", self.font_size, FONTS, "pt"),
+        for value, (least, most), unit in (
+            (self.width, SIZES, "cm"),
+            (self.height, SIZES, "cm"),
+            (self.font_size, FONTS, "pt"),
         ):
             if value is not None and not least <= value <= most:
-                raise InputError.one(
-                    f"the {words} must be from {least:g} to {most:g} {unit}, not {value:g} {unit}"
-                )
+                raise InputError.one(f"must be from {least:g} to {most:g} {unit}, not {value:g} {unit}")
 
     @property
     def scale(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import TypeAlias
@@ -76,22 +76,17 @@ class FigureFiles:
     """The files of figures, staged before the first figure is drawn.
 
     Args:
-        names: names of the figures.
-        folder: folder for the files; it is created if it does not exist.
-        stem: beginning of the file names.
-        file_format: one of `FORMATS`.
+        paths: paths by name of the figure, whose endings are the formats; folders are created.
         outputs: output files of the command.
 
     Raises:
         StorageError: as `Outputs.folder` and `Outputs.file`.
     """
 
-    def __init__(
-        self, names: Iterable[str], folder: str | Path, stem: str, file_format: str, outputs: Outputs
-    ) -> None:
-        outputs.folder(folder)
-        self._format = file_format
-        self._files = {name: outputs.file(Path(folder) / f"{stem}-{name}.{file_format}") for name in names}
+    def __init__(self, paths: Mapping[str, Path], outputs: Outputs) -> None:
+        for folder in dict.fromkeys(path.parent for path in paths.values()):
+            outputs.folder(folder)
+        self._files = {name: outputs.file(path) for name, path in paths.items()}
 
     def save(self, figures: Mapping[str, Figure | Sheet]) -> None:
         """Save figures by name; draw sheets first.
@@ -101,7 +96,8 @@ class FigureFiles:
         """
         for name, figure in figures.items():
             shown = drawn(figure) if isinstance(figure, Sheet) else figure
-            self._files[name].write_bytes(_rendered(shown, self._format))
+            file = self._files[name]
+            file.write_bytes(_rendered(shown, file.path.suffix.removeprefix(".")))
 
 
 def save_figures(
@@ -121,7 +117,8 @@ def save_figures(
         StorageError: a file exists and `overwrite` is false, or the folder cannot be written to.
     """
     with Outputs(overwrite=overwrite) as outputs:
-        FigureFiles(figures, folder, stem, file_format, outputs).save(figures)
+        paths = {name: Path(folder) / f"{stem}-{name}.{file_format}" for name in figures}
+        FigureFiles(paths, outputs).save(figures)
     return outputs.paths
 
 
