@@ -133,44 +133,26 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
     columns = np.flatnonzero(there.any(axis=0)).tolist()
     signals = charts.signals({name: "computed"})
 
-    def panel(group: Sequence[int], column: int) -> Chart | None:
+    def panels(group: Sequence[int], column: int) -> tuple[Chart | None, Chart | None]:
         present = [joint for joint in group if there[joint, column]]
         if not present:
-            return None
-        chart = charts.chart(name, signals, column, present)
+            return None, None
+        chart, used = charts.with_utilization(charts.chart(name, signals, column, present), column)
         axis = axis_label(words, chart.unit, charts.first.joint_types[group[0]], column)
-        return replace(chart, axis=axis, failures=[(each, group) for each in charts.failures])
+        failures = [(each, group) for each in charts.failures]
+        return replace(chart, axis=axis, failures=failures), used
 
-    rows: list[Row] = [[panel(group, column) for column in columns] for group in groups]
-    used: list[Row] = [
-        [
-            charts.utilization(chart, column) if chart and len(group) > 1 else None
-            for chart, column in zip(row, columns, strict=True)
-        ]
-        for row, group in zip(rows, groups, strict=True)
-    ]
+    rows: list[Row] = []
+    for group in groups:
+        rows += zip(*(panels(group, column) for column in columns), strict=True)
     beside: list[Legend] = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
-    heights: tuple[float, ...] = (1.0,)
-    if any(chart for row in used for chart in row):
-        heights = (1.0, UTILIZATION)
-        rows = [row for pair in zip(map(_without_limits, rows, used), used, strict=True) for row in pair]
+    heights: tuple[float, ...] = (1.0, UTILIZATION)
+    if any(chart for row in rows[1::2] for chart in row):
         beside = [legend for each in beside for legend in (each, {})]
-    return Block(
-        charts.first.time, rows, heights=heights, beside=beside if named and legend_width(charts) else ()
-    )
-
-
-def _without_limits(row: Row, used: Row) -> Row:
-    """Return charts without the limits whose utilization is drawn below."""
-    return [
-        replace(
-            chart,
-            limits=[each for each in chart.limits if each.joint not in {line.joint for line in below.lines}],
-        )
-        if chart and below
-        else chart
-        for chart, below in zip(row, used, strict=True)
-    ]
+    else:
+        rows, heights = rows[::2], (1.0,)
+    named = named and legend_width(charts) > 0
+    return Block(charts.first.time, rows, heights=heights, beside=beside if named else ())
 
 
 def legend_width(charts: StoredCharts) -> float:

@@ -193,7 +193,19 @@ class StoredCharts:
             note=self._undefined(lines),
         )
 
-    def utilization(self, chart: Chart, column: int) -> Chart | None:
+    def with_utilization(self, chart: Chart, column: int) -> tuple[Chart, Chart | None]:
+        """Return a chart, and the utilization of its limits if several joints share the chart.
+
+        Limits of several joints could not be told apart; the chart is returned without those that the
+        utilization shows.
+        """
+        used = self._utilization(chart, column) if len({line.joint for line in chart.lines}) > 1 else None
+        if used is None:
+            return chart, None
+        elsewhere = {line.joint for line in used.lines}
+        return replace(chart, limits=[each for each in chart.limits if each.joint not in elsewhere]), used
+
+    def _utilization(self, chart: Chart, column: int) -> Chart | None:
         """Return the utilization of the limits of a chart; None if no joint has a lower and an upper limit.
 
         0 % is the middle between both limits, 100 % either of them, so that all joints share one limit line.
@@ -290,7 +302,10 @@ class StoredCharts:
         if roles:
             signals = self.signals(roles)
             for column, title, joints in columns:
-                charts.append(replace(self.chart(name, signals, column, joints), title=title))
+                chart, used = self.with_utilization(self.chart(name, signals, column, joints), column)
+                charts.append(replace(chart, title=title))
+                if used is not None:
+                    charts.append(replace(used, title=f"{title}: utilization of limits"))
         for outcome in roles if len(self.files) > 1 else ():
             apart = self.differences(outcome)
             for column, title, joints in columns:

@@ -88,14 +88,14 @@ vsacli.charts = (() => {
       }
       if (low > high) return { start: 0, end: 1 };
       const height = high - low || Math.abs(high) || 1;
-      const near = this.chart.limits.filter(({ joint, value }) => state.joints.has(joint)
+      const near = this.chart.limits.filter(({ joint, value }) => (joint === null || state.joints.has(joint))
         && value > low - NEAR * height && value < high + NEAR * height).map(({ value }) => value);
       return { start: Math.min(low, ...near) - ROOM * height, end: Math.max(high, ...near) + ROOM * height };
     }
 
     addLimits() {
       this.limits = this.chart.limits.map(({ joint, value }) => ({ joint, line: this.figure.hspan([value], {
-        line_color: curveColor(joint), line_dash: "dotted", line_width: 1.2 }) }));
+        line_color: joint === null ? color("soft") : curveColor(joint), line_dash: "dotted", line_width: 1.2 }) }));
     }
 
     follow() {
@@ -135,7 +135,7 @@ vsacli.charts = (() => {
       });
       this.keys.forEach((key) => key.classList.toggle("hidden", !key.querySelector(".key:not(.hidden)")));
       for (const { series, drawn } of this.curves || []) drawn.forEach((each) => { each.visible = vsacli.shown(series); });
-      for (const { joint, line } of this.limits || []) line.visible = state.joints.has(joint);
+      for (const { joint, line } of this.limits || []) line.visible = joint === null || state.joints.has(joint);
       this.reset();
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vsacli.base.json_records import json_value
-from vsacli.results.charts.chart import ATTAINABLE, Band, Chart
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart
 
 BEYOND = 5.0
 """Height up to which the attainable range extends beyond the initial view, in heights of that view."""
@@ -67,7 +67,10 @@ class Packed:
             "name": chart.name,
             "unit": chart.unit,
             "series": series,
-            "limits": [{"joint": limit.joint, "value": limit.value} for limit in chart.limits],
+            "limits": [
+                {"joint": None if limit.look == LIMIT_LOOK else limit.joint, "value": limit.value}
+                for limit in chart.limits
+            ],
             "shown": chart.shown,
             "band": chart.band if any(line.band for line in chart.lines) else "",
             "note": "; ".join(filter(None, [CUT_OFF if chart.cut_off else "", chart.note])),
