@@ -66,9 +66,9 @@ def numbers(
         raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
 
 
-def example(command: str) -> str:
-    """Return the epilog of a help text: a command line that works."""
-    return f"\b\nExample:\n  {command}"
+def example(*commands: str) -> str:
+    """Return the epilog of a help text: command lines that work."""
+    return "\n  ".join(["\b\nExample:", *commands])
 
 
 robot_argument = click.argument("robot", type=FILE)
