@@ -83,10 +83,13 @@ def test_every_kind_and_mechanism_of_any_number_of_joints(
         assert verdict_of(letter * count, actuator, tmp_path) == "ok"
 
 
-@pytest.mark.parametrize("second", EVERY_ACTUATOR)
-@pytest.mark.parametrize("first", [slow(actuator) for actuator in EVERY_ACTUATOR])
-def test_every_kind_and_mechanism_carries_every_other_one(first: str, second: str, tmp_path: Path) -> None:
-    assert verdict_of("RRR", ("rigid", first, second), tmp_path) == "ok"
+@pytest.mark.parametrize("actuator", [slow(actuator) for actuator in EVERY_ACTUATOR])
+def test_every_kind_and_mechanism_carries_every_other_one(actuator: str, tmp_path: Path) -> None:
+    """The second joint of an arm carries most."""
+    for start in range(0, len(EVERY_ACTUATOR), 6):
+        first, *others = EVERY_ACTUATOR[start : start + 6]
+        arm = (first, actuator, *others)
+        assert verdict_of("R" * len(arm), arm, tmp_path) == "ok", arm
 
 
 def test_tendons_are_the_laws_that_only_pull() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.types import StringParamType
 
 from vsacli.actuators.kinds import ACTUATORS, kind_and_mechanism, mechanisms_of
 from vsacli.actuators.mechanisms import MECHANISMS
@@ -44,7 +45,7 @@ class _JointOption(NamedTuple):
     actuator: str
 
 
-class _ActuatorType(click.ParamType):
+class _ActuatorType(StringParamType):
     """`KIND` or `KIND:MECHANISM`, with shell completion."""
 
     name = "actuator"
