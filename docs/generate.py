@@ -25,7 +25,11 @@ from page_images import draw_images
 from python_names import public_names
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.laws import LAWS
+from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli.actuators.serial import Serial
 from vsacli.base.flags import Flag
 from vsacli.base.renamed import RENAMINGS
 from vsacli.base.signals import COMMANDED, POSITION
@@ -49,6 +53,17 @@ from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
+
+MECHANISM_WORDS = {
+    "awas": "AwAS arm",
+    "lever": "lever",
+    "variable_ratio": "variable ratio",
+    "maccepa": "MACCEPA",
+    "potential": "energy formula",
+    "cam": "cam disk",
+    "shifted_cams": "shifted cams",
+}
+"""Mechanisms of serial actuators in words."""
 
 HELP_WIDTH = 80
 END = "<!-- end of generated part -->"
@@ -217,13 +232,21 @@ def robots() -> str:
 
 def _robot_row(example: Example) -> tuple[str, ...]:
     joints = example.robot.joints
-    kinds = Counter(joint.actuator_type for joint in joints)
+    kinds = Counter(_actuator_words(joint.actuator) for joint in joints)
     return (
         _link(example.path),
         "".join("R" if joint.is_revolute else "P" for joint in joints),
         ", ".join(f"{count} {kind}" for kind, count in kinds.items()),
         ", ".join(_link(each.path) for each in example.trajectories),
     )
+
+
+def _actuator_words(actuator: Actuator) -> str:
+    """The kind, and of a serial actuator its mechanism instead, with a link to its section."""
+    if not isinstance(actuator, Serial):
+        return ACTUATORS.name_of(type(actuator))
+    name = MECHANISMS.name_of(type(actuator.mechanism))
+    return f"[{MECHANISM_WORDS[name]}](serial.md#{name})"
 
 
 def _link(path: Path) -> str:

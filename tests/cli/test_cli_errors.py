@@ -227,7 +227,8 @@ def test_what_a_library_prints_never_goes_into_a_file(tmp_path):
         "from vsacli.cli.main import main; main()"
     )
     done = shell(f'{sys.executable} -c "{code}" <&- >&-', tmp_path)
-    assert (done.returncode, done.stderr) == (0, "wrote arm.yaml\n")
+    following = "next: vsacli new trajectory --robot arm.yaml -o move.yaml\n"
+    assert (done.returncode, done.stderr) == (0, f"wrote arm.yaml\n{following}")
 
 
 @pytest.mark.parametrize(

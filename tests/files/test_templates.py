@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,8 @@ from samples.command_line import REPOSITORY, contents
 from samples.marks import slow
 
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
-from vsacli.cli.new import new
 from vsacli.documents.commented import WIDTH
 from vsacli.documents.fields import OneOf, Pair, Record, declared
 from vsacli.files.templates import MOST_JOINTS, robot_template, trajectory_template
@@ -52,15 +49,6 @@ def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp
     assert robot.warnings == (OF_PLACEHOLDERS,)
     report = report_of(robot, trajectory_template(robot), tmp_path)
     assert (report.verdict, report.warnings) == ("ok", (OF_PLACEHOLDERS,))
-
-
-@pytest.mark.parametrize("mechanism", MECHANISMS)
-def test_a_serial_robot_can_be_had_with_each_mechanism(mechanism: str, tmp_path: Path) -> None:
-    # a cam needs its profile beside it
-    shutil.copy(REPOSITORY / "robots" / "cam_profile.csv", tmp_path)
-    robot = robot_of(robot_template("RR", mechanism), tmp_path)
-    assert {joint.actuator_type for joint in robot.joints} == {"serial"}
-    assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
 
 
 def test_a_mechanism_that_turns_drives_no_slide(tmp_path: Path) -> None:
@@ -176,23 +164,35 @@ def test_lines_are_not_too_long() -> None:
         assert max(map(len, text.splitlines())) <= WIDTH + 10  # further joints stand on a line each
 
 
-def test_every_kind_of_actuator_can_be_had() -> None:
-    robot_command = new.commands["robot"]
-    (option,) = (each for each in robot_command.params if each.name == "actuator")
-    assert {*ACTUATORS, *MECHANISMS} == set(option.type.choices)
-
-
-@pytest.mark.parametrize("joints", ["", "X", "RRX", "R R", "R" * (MOST_JOINTS + 1)])
-def test_letters_that_are_no_joints(joints: str) -> None:
-    with pytest.raises(
-        InputError, match=r"joints: expected 1 to 100 letters R \(revolute\) and P \(prismatic\)"
-    ):
+@pytest.mark.parametrize(
+    ("joints", "hint"),
+    [
+        ("", "found ''"),
+        ("RRX", "found 'RRX'"),
+        ("R R", "found 'R R'"),
+        ("6", "for 6 revolute joints: --joints RRRRRR"),
+        ("1", "for 1 revolute joint: --joints R"),
+        ("500", "found '500'"),
+    ],
+)
+def test_letters_that_are_no_joints(joints: str, hint: str) -> None:
+    with pytest.raises(InputError) as error:
         robot_template(joints)
+    expected = "expected a letter for each joint, R (revolute) or P (prismatic), e.g. RRP for 3 joints"
+    assert str(error.value) == f"{expected}; {hint}"
+
+
+def test_too_many_joints() -> None:
+    with pytest.raises(InputError, match="expected at most 100 joints, found 101"):
+        robot_template("R" * (MOST_JOINTS + 1))
+
+
+NEXT_OF_ROBOT = "next: vsacli new trajectory --robot arm.yaml -o move.yaml\n"
 
 
 def test_files_are_written_and_never_replaced_by_accident(vsacli: Any, tmp_path: Path) -> None:
     done = vsacli("new", "robot", "--joints", "RP", "-o", "arm.yaml")
-    assert (done.code, done.out, done.err) == (0, "", "wrote arm.yaml\n")
+    assert (done.code, done.out, done.err) == (0, "", f"wrote arm.yaml\n{NEXT_OF_ROBOT}")
     assert (tmp_path / "arm.yaml").read_text() == robot_template("RP")
     before = contents(tmp_path)
     again = vsacli("new", "robot", "--joints", "R", "-o", "arm.yaml")
@@ -211,8 +211,12 @@ def test_from_nothing_to_torques(vsacli: Any) -> None:
 
 
 def test_standard_output_is_the_file(vsacli: Any) -> None:
-    assert vsacli("new", "robot", "--joints", "RP").out == robot_template("RP")
-    assert vsacli("new", "trajectory").out == trajectory_template()
+    robot, trajectory = vsacli("new", "robot", "--joints", "RP"), vsacli("new", "trajectory")
+    assert (robot.out, robot.err) == (robot_template("RP"), NEXT_OF_ROBOT)
+    assert (trajectory.out, trajectory.err) == (
+        trajectory_template(),
+        "next: vsacli invdyn arm.yaml move.yaml\n",
+    )
 
 
 def test_a_robot_that_cannot_be_read(vsacli: Any) -> None:

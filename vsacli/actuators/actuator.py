@@ -127,8 +127,13 @@ class Actuator(ABC):
 
     @classmethod
     @abstractmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return plausible values of the fields, for a new robot file."""
+    def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
+        """Return plausible values of the fields, for a new robot file.
+
+        Args:
+            joint_type: Type of the joint.
+            mechanism: Mechanism or spring law, one of `mechanisms_of` this kind; by default the usual one.
+        """
 
     @classmethod
     @abstractmethod

@@ -28,11 +28,6 @@ from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, Pair, Record, check_fields, choice, value
 from vsacli.documents.source import Source
 
-EXAMPLE_SPRING = {
-    "revolute": {"type": "cubic", "k": 400, "k_c": 2000},
-    "prismatic": {"type": "cubic", "k": 4000, "k_c": 200000},
-}
-
 
 @dataclass(frozen=True)
 class Antagonistic(Actuator):
@@ -84,9 +79,11 @@ class Antagonistic(Actuator):
         return self.pair.laws
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return equal motors and springs on both sides."""
-        return {"motor": Motor.example(joint_type), "spring": EXAMPLE_SPRING[joint_type]}
+    def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
+        """Return equal motors and springs on both sides, by default cubic springs."""
+        law = mechanism or "cubic"
+        spring = {"type": law, **LAWS[law].examples[joint_type]}
+        return {"motor": Motor.example(joint_type), "spring": spring}
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:

@@ -66,9 +66,12 @@ class Elastic(Actuator):
         return Polynomial(c1=self.stiffness)
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return a motor and a linear spring."""
-        return {"motor": Motor.example(joint_type), "stiffness": EXAMPLE_STIFFNESS[joint_type]}
+    def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
+        """Return a motor and a spring: a linear one, or one of the law."""
+        motor = Motor.example(joint_type)
+        if mechanism is None:
+            return {"motor": motor, "stiffness": EXAMPLE_STIFFNESS[joint_type]}
+        return {"motor": motor, "spring": {"type": mechanism, **LAWS[mechanism].examples[joint_type]}}
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:

@@ -29,7 +29,7 @@ class Rigid(Actuator):
         check_fields(self)
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:
+    def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:  # noqa: ARG003
         """Return a motor."""
         return {"motor": Motor.example(joint_type)}
 

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shlex
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.types import StringParamType
 
-from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS, kind_and_mechanism, mechanisms_of
 from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
+<<<<<<< HEAD
 from vsacli.cli.command_parts import example, overwrite_option, read_robot
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Words
+=======
+from vsacli.base.texts import counted
+from vsacli.cli.command_parts import example, overwrite_option
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.input_errors import naming_option
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+>>>>>>> w-G
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
@@ -30,40 +46,167 @@ def new() -> None:
     """Create a commented robot or trajectory file as a starting point."""
 
 
+class _JointOption(NamedTuple):
+    """A joint as given by `--joint`."""
+
+    name: str
+    actuator: str
+
+
+class _ActuatorType(StringParamType):
+    """`KIND` or `KIND:MECHANISM`, with shell completion."""
+
+    name = "actuator"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See `click.ParamType.convert`."""
+        try:
+            kind_and_mechanism(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
+        return value
+
+    def shell_complete(
+        self, _context: click.Context, _parameter: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Complete names of kinds and mechanisms."""
+        from click.shell_completion import CompletionItem
+
+        of_kinds = (f"{kind}:{each}" for kind in ACTUATORS for each in mechanisms_of(kind))
+        names = (*ACTUATORS, *MECHANISMS, *of_kinds)
+        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+
+
+class _JointType(_ActuatorType):
+    """`NAME:KIND` or `NAME:KIND:MECHANISM`."""
+
+    name = "joint"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See `click.ParamType.convert`."""
+        if isinstance(value, _JointOption):
+            return value
+        name, colon, actuator = value.partition(":")
+        if not (name and colon and actuator):
+            expected = "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever"
+            self.fail(f"{expected}, found {value!r}", param, ctx)
+        from vsacli.documents.fields import Text
+
+        if fault := Text(identifier=True).fault(name):
+            self.fail(f"the name {fault}", param, ctx)
+        return _JointOption(name, super().convert(actuator, param, ctx))
+
+    def shell_complete(
+        self, context: click.Context, parameter: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Complete the actuator behind the name."""
+        from click.shell_completion import CompletionItem
+
+        name, colon, actuator = incomplete.partition(":")
+        found = super().shell_complete(context, parameter, actuator) if colon else []
+        return [CompletionItem(f"{name}:{each.value}") for each in found]
+
+
 @new.command(
     "robot",
     short_help="Write a robot file with given joints.",
-    epilog=example("vsacli new robot --joints RRP -o arm.yaml"),
+    epilog=example(
+        "vsacli new robot --joints RRP -o arm.yaml",
+        "vsacli new robot --joint base:rigid --joint elbow:serial:lever -o arm.yaml",
+    ),
 )
 @click.option(
     "--joints",
     metavar="LETTERS",
-    required=True,
     help="Type of each joint from the base to the tip: R (revolute) or P (prismatic), e.g. RRP.",
+    show_default="R for each --joint",
 )
 @click.option(
     "--actuator",
+<<<<<<< HEAD
     type=Words((*ACTUATORS, *MECHANISMS)),
     default="antagonistic",
     show_default=True,
     help="Kind of actuator of every joint, or mechanism of serial actuators.",
+=======
+    metavar="KIND[:MECHANISM]",
+    type=_ActuatorType(),
+    help="Actuator of every joint, as in --joint.",
+    show_default="antagonistic",
+)
+@click.option(
+    "--joint",
+    "chosen",
+    metavar="NAME:KIND[:MECHANISM]",
+    type=_JointType(),
+    multiple=True,
+    help="Name and actuator of one joint, from the base to the tip; may be repeated. "
+    f"KIND: {', '.join(ACTUATORS)}. MECHANISM: of serial actuators {', '.join(MECHANISMS)}; of antagonistic "
+    "and elastic ones a spring law such as cubic, sinh or table (docs/springs.md).",
+>>>>>>> w-G
 )
 @_output_option
 @overwrite_option
 @talk_options
-def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk: Talk) -> None:
+def robot(
+    joints: str | None,
+    actuator: str | None,
+    chosen: tuple[_JointOption, ...],
+    output: str | None,
+    overwrite: bool,
+    talk: Talk,
+) -> None:
     """Write a robot file with these joints, to be edited.
 
-    The file is complete and can be used as it is; a profile that it refers to is written next to it. Each key
-    has a comment, and optional keys are commented out. Reports mark its springs and motors as placeholders
-    until the key `placeholder` is removed.
+    Give --joints for joints with equal actuators, or --joint once for each joint of a mixed arm. These
+    are revolute, unless --joints has a letter for each as well.
+
+    The file is complete and can be used as it is; tables that it refers to are written next to it. Each key
+    has a comment where it occurs first, also on where to find its value, and optional keys are commented
+    out. Reports mark its springs and motors as placeholders until the key `placeholder` is removed.
     """
     from vsacli.files.examples import example_tables
     from vsacli.files.templates import robot_template
 
+<<<<<<< HEAD
     with naming_option("--joints"):
         text = robot_template(joints, actuator)
+=======
+    letters = _letters(joints, actuator, chosen)
+    with naming_option("--joint" if joints is None else "--joints"):
+        if chosen:
+            text = robot_template(letters, [each.actuator for each in chosen], [each.name for each in chosen])
+        else:
+            text = robot_template(letters, actuator or "antagonistic")
+>>>>>>> w-G
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
+    talk.note(f"next: vsacli new trajectory --robot {_file(output, 'arm.yaml')} -o move.yaml")
+
+
+def _letters(joints: str | None, actuator: str | None, chosen: Sequence[_JointOption]) -> str:
+    """Return the letter of each joint.
+
+    Raises:
+        click.UsageError: options are missing, or contradict each other.
+    """
+    if not chosen:
+        if joints is None:
+            raise click.UsageError("give --joints, e.g. --joints RRP, or --joint for each joint")
+        return joints
+    if actuator is not None:
+        raise click.UsageError(
+            "--actuator is that of every joint, but --joint names one for each joint; leave out one of both"
+        )
+    names = Counter(each.name for each in chosen)
+    if repeated := [name for name, count in names.items() if count > 1]:
+        raise click.UsageError(f"--joint: the name {repeated[0]!r} is given twice; each joint has its own")
+    if joints is not None and len(joints) != len(chosen):
+        letters, times = counted(len(joints), "letter"), counted(len(chosen), "time")
+        raise click.UsageError(
+            f"--joints has {letters}, but --joint is given {times}; give a letter for each --joint, or "
+            "leave out --joints if all are revolute"
+        )
+    return joints or "R" * len(chosen)
 
 
 @new.command(
@@ -92,6 +235,12 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     robot = None if robot_path is None else read_robot(robot_path, argument="--robot")
     inputs = () if robot is None else [source.path for source in robot.sources]
     _write(trajectory_template(robot), output, overwrite, talk, inputs)
+    talk.note(f"next: vsacli invdyn {_file(robot_path, 'arm.yaml')} {_file(output, 'move.yaml')}")
+
+
+def _file(path: str | None, usual: str) -> str:
+    """Return a path as a word of a shell command; the usual one for a standard stream."""
+    return shlex.quote(usual if path is None or path == STANDARD else path)
 
 
 def _write(

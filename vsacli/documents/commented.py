@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.base.units import DIMENSIONLESS
@@ -38,7 +39,13 @@ class _Line(NamedTuple):
         return self._replace(text=indent + self.text)
 
 
-def commented_document(format_name: str, cls: type, values: Values, head: Iterable[str] = ()) -> str:
+def commented_document(
+    format_name: str,
+    cls: type,
+    values: Values,
+    head: Iterable[str] = (),
+    sources: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Return a document of the record class `cls`.
 
     Args:
@@ -46,8 +53,9 @@ def commented_document(format_name: str, cls: type, values: Values, head: Iterab
         cls: record class of the whole document.
         values: values of every required field, and of the optional fields to set.
         head: lines of the comment at the top.
+        sources: where a reader finds the value of a field, by `Class.field`; each text is said once.
     """
-    lines = [_Line(f"format: {format_name}"), *_record(cls, values, "")]
+    lines = [_Line(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
     return "\n".join([*comments, *(text for line in lines for text in _rendered(line))]) + "\n"
 
@@ -65,55 +73,100 @@ def _rendered(line: _Line) -> Iterator[str]:
         yield text
 
 
-def _record(cls: type, values: Values, variant: str) -> Iterator[_Line]:
-    """Yield all fields of a record; fields without a value are inactive and show their defaults."""
-    variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
-    for name, (field, default) in declared(cls).items():
-        comment = _comment(field, variant)
-        if name in values:
-            yield from _field(field.kind, name, values[name], comment, variant)
-        elif default is REQUIRED:
-            raise KeyError(f"{cls.__name__} needs a value of {name}")
-        elif isinstance(field.kind, Record):
-            example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
-            lines = _field(field.kind, name, example, comment, variant)
-            yield from (line._replace(active=False) for line in lines)
-        else:
-            yield _Line(f"{name}: {_default(default)}".rstrip(), comment, active=False)
+class _Commented:
+    """Lines of records. Of a list of records the first has all keys; the others explain only what is new.
 
+    Args:
+        sources: where a reader finds the value of a field, by `Class.field`.
+    """
 
-def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
-    """Yield a field for a value in the form used in files; nested fields are indented."""
-    match kind:
-        case Pair(item):
-            yield from _field(item, name, value, comment, variant)
-        case Record(cls):
-            yield _Line(f"{name}:", comment)
-            yield from (line.inside() for line in _record(cls, value, variant))
-        case OneOf(variants):
-            chosen = value["type"]
-            others = [word for word in variants if word != chosen]
-            yield _Line(f"{name}:", comment)
-            yield _Line(f"type: {chosen}", f"or {', '.join(others)}" if others else "").inside()
-            yield from (line.inside() for line in _record(variants[chosen], value, variant))
-        case Items() if kind.records or isinstance(value[0], list):
-            yield _Line(f"{name}:", comment)
-            yield from _entries(kind, value, variant)
-        case _:
+    def __init__(self, sources: Mapping[str, str]) -> None:
+        self._sources = sources
+        self._said: set[str] = set()
+        self._explained: set[tuple[type, str]] = set()
+        self._again = False
+
+    def record(self, cls: type, values: Values, variant: str) -> Iterator[_Line]:
+        """Yield all fields of a record; fields without a value are inactive and show their defaults."""
+        variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
+        for name, (field, default) in declared(cls).items():
+            known = self._again and (cls, name) in self._explained
+            self._explained.add((cls, name))
+            comment = "" if known else self._comment(cls, name, field, variant)
+            if name in values:
+                yield from self._given(field.kind, name, values[name], comment, variant)
+            elif default is REQUIRED:
+                raise KeyError(f"{cls.__name__} needs a value of {name}")
+            elif not known:
+                yield from self._optional(field, name, default, comment, variant)
+
+    def _given(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+        """Yield a field with a value, in one line if all inside is explained already."""
+        first, *inside = self._field(kind, name, value, comment, variant)
+        if inside and self._again and all(line.active and not line.comment for line in inside):
             yield _Line(f"{name}: {on_one_line(value)}", comment)
+        else:
+            yield first
+            yield from inside
 
+    def _optional(self, field: Field, name: str, default: Any, comment: str, variant: str) -> Iterator[_Line]:
+        """Yield a field without a value, inactive; of a record its example."""
+        if not isinstance(field.kind, Record):
+            yield _Line(f"{name}: {_default(default)}".rstrip(), comment, active=False)
+            return
+        example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
+        lines = self._given(field.kind, name, example, comment, variant)
+        yield from (line._replace(active=False) for line in lines)
 
-def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
-    """Yield lists as one line each; of records, the first with all keys and the others with the keys set."""
-    if not kind.records:
-        yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
-        return
-    first, *others = values
-    entries = [list(_record(kind.records[""], first, variant))]
-    entries += [[_Line(f"{key}: {on_one_line(each)}") for key, each in other.items()] for other in others]
-    for head, *rest in entries:
-        yield head.inside("- ").inside()
-        yield from (line.inside().inside() for line in rest)
+    def _field(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+        """Yield a field for a value in the form used in files; nested fields are indented."""
+        match kind:
+            case Pair(item):
+                yield from self._field(item, name, value, comment, variant)
+            case Record(cls):
+                yield _Line(f"{name}:", comment)
+                yield from (line.inside() for line in self.record(cls, value, variant))
+            case OneOf(variants):
+                chosen = value["type"]
+                others = ", ".join(word for word in variants if word != chosen)
+                yield _Line(f"{name}:", comment)
+                yield _Line(f"type: {chosen}", f"or {others}" if others and comment else "").inside()
+                yield from (line.inside() for line in self.record(variants[chosen], value, variant))
+            case Items() if kind.records or isinstance(value[0], list):
+                yield _Line(f"{name}:", comment)
+                yield from self._entries(kind, value, variant)
+            case _:
+                yield _Line(f"{name}: {on_one_line(value)}", comment)
+
+    def _entries(self, kind: Items, values: Any, variant: str) -> Iterator[_Line]:
+        """Yield lists as one line each, and the keys of records."""
+        if not kind.records:
+            yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
+            return
+        outside = self._again
+        for value in values:
+            head, *rest = self.record(kind.records[""], value, variant)
+            yield head.inside("- ").inside()
+            yield from (line.inside().inside() for line in rest)
+            self._again = True
+        self._again = outside
+
+    def _comment(self, cls: type, name: str, field: Field, variant: str) -> str:
+        """Return unit and meaning of a field, its forms where they are not obvious, and its source."""
+        unit = field.quantity.unit(variant) if variant else str(field.quantity)
+        match field.kind:
+            case Choice(options=options):
+                forms = f" ({' or '.join(options)})"
+            case Interval():
+                forms = " ([lower, upper] or one number)"
+            case _:
+                forms = ""
+        meaning = f"{field.doc}{forms}" if unit == str(DIMENSIONLESS) else f"{unit}; {field.doc}{forms}"
+        source = self._sources.get(f"{cls.__name__}.{name}", "")
+        if not source or source in self._said:
+            return meaning
+        self._said.add(source)
+        return f"{meaning}. {source}"
 
 
 def _default(default: Any) -> str:
@@ -122,16 +175,3 @@ def _default(default: Any) -> str:
     if all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
         return on_one_line(default)
     return default if isinstance(default, str) else ""
-
-
-def _comment(field: Field, variant: str) -> str:
-    """Return unit and meaning of a field, and its forms where they are not obvious."""
-    unit = field.quantity.unit(variant) if variant else str(field.quantity)
-    match field.kind:
-        case Choice(options=options):
-            forms = f" ({' or '.join(options)})"
-        case Interval():
-            forms = " ([lower, upper] or one number)"
-        case _:
-            forms = ""
-    return f"{field.doc}{forms}" if unit == str(DIMENSIONLESS) else f"{unit}; {field.doc}{forms}"

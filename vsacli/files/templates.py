@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from vsacli.actuators.kinds import example
 from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
+from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.commented import WIDTH, commented_document
+from vsacli.documents.expression import BOOLEANS
+from vsacli.dynamics.forward import mass_matrix
+from vsacli.files.data_sheets import SOURCES
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.robot import file as robot_file
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -67,6 +75,12 @@ Values = dict[str, Any]
 
 TYPES = {"R": "revolute", "P": "prismatic"}
 MOST_JOINTS = 100
+MOST_SPELLED_OUT = 12
+"""Largest number of joints for which an error shows the letters."""
+
+SHORTER, LIGHTER, TAPERED = 0.8, 0.7, 6
+"""Length and mass of a link relative to those of the link before it, up to this many links."""
+
 ROBOT_HEAD = (
     "A robot to begin with. Replace the numbers by those of yours, then remove `placeholder`. What stands",
     "commented out is optional and shown with its default. Numbers are SI; expressions such as pi/2 and",
@@ -92,6 +106,9 @@ STROKE_OF_MOTION = 0.1
 PEAK_TO_MEAN_VELOCITY = 2.5
 """Peak velocity of the motion, relative to its mean, rounded up."""
 
+PEAK_ACCELERATION = 10.0
+"""Peak acceleration of the motion, relative to its length over the square of its duration, rounded up."""
+
 USED_SHARE = 0.5
 """Fraction of a range or limit that the motion uses."""
 
@@ -99,45 +116,81 @@ START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
 """Stiffness at both ends relative to the minimum attainable one, if there is no maximum."""
 
 
-def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-robot") -> str:
+def robot_template(
+    joints: str,
+    actuators: str | Sequence[str] = "antagonistic",
+    joint_names: Sequence[str] = (),
+    name: str = "my-robot",
+) -> str:
     """Return the text of a robot file.
 
     Args:
         joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
-        actuator: kind of actuator of every joint, or mechanism of serial ones.
+        actuators: `KIND` or `KIND:MECHANISM` of every joint, or of each joint.
+        joint_names: name of each joint; by default joint_1, joint_2 and so on.
         name: name of the robot.
 
     Raises:
-        InputError: there are other letters, none, or too many; or the mechanism does not suit such joints.
+        InputError: there are other letters, none, or too many; or an actuator does not suit its joint.
     """
-    kinds = [TYPES.get(letter, "") for letter in joints.upper()]
-    if not all(kinds) or not 0 < len(kinds) <= MOST_JOINTS:
-        expected = f"1 to {MOST_JOINTS} letters R (revolute) and P (prismatic), e.g. RRP"
-        raise InputError.one(f"expected {expected}, found {joints[:MOST_JOINTS]!r}")
+    types = _joint_types(joints)
+    each = [actuators] * len(types) if isinstance(actuators, str) else actuators
+    names = joint_names or [f"joint_{number}" for number in range(1, len(types) + 1)]
+    chosen = zip(names, types, each, strict=True)
     values = {
         "name": name,
         "placeholder": True,
         "gravity": [0, 0, -9.81],
-        "joints": [_joint(number, kind, actuator) for number, kind in enumerate(kinds, 1)],
+        "joints": [_joint(number, *joint) for number, joint in enumerate(chosen)],
     }
-    return commented_document(robot_file.FORMAT, robot_file.RobotFile, values, ROBOT_HEAD)
+    return commented_document(robot_file.FORMAT, robot_file.RobotFile, values, ROBOT_HEAD, SOURCES)
 
 
-def _joint(number: int, joint_type: str, actuator: str) -> Values:
-    """Return a joint; the axis of the first joint is vertical, those of all others are horizontal."""
-    alpha: Any = "pi/2" if number == 1 else 0
-    link = {"mass": 2.0, "inertia": {"xx": 0.002, "yy": 0.015, "zz": 0.015}}
+def _joint_types(letters: str) -> list[str]:
+    types = [TYPES.get(letter, "") for letter in letters.upper()]
+    if len(types) > MOST_JOINTS:
+        raise InputError.one(f"expected at most {MOST_JOINTS} joints, found {len(types)}")
+    if not types or not all(types):
+        expected = "expected a letter for each joint, R (revolute) or P (prismatic), e.g. RRP for 3 joints"
+        number = int(letters) if re.fullmatch("[0-9]{1,3}", letters) else 0
+        several = counted(number, "revolute joint")
+        hint = (
+            f"for {several}: --joints {'R' * number}"
+            if 0 < number <= MOST_SPELLED_OUT
+            else f"found {letters!r}"
+        )
+        raise InputError.one(f"{expected}; {hint}")
+    return types
+
+
+def _joint(index: int, name: str, joint_type: str, actuator: str) -> Values:
+    """Return a joint; the axis of the first joint is vertical, those of all others are horizontal.
+
+    Links get shorter and lighter towards the tip, as those of real arms do: the load of the first joints
+    hardly grows with the number of joints, so that springs of one size hold all arms.
+    """
+    alpha: Any = 0 if index else "pi/2"
+    taper = min(index, TAPERED)
+    length, mass = 0.3 * SHORTER**taper, 2.0 * LIGHTER**taper
+    across = mass * length * length / 12
+    inertia = {"xx": across * 2 / 15, "yy": across, "zz": across}
+    link = {"mass": _rounded(mass), "inertia": {axis: _rounded(each) for axis, each in inertia.items()}}
+    half, travel = _rounded(length / 2), _rounded(length * 2 / 3)
     geometry = _by_type(
         joint_type,
-        {"dh": {"a": 0.3, "alpha": alpha}, "link": {**link, "com": [-0.15, 0, 0]}},
-        {"dh": {"a": 0, "alpha": alpha, "d": 0.2}, "link": {**link, "com": [0, 0, -0.1]}},
+        {"dh": {"a": 2 * half, "alpha": alpha}, "link": {**link, "com": [-half, 0, 0]}},
+        {"dh": {"a": 0, "alpha": alpha, "d": travel}, "link": {**link, "com": [0, 0, -travel / 2]}},
     )
+    try:
+        driven = example(actuator, joint_type)
+    except InputError as error:
+        raise InputError.one(f"{name}: {error}") from None
     return {
-        "name": f"joint_{number}",
+        "name": for_yaml(name) if name.lower() in (*BOOLEANS, "null") else name,
         "type": joint_type,
         **geometry,
         "damping": _by_type(joint_type, 0.1, 1.0),
-        "actuator": example(actuator, joint_type),
+        "actuator": driven,
     }
 
 
@@ -214,9 +267,9 @@ def _way(joint: Joint) -> tuple[float, float]:
 
 
 def _stiffness(robot: Robot) -> Values:
-    loads = static_load(robot)
+    loads, of_motion = static_load(robot), _motion_loads(robot)
     chosen = {
-        joint.name: _stiffnesses(joint, float(load), float(configuration[index]))
+        joint.name: _stiffnesses(joint, float(load), float(configuration[index]), of_motion[index])
         for index, (joint, load, configuration) in enumerate(
             zip(robot.joints, loads.values, loads.configurations, strict=True)
         )
@@ -235,9 +288,22 @@ def first_stiffnesses(robot: Robot) -> dict[str, float]:
     return dict(_stiffness(robot).get("start", {}))
 
 
-def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
+def _motion_loads(robot: Robot) -> list[float]:
+    """Return bounds of the torque that moves each joint without gravity, N m (N)."""
+    ways = [_way(joint) for joint in robot.joints]
+    lengths = np.array([end - start for start, end in ways])
+    inertia = np.abs(mass_matrix(robot, np.array([start for start, _ in ways])))
+    damping = np.array([joint.damping for joint in robot.joints])
+    velocity, acceleration = PEAK_TO_MEAN_VELOCITY / DURATION, PEAK_ACCELERATION / DURATION**2
+    bounds: list[float] = (inertia @ lengths * acceleration + damping * lengths * velocity).tolist()
+    return bounds
+
+
+def _stiffnesses(joint: Joint, load: float, q: float, of_motion: float) -> tuple[float, float]:
     """Return two stiffnesses attainable under the load at q, or without load if none is."""
     ranges = stiffness_ranges(joint, load, q)
+    if ranges["unloaded"][0] == 0:  # soft without bound at rest: such springs must at least carry the motion
+        ranges = stiffness_ranges(joint, max(abs(load), of_motion), q)
     lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
     lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])
     soft, stiff = START_TO_LOWEST * lower, END_TO_LOWEST * lower

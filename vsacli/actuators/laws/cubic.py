@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ class Cubic(SpringLaw):
 
     k: float = number(units.STIFFNESS, "linear coefficient K", check=POSITIVE)
     k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
+
+    examples: ClassVar = {"revolute": {"k": 400, "k_c": 2000}, "prismatic": {"k": 4000, "k_c": 200000}}
 
     @property
     def polynomial(self) -> tuple[float, ...]:

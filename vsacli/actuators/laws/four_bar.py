@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class FourBar(SpringLaw):
 
     k: float = number(units.TORQUE, "constant k of the linear spring, per rad of beta", check=POSITIVE)
     ratio: float = number(units.DIMENSIONLESS, "ratio C of the linkage's arms", check=ABOVE_ONE)
+
+    examples: ClassVar = {"revolute": {"k": 1600, "ratio": 2}}
 
     @property
     def domain(self) -> tuple[float, float]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -141,7 +141,13 @@ class SpringLaw(ABC):
 
     So sigma > 0 on the domain, and zeta has the sign of phi. The methods take and return arrays of any one
     shape; phi in rad (m), torque in N m (N).
+
+    Attributes:
+        examples: Plausible values of the fields for a new robot file, by type of joint; without those of a
+            type, `vsacli new` does not offer the law there.
     """
+
+    examples: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
 
     max_deflection: float = number(
         POSITION,

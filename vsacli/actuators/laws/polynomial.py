@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class Polynomial(SpringLaw):
     c5: float = number(units.FIFTH_STIFFNESS, "coefficient of phi^5", check=NON_NEGATIVE, default=0.0)
     c7: float = number(units.SEVENTH_STIFFNESS, "coefficient of phi^7", check=NON_NEGATIVE, default=0.0)
     c9: float = number(units.NINTH_STIFFNESS, "coefficient of phi^9", check=NON_NEGATIVE, default=0.0)
+
+    examples: ClassVar = {
+        "revolute": {"c1": 400, "c3": 1000, "c5": 5000},
+        "prismatic": {"c1": 4000, "c3": 100000, "c5": 2e7},
+    }
 
     @cached_property
     def _coefficients(self) -> tuple[float, ...]:

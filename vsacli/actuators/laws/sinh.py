@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ class Sinh(SpringLaw):
 
     k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
+
+    examples: ClassVar = {"revolute": {"k": 80, "a": 5}, "prismatic": {"k": 160, "a": 25}}
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """Return the closed solution for two springs of equal a; None for other laws."""

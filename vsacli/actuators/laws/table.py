@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -84,6 +84,8 @@ class MeasuredSpring(SpringLaw):
         TableFile(("deflection", "torque")),
         "CSV file with the header deflection,torque in rad,N m (m,N), path relative to the robot file",
     )
+
+    examples: ClassVar = {"revolute": {"file": "measured_spring.csv"}}  # the bundled table is in rad and N m
 
     def __post_init__(self) -> None:
         super().__post_init__()

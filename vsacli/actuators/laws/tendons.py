@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -131,6 +132,8 @@ class Quadratic(Tendon):
 
     k: float = number(units.QUADRATIC_STIFFNESS, "quadratic coefficient k", check=POSITIVE)
 
+    examples: ClassVar = {"revolute": {"k": 1000}, "prismatic": {"k": 100000}}
+
     @property
     def polynomial(self) -> tuple[float, ...]:
         """The quadratic term alone."""
@@ -190,6 +193,8 @@ class Exponential(Tendon):
 
     c: float = number(units.TORQUE, "torque scale c", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
+
+    examples: ClassVar = {"revolute": {"c": 20, "a": 5}, "prismatic": {"c": 40, "a": 25}}
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """Return the closed solution with a tendon of equal a on side 2; None for other laws."""

@@ -184,7 +184,7 @@ class Mechanism(ABC):
     @classmethod
     @abstractmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """Return plausible values of the fields, for a new robot file."""
+        """Return plausible values of the fields, for a new robot file; none if there are no such."""
 
     @property
     def deflection_range(self) -> tuple[float, float]:

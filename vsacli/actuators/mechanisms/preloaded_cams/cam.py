@@ -176,9 +176,11 @@ class Cam(PreloadedCam):
             raise InputError(problems)
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """Return the cam of the bundled example."""
-        return {"k": 40000, "r": 0.005, "pretension": [0.001, 0.02], "profile": "cam_profile.csv"}
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """Return the profile of the bundled example, which turns."""
+        if joint_type == "prismatic":
+            return {}
+        return {"k": 60000, "r": 0.005, "pretension": [0.01, 0.05], "profile": "cam_profile.csv"}
 
     @cached_property
     def _fitted(self) -> Profile:

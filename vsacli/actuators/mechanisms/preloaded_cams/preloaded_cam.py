@@ -121,7 +121,7 @@ class Maccepa(PreloadedCam):
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
         """Return levers of a hand's size, with the stiffness of an arm's joint."""
-        return {"b": 0.04, "c": 0.12, "k": 20000, "r": 0.01, "pretension": [0.002, 0.05]}
+        return {"b": 0.04, "c": 0.12, "k": 40000, "r": 0.01, "pretension": [0.01, 0.05]}
 
     @property
     def deflection_range(self) -> tuple[float, float]:
