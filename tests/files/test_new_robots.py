@@ -183,12 +183,12 @@ CONTRADICTIONS = {
     "--joint RRP": "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever, found 'RRP'",
     "--joint a:": "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever, found 'a:'",
     "--joint 1a:rigid": "the name must be made of letters, digits, _ and -, beginning with a letter",
-    "--joint a:seral": "'seral' is no kind of actuator; did you mean 'serial'?",
-    "--joint a:serial:leaver": "is no mechanism or spring law of serial actuators; did you mean 'lever'?",
-    "--joint a:elastic:quadratic": "is no mechanism or spring law of elastic actuators; valid: cubic",
-    "--joint a:rigid:x": "'x' is no mechanism or spring law of rigid actuators; write rigid alone",
-    "--joint a:cubic": "'cubic' is no kind of actuator; write antagonistic:cubic or elastic:cubic",
-    "--joints R --actuator elastc": "'elastc' is no kind of actuator; did you mean 'elastic'?",
+    "--joint a:seral": "'seral' is not a kind of actuator; did you mean 'serial'?",
+    "--joint a:serial:leaver": "is not a mechanism or spring law of serial actuators; did you mean 'lever'?",
+    "--joint a:elastic:quadratic": "is not a mechanism or spring law of elastic actuators; valid: cubic",
+    "--joint a:rigid:x": "'x' is not a mechanism or spring law of rigid actuators; write rigid alone",
+    "--joint a:cubic": "'cubic' is not a kind of actuator; write antagonistic:cubic or elastic:cubic",
+    "--joints R --actuator elastc": "'elastc' is not a kind of actuator; did you mean 'elastic'?",
 }
 
 

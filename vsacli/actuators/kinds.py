@@ -54,11 +54,11 @@ def kind_and_mechanism(words: str) -> tuple[str, str | None]:
     if kind not in ACTUATORS:
         homes = [f"{home}:{kind}" for home in ACTUATORS if kind in mechanisms_of(home)]
         hint = f"; write {' or '.join(homes)}" if homes else did_you_mean(kind, (*ACTUATORS, *MECHANISMS))
-        raise InputError.one(f"{kind!r} is no kind of actuator{hint}")
+        raise InputError.one(f"{kind!r} is not a kind of actuator{hint}")
     names = mechanisms_of(kind) if colon else ()
     if colon and mechanism not in names:
         hint = did_you_mean(mechanism, names) if names else f"; write {kind} alone"
-        raise InputError.one(f"{mechanism!r} is no mechanism or spring law of {kind} actuators{hint}")
+        raise InputError.one(f"{mechanism!r} is not a mechanism or spring law of {kind} actuators{hint}")
     return kind, mechanism or None
 
 

@@ -54,27 +54,9 @@ def variables_option(default: str) -> Callable[[Any], Any]:
     )
 
 
-<<<<<<< HEAD
-def example(command: str) -> str:
-    """Return the epilog of a help text: a command line that works."""
-    return f"\b\nExample:\n  {command}"
-=======
-def numbers(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, ...] | None:
-    """Convert numbers separated by commas, as a click callback."""
-    if written is None:
-        return None
-    try:
-        return tuple(float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
-
-
 def example(*commands: str) -> str:
     """Return the epilog of a help text: command lines that work."""
     return "\n  ".join(["\b\nExample:", *commands])
->>>>>>> w-G
 
 
 robot_argument = click.argument("robot", type=FILE)

@@ -15,22 +15,14 @@ from vsacli.actuators.kinds import ACTUATORS, kind_and_mechanism, mechanisms_of
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
-<<<<<<< HEAD
-from vsacli.cli.command_parts import example, overwrite_option, read_robot
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE, YAML_FILE
-from vsacli.cli.input_errors import naming_option
-from vsacli.cli.option_types import Words
-=======
 from vsacli.base.texts import counted
-from vsacli.cli.command_parts import example, overwrite_option
+from vsacli.cli.command_parts import example, overwrite_option, read_robot
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_option
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
->>>>>>> w-G
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
@@ -123,12 +115,6 @@ class _JointType(_ActuatorType):
 )
 @click.option(
     "--actuator",
-<<<<<<< HEAD
-    type=Words((*ACTUATORS, *MECHANISMS)),
-    default="antagonistic",
-    show_default=True,
-    help="Kind of actuator of every joint, or mechanism of serial actuators.",
-=======
     metavar="KIND[:MECHANISM]",
     type=_ActuatorType(),
     help="Actuator of every joint, as in --joint.",
@@ -143,7 +129,6 @@ class _JointType(_ActuatorType):
     help="Name and actuator of one joint, from the base to the tip; may be repeated. "
     f"KIND: {', '.join(ACTUATORS)}. MECHANISM: of serial actuators {', '.join(MECHANISMS)}; of antagonistic "
     "and elastic ones a spring law such as cubic, sinh or table (docs/springs.md).",
->>>>>>> w-G
 )
 @_output_option
 @overwrite_option
@@ -168,17 +153,12 @@ def robot(
     from vsacli.files.examples import example_tables
     from vsacli.files.templates import robot_template
 
-<<<<<<< HEAD
-    with naming_option("--joints"):
-        text = robot_template(joints, actuator)
-=======
     letters = _letters(joints, actuator, chosen)
     with naming_option("--joint" if joints is None else "--joints"):
         if chosen:
             text = robot_template(letters, [each.actuator for each in chosen], [each.name for each in chosen])
         else:
             text = robot_template(letters, actuator or "antagonistic")
->>>>>>> w-G
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
     talk.note(f"next: vsacli new trajectory --robot {_file(output, 'arm.yaml')} -o move.yaml")
 
