@@ -210,7 +210,7 @@ def test_conditions_that_contradict_themselves_are_refused():
         simulate(vsa_3r(), short_motion(3), feedback="positions")
     with pytest.raises(InputError, match="unknown feedback 'position'; did you mean 'positions'"):
         simulate(vsa_3r(), short_motion(3), gains=GAINS, feedback="position")
-    with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
+    with pytest.raises(InputError, match="the relative tolerance must be from 1e-13 to 0.001, not 1e-15"):
         Tolerances(rtol=1e-15)
     with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):
         perturbed(vsa_3r(), 1.0, seed=0)

@@ -214,19 +214,25 @@ def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
-    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
+    motors = " / ".join(error_text(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
     return (joint.name, *map(_pair, (joint.q, joint.stiffness)), motors)
 
 
 def _pair(deviation: Deviation) -> str:
     if math.isnan(deviation.peak):
         return "-"
-    return f"{_number(deviation.peak)} / {_number(deviation.final)}"
+    return f"{error_text(deviation.peak)} / {error_text(deviation.final)}"
 
 
-def _number(value: float) -> str:
-    """Return a number as reports show it, with two digits if it is small."""
-    return number(value) if abs(value) >= 10 else "-" if math.isnan(value) else f"{value:.2g}"
+SMALLEST_ERROR = 1e-12
+"""Magnitude below which an error or torque is shown as 0: rounding of values near 1."""
+
+
+def error_text(value: float) -> str:
+    """Return a number as reports show it: with two digits if it is small, 0 if it is rounding."""
+    if math.isnan(value):
+        return "-"
+    return number(value) if abs(value) >= 10 else "0" if abs(value) < SMALLEST_ERROR else f"{value:.2g}"
 
 
 def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Problem]:
