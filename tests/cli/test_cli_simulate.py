@@ -44,7 +44,7 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         q, commanded, error = (stored.read(name) for name in ("q", "q_ref", "q_error"))
         assert np.array_equal(q - commanded, error)
         assert np.abs(error).max() < 1e-8  # the integrator's tolerance, as elsewhere
-        assert stored.report_json["format"] == "vsacli-simulation-report/1"
+        assert stored.report_json["format"] == "vsacli-simulation-report/2"
 
 
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):

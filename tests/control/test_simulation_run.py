@@ -243,7 +243,7 @@ def test_every_declared_variable_is_in_the_history():
 def test_the_report_is_plain_json():
     report = simulate(vsa_3r(), short_motion(3)).report
     content = json.loads(json.dumps(report.as_json(), allow_nan=False))
-    assert content["format"] == "vsacli-simulation-report/1"
+    assert content["format"] == "vsacli-simulation-report/2"
     assert content["controller"] == "feedforward"
     assert content["joints"][0]["q_error"].keys() == {"peak", "time", "final"}
     assert content["ending"] is None

@@ -266,7 +266,7 @@ def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
         return f"the spring is slack {where}, so that motor torques are undefined ({when})"
     change = "decrease" if worst.bound == joint.attainable[1] else "increase"
     return (
-        f"stiffness {worst.value:.6g} {worst.unit} {where} is singular: motor torques are undefined at the "
+        f"stiffness {number(worst.value)} {worst.unit} {where} is singular: motor torques are undefined at the "
         f"end of the attainable range; {change} it ({when})"
     )
 
@@ -274,7 +274,7 @@ def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
 def _near_singular(joint: JointReport, worst: Worst, samples: int) -> str:
     gap, when = abs(worst.value - worst.bound) / worst.value, _when(joint, "near_singular", samples)
     return (
-        f"warning: stiffness {worst.value:.6g} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
+        f"warning: stiffness {number(worst.value)} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
         f"from the singularity, where motor torques grow without bound ({when})"
     )
 

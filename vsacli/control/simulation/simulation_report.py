@@ -103,7 +103,7 @@ class SimulationReport(Stored):
     budget: int = 0
     methods: tuple[Method, ...] = ()
 
-    format: ClassVar = "vsacli-simulation-report/1"
+    format: ClassVar = "vsacli-simulation-report/2"
     shape: ClassVar = {
         **named("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
         "largest_error?": "largest_error",
