@@ -26,7 +26,7 @@ from vsacli.dynamics.losses import positive_part, trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
-_GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%, not {!r}"
+_GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class GoalTolerance:
 
     def __post_init__(self) -> None:
         if not (0 <= self.share <= 1 and 0 <= self.absolute < math.inf and self.share + self.absolute > 0):
+            parts = f"share={self.share:g} and absolute={self.absolute:g}"
             raise InputError.one(
-                "the tolerance must be positive and finite, as a share at most 100 %: "
-                f"not {100 * self.share:g} % + {self.absolute:g} rad (m)"
+                f"a goal tolerance must be positive and finite, its share at most 1: not {parts}"
             )
 
     @classmethod
@@ -62,8 +62,13 @@ class GoalTolerance:
         try:
             number = float(text.removesuffix("%"))
         except ValueError:
-            raise InputError.one(f"--goal-tolerance: {_GRAMMAR.format(written)}") from None
-        return cls(share=number / 100) if text.endswith("%") else cls(0.0, number)
+            raise InputError.one(f"{_GRAMMAR}, found {written!r}") from None
+        share = text.endswith("%")
+        try:
+            return cls(share=number / 100) if share else cls(0.0, number)
+        except InputError:
+            bounds = "from 0 % to 100 % of a joint's range" if share else "positive and finite"
+            raise InputError.one(f"the goal tolerance must be {bounds}, not {text}") from None
 
     def of(self, commanded_range: float) -> float:
         """Return the tolerance of a joint commanded over a range, rad (m)."""
