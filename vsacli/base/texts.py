@@ -58,6 +58,11 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or noun + 's'}"
 
 
+def and_joined(names: Sequence[str]) -> str:
+    """Return names joined for a sentence: "a, b and c"."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
 def verdict_words(verdict: str) -> str:
     """Return a verdict as the first line of a report shows it."""
     return verdict.upper().replace("_", " ")

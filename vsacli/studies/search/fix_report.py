@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
+from vsacli.base.texts import and_joined
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -254,8 +255,3 @@ class Fixes(Published):
         else:
             yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
         yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
-
-
-def and_joined(names: Sequence[str]) -> str:
-    """Return names joined for a sentence: "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
