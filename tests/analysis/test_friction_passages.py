@@ -18,7 +18,7 @@ from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 
-TOLD = re.compile(r"from t = ([\d.]+) s on: motor torques reach (\S+) N m there, (\S+) at the steps")
+TOLD = re.compile(r"from t = ([\d.]+) s on: motor torques reach (\S+) N m there, (\S+) at the samples")
 
 
 def rubbing(width: float) -> Robot:

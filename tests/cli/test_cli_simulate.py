@@ -44,7 +44,7 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         q, commanded, error = (stored.read(name) for name in ("q", "q_ref", "q_error"))
         assert np.array_equal(q - commanded, error)
         assert np.abs(error).max() < 1e-8  # the integrator's tolerance, as elsewhere
-        assert stored.report_json["format"] == "vsacli-simulation-report/1"
+        assert stored.report_json["format"] == "vsacli-simulation-report/2"
 
 
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
@@ -143,23 +143,26 @@ def test_measured_positions_are_reported(vsacli, quick):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((*FEEDBACK, "--poles", "-1,-2,-3,1"), "the pole 1 of the position error is unstable"),
-        ((*FEEDBACK, "--poles", "-1,-2"), "this robot has 4 poles without integral action, not 2"),
-        ((*FEEDBACK, "--integral", "--poles", "-1,-2,-3,-4"), "has 5 poles with integral action, not 4"),
+        ((*FEEDBACK, "--poles", "-1,-2,-3,1"), "the pole 1 of the position error is unstable; its"),
+        ((*FEEDBACK, "--poles", "-1,-2"), "(5 with integral action), or 1 that is repeated, found 2"),
+        ((*FEEDBACK, "--integral", "--poles", "-1,-2,-3,-4"), "expected 5 poles of the position error (4"),
         ((*FEEDBACK, "--stiffness-poles", "5"), "the pole 5 of the stiffness error is unstable"),
         ((*FEEDBACK, "--poles", "fast"), "expected poles such as -20,-21"),
         ((*FEEDBACK, "--poles", "none.yaml"), "none.yaml: no such file"),
         (("--poles", "-20"), "poles and integral action need --controller feedback-linearization"),
-        (("--feedback", "positions"), "measured positions need the controller feedback-linearization"),
-        (("--initial-error", "0.1,0.2"), "one for each of the 3 joints"),
+        (("--feedback", "positions"), "positions as feedback need the controller feedback-linearization"),
+        (("--initial-error", "0.1,0.2"), "expected 1 value, or 3 (base, shoulder, elbow), found 2"),
         (("--initial-error", "much"), "expected a number, or one for each joint"),
-        (("--goal-tolerance", "tight"), "--goal-tolerance: expected a number in rad (m) such as 0.01, or"),
-        (("--rtol", "0"), "the tolerances of the integration must be positive and at most 0.001"),
-        (("--atol", "0.1"), "not 1e-09 (relative) and 0.1 (absolute)"),
-        (("--budget", "0"), "the budget must be at least 1 evaluation, not 0"),
+        (("--goal-tolerance", "tight"), "expected a number in rad (m) such as 0.01, or a share of"),
+        (("--goal-tolerance", "300%"), "must be from 0 % to 100 % of a joint's range, not 300%"),
+        (("--rtol", "0"), "the relative tolerance must be from 1e-13 to 0.001, not 0\n"),
+        (("--atol", "0.1"), "the absolute tolerance must be above 0 and at most 0.001, not 0.1\n"),
+        (("--budget", "0"), "the budget must be at least 1, not 0"),
+        (("--sensor-noise", "-1"), "the sensor noise must be from 0 to 1e+30, not -1"),
+        (("--encoder-bits", "100"), "an encoder must have 1 to 48 bits, not 100"),
         ((*FEEDBACK, "--poles", "-1e6"), "its poles are too fast to be simulated: rounding of"),
-        (("--perturb", "2"), "the relative error of the model must lie between 0 and 1"),
-        (("--initial-stiffness-error", "-100"), "no state at the start has this position and stiffness"),
+        (("--perturb", "2"), "the model error must be at least 0 and below 1, e.g. 0.05 for 5 %, not 2"),
+        (("--initial-stiffness-error", "-100"), "is below the minimum of 819.4 N m/rad at this"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )  # fmt: skip

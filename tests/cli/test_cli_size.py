@@ -1,6 +1,7 @@
 """`vsacli size`: exit codes, what is said where, what is written."""
 
 import json
+import re
 
 import pytest
 from samples.catalogs import GENERIC
@@ -47,7 +48,7 @@ def test_nothing_that_does_is_told_with_what_is_nearest(vsacli, motors, tmp_path
     weak.write_text(weak.read_text().replace("frame-85", "# ", 1))
     done = vsacli("size", ARM, SWING, "--catalog", weak, "--gear", "5", "-o", "s.yaml")
     assert done.code == 3
-    assert "has none that suffices" in done.out
+    assert re.search(r": no motor of \S*weak\.csv \(\d motors?\) suffices$", done.out.splitlines()[0])
     assert "no motor suffices; flat-45 with the gear 5 would use" in done.out
     assert "s.yaml is not written: there is no motor for elbow 1" in done.err
     assert not (tmp_path / "s.yaml").exists()
@@ -57,7 +58,7 @@ def test_steps_that_cannot_be_done_are_left_out_and_told(vsacli, too_soft):
     done = vsacli("size", ROBOT, too_soft)
     assert done.code == 3
     assert (
-        "of 401 samples infeasible or singular and left out, so the answer is not for the whole motion"
+        "of 401 samples were left out as infeasible or singular, so the result does not hold for the whole"
         in done.out
     )
 
@@ -84,6 +85,20 @@ def test_rotors_that_cannot_be_coupled_so_much_are_refused_written_or_not(vsacli
     assert not (tmp_path / "s.yaml").exists()
 
 
+def test_a_criterion_names_the_motors_that_lack_it(vsacli, tmp_path):
+    header = "name,inertia,max_torque,mass"
+    (tmp_path / "m.csv").write_text(f"{header}\na,1e-4,1,\nb,1e-4,1,0.2\nc,1e-4,1,\n")
+    done = vsacli("size", ARM, SWING, "--catalog", "m.csv", "--minimize", "mass")
+    assert done.code == 2
+    assert "minimizing mass needs the column mass in m.csv, which 2 motors lack (a, c)" in done.err
+
+
+def test_a_trajectory_given_twice_is_questioned(vsacli):
+    warning = f"warning: {SWING} is given twice; give each trajectory once"
+    assert warning in vsacli("size", ARM, SWING, SWING).out.splitlines()
+    assert "twice" not in vsacli("size", ARM, SWING).out
+
+
 def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
     arm = REPOSITORY / "robots" / "planar_2r.yaml"
     swing = REPOSITORY / "trajectories" / "planar_2r.yaml"
@@ -97,12 +112,13 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--gear", "50"], "gears and a criterion are for motors of a catalog; give one"),
-        (["--minimize", "mass"], "gears and a criterion are for motors of a catalog; give one"),
+        (["--gear", "50"], "gears need a catalog of motors; give one"),
+        (["--minimize", "mass"], "minimize needs a catalog of motors; give one"),
         (["-o", "s.yaml"], "--output is for the motors chosen from a catalog"),
-        (["--catalog", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100, or a range"),
-        (["--catalog", "motors.csv", "--gear", "160..50"], "is empty; the smaller one comes first"),
-        (["--catalog", "motors.csv", "--gear", "0"], "must be positive and finite"),
+        (["--catalog", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100 or a range"),
+        (["--catalog", "motors.csv", "--gear", "50:1"], "found '50:1'; write 50\n"),
+        (["--catalog", "motors.csv", "--gear", "160..50"], "'160..50' runs downward; write 50..160\n"),
+        (["--catalog", "motors.csv", "--gear", "5,0"], "gear ratios must be positive and finite, not 0\n"),
         (["--catalog", "motors.csv", "--gear", "hip=5"], "there is no joint 'hip'; valid: elbow"),
         (
             ["--catalog", "motors.csv", "--gear", "5", "--gear", "6"],
@@ -122,7 +138,10 @@ def test_what_is_refused(vsacli, arguments, message):
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("m,1e-4,,,,,,,", "nothing bounds its torque: give one of continuous_torque, max_torque"),
+        (
+            "m,1e-4,,,,,,,",
+            "motor 'm' has no torque limit; give continuous_torque, max_torque,",
+        ),
         ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001"),
         ("m,1e-4,1,,,,0.5,,", "resistance: needs torque_constant, too"),
         ("m,1e-4,1,,,0.1,,,24", "max_voltage: needs resistance, too"),

@@ -100,7 +100,14 @@ def test_parts_make_the_same_table(vsacli: Any, grid_study: str, grid_table: Pat
     assert vsacli("info", "whole.h5", "--extract", "again").code == 0
     assert {each.name for each in Path("again").iterdir()} == {"study.yaml", "arm.yaml", "move.yaml"}
     lacking = vsacli("study", "--merge", *parts[:2], "-o", "lacking.h5")
-    assert (lacking.code, lacking.err) == (2, "2 of 6 runs are in none of the files: 1, 4\n")
+    missing = (
+        "the tables hold 4 of 6 runs; runs 1, 4 are missing: give the tables of all shards (--shard K/N)"
+    )
+    assert (lacking.code, lacking.err) == (2, f"{missing}\n")
+    twice = vsacli("study", "--merge", *parts, f"./{parts[0]}", "-o", "twice.h5")
+    assert (twice.code, twice.err) == (2, f"./{parts[0]}: is given twice; give each table once\n")
+    alone = vsacli("study", "--merge", "study-1-of-3.h5", "-o", "alone.h5")
+    assert alone.err.startswith("study-1-of-3.h5 holds 2 of 6 runs; runs 1, 2, 4, 5 are missing: ")
     Path(grid_study).write_text(Path(grid_study).read_text().replace("1000", "1100"))
     assert vsacli("study", grid_study, "--shard", "2/3", "-o", "other.h5", "-q").code == 0
     strange = vsacli("study", "--merge", *parts[:2], "other.h5", "-o", "x.h5")

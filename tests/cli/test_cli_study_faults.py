@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -203,16 +204,17 @@ SPRING = "joints.*.actuator.spring.k"
     ("text", "message"),
     [
         (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.0.actuator.spring has no 'kx'"),
-        (f"vary: {{{SPRING}: [400, -1]}}", "study.yaml:5: joints.*.actuator.spring.k: joints.0"),
+        (f"vary: {{{SPRING}: [400, -1]}}", f"study.yaml:5: {SPRING}: must be positive, not -1\n"),
+        (f"method: random\nsamples: 2\nvary: {{{SPRING}: {{normal: 300 %}}}}", "must be at most 100 %, not"),
         (f"vary: {{{SPRING}: []}}", f"study.yaml:5: {SPRING}: expected a list of values, "),
         (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
-        (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
+        (f"vary: {{{SPRING}: {{normal: 5 %}}}}", f"study.yaml:5: {SPRING}: has a distribution, which"),
         ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
         ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
-        ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),
-        ("method: random\nsamples: 3", "vary: nothing varies that the method random could draw"),
+        ("method: random\nvary: {duration: [1]}", "missing key 'samples': the number of runs that the"),
+        ("method: random\nsamples: 3", "missing key 'vary': the values that the method random draws"),
         ("method: random\nsamples: 3\nvary: {joints.*.link.com: {normal: 5 %}}", "is zero, of which a share"),
         ("keep: [margins]", "keep: unknown word 'margins'; did you mean 'margin'?"),
         ("trajectry: x", "unknown key 'trajectry'"),
@@ -241,4 +243,31 @@ def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
 def test_no_file_is_replaced_or_read_for_nothing(vsacli: Any, own_folder: Path) -> None:
     study(own_folder, GRID, HEAD.replace("move.yaml", "moves/*.yaml"))
     none = vsacli("study", "study.yaml")
-    assert (none.code, none.err) == (2, "study.yaml: trajectory: no file fits 'moves/*.yaml'\n")
+    assert (none.code, none.err) == (2, "study.yaml:4: trajectory: no file fits 'moves/*.yaml'\n")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("arm.", "arm_.", "study.yaml:3: robot: arm_.yaml: no such file; did you mean 'arm.yaml'?\n"),
+        ("move.", "mov.", "study.yaml:4: trajectory: mov.yaml: no such file; did you mean 'move.yaml'?\n"),
+        ("move.yaml", "mov?.yml", "study.yaml:4: trajectory: no file fits 'mov?.yml'\n"),
+    ],
+)
+def test_a_file_that_is_missing_is_named_as_in_the_study(
+    vsacli: Any, own_folder: Path, old: str, new: str, message: str
+) -> None:
+    study(own_folder, "vary: {rate: [50, 100]}")
+    path = own_folder / "study.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    refused = vsacli("study", "study.yaml")
+    assert refused.code == 2
+    assert refused.err == message
+
+
+def test_a_study_in_which_nothing_varies_is_questioned(vsacli: Any, own_folder: Path) -> None:
+    study(own_folder, "")
+    done = vsacli("study", "study.yaml", "--processes", "1")
+    assert (done.code, done.out.splitlines()[1]) == (0, "warning: nothing varies; add vary:")
+    assert json.loads(vsacli("info", "study.h5", "--json").out)["warnings"] == ["nothing varies; add vary:"]

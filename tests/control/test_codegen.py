@@ -280,7 +280,7 @@ def test_code_without_loops() -> None:
     assert made.files["vsa_3r.c"] == project("3R").files["vsa_3r.c"]
     one_loops = with_springs("sinh")  # the springs of the first joint are alike, those of the second are not
     name = one_loops.joint_names[1]
-    with pytest.raises(InputError, match=f"two sinh needs loops at {name}: code without loops needs"):
+    with pytest.raises(InputError, match=f"{name} of two sinh is solved by iteration; only pairs of"):
         generate(one_loops, loops=False)
 
 

@@ -261,7 +261,11 @@ def test_gains_are_the_coefficients_of_the_polynomials():
         ([-1] * 6, [-1, -1], "expected 2, 3, 4, 5 poles of the position error, found 6"),
         ([-1, -2, 0, -3], [-1, -1], "the pole 0 of the position error is unstable"),
         ([-1, -2, -3, -4], [-1, 2], "the pole 2 of the stiffness error is unstable"),
-        ([-1, -2, -3 + 1j, -4], [-1, -1], "a complex pole of the position error lacks its conjugate"),
+        (
+            [-1, -2, -3 + 1j, -4],
+            [-1, -1],
+            r"complex pole -3\+1j of the .* has no conjugate; add -3-1j",
+        ),
         ([-1, -2, np.nan, -4], [-1, -1], "is unstable"),
     ],
 )
@@ -279,7 +283,7 @@ def test_gains_that_are_not_hurwitz_are_refused():
 @pytest.mark.parametrize("text", ["fast", "", "-1;-2", "-1,,-2"])
 def test_text_that_holds_no_poles_is_refused(text):
     with pytest.raises(
-        InputError, match=re.escape(f"expected poles such as -20,-21,-10+5j,-10-5j, not {text!r}")
+        InputError, match=re.escape(f"expected poles such as -20,-21,-10+5j,-10-5j, found {text!r}")
     ):
         parse_poles(text)
 
@@ -292,11 +296,11 @@ def test_one_pole_stands_for_as_many_as_the_robot_needs():
     assert gains_from_text(all_rigid("R", 1), "-3", "-4", integral=False).position.tolist() == [[9, 6]]
 
 
-@pytest.mark.parametrize(("integral", "count"), [(False, "4 poles without"), (True, "5 poles with")])
+@pytest.mark.parametrize(("integral", "count"), [(False, "4 .* .5 with"), (True, "5 .* .4 without")])
 def test_a_wrong_number_of_poles_is_refused(integral, count):
-    with pytest.raises(
-        InputError, match=f"the position error of this robot has {count} integral action, not 2"
-    ):
+    count, other = count.split(" .* ")
+    expected = f"expected {count} poles of the position error {other} integral action.,"
+    with pytest.raises(InputError, match=f"{expected} or 1 that is repeated, found 2"):
         gains_from_text(vsa_3r(), "-3,-4", "-4", integral=integral)
 
 
@@ -324,11 +328,15 @@ def test_a_file_has_poles_for_each_joint(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("-30", "30", "poles.yaml:6: joints: position: the pole 30 of the position error is unstable"),
+        (
+            "-30",
+            "30",
+            "poles.yaml:6: joints: position: the pole 30 of the .* is unstable; .* -30",
+        ),
         ("-30", "quick", "poles.yaml:6: joints: position: expected poles such as"),
         ("shoulder", "sholder", "no joint 'sholder'; did you mean 'shoulder'"),
         ("  - name: elbow\n    position: -40\n", "", "no poles for elbow; each joint needs them"),
-        ("-30", "-30, -31", "poles.yaml: the position error of this robot has 4 poles without"),
+        ("-30", "-30, -31", "poles.yaml: shoulder: expected 4 poles of the position error"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused(tmp_path, old, new, message):

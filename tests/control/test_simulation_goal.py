@@ -132,15 +132,15 @@ def test_a_tolerance_as_typed(written, share, absolute):
 @pytest.mark.parametrize(
     ("written", "message"),
     [
-        ("wide", "--goal-tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
-        ("%", "--goal-tolerance: expected a number"),
-        ("1 deg", "--goal-tolerance: expected a number"),
-        ("0", "the tolerance must be positive and finite"),
-        ("-1", "the tolerance must be positive and finite"),
-        ("-1%", "the tolerance must be positive and finite"),
-        ("nan", "the tolerance must be positive and finite"),
-        ("inf", "the tolerance must be positive and finite"),
-        ("120%", "as a share at most 100 %"),
+        ("wide", "expected a number in rad .m. such as 0.01, or a share .* found 'wide'"),
+        ("%", "expected a number"),
+        ("1 deg", "expected a number"),
+        ("0", "the goal tolerance must be positive and finite, not 0$"),
+        ("-1", "the goal tolerance must be positive and finite, not -1$"),
+        ("-1%", "the goal tolerance must be from 0 % to 100 % of a joint's range, not -1%"),
+        ("nan", "the goal tolerance must be positive and finite, not nan"),
+        ("inf", "the goal tolerance must be positive and finite, not inf"),
+        ("120%", "from 0 % to 100 % of a joint's range, not 120%"),
     ],
 )
 def test_a_tolerance_that_makes_no_sense_is_refused(written, message):

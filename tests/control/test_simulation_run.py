@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 import pytest
+from samples.command_line import rest_to_rest
 from samples.drives import motion
 from samples.plants import rigid, with_actuators
 from samples.robots import vsa_3r
@@ -25,8 +26,9 @@ from vsacli.control.simulation import InitialError, Sensors, Tolerances, perturb
 from vsacli.control.simulation.boundaries import Singularity
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, Phase
 from vsacli.control.simulation.history import RateFilter
-from vsacli.control.simulation.simulate import start_state
+from vsacli.control.simulation.start import start_state
 from vsacli.control.simulation.tabulated import Reference
+from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -191,12 +193,13 @@ def test_rigid_joints_can_be_driven_by_feedforward_but_not_linearized():
     [
         (
             InitialError([0.1, 0.2]),
-            "initial error of q must be one finite number, or one for each of the 3 joints",
+            r"initial position error: expected 1 value, or 3 \(base, shoulder, elbow\), found 2",
         ),
-        (InitialError(np.nan), "initial error of q must be one finite number"),
+        (InitialError(np.nan), "initial position error: expected finite values"),
         (
             InitialError(0, -100),
-            "no state at the start has this position and stiffness .base, shoulder, elbow",
+            r"shoulder: stiffness 750 N m/rad at the start is below the minimum of 819\.4 N m/rad at this "
+            r"load; increase it, or choose smaller initial errors\nelbow: ",
         ),
     ],
 )
@@ -205,14 +208,34 @@ def test_starts_that_cannot_be_had_are_refused(error, message):
         simulate(vsa_3r(), motion(), initial_error=error)
 
 
+def test_a_start_beyond_the_springs_names_the_trajectory(tmp_path):
+    path = rest_to_rest(tmp_path / "soft.yaml")
+    path.write_text(path.read_text().replace("start: 850", "start: 700"))
+    with pytest.raises(InputError) as refused:
+        simulate(vsa_3r(), load_trajectory(path, vsa_3r()))
+    assert [problem.file for problem in refused.value.problems] == [str(path)] * 3
+    assert refused.value.problems[0].message == (
+        "base: stiffness 700 N m/rad at the start is below the minimum of 800 N m/rad at this load; "
+        "increase it"
+    )
+
+
+def test_initial_errors_of_more_than_a_turn_are_questioned():
+    short = short_motion(3, duration=0.1)
+    warnings = simulate(vsa_3r(), short, initial_error=InitialError([10.0, 0.0, 10.0])).report.warnings
+    asked = [warning for warning in warnings if "turns" in warning]
+    assert asked == ["the initial position error of 10 rad is 1.6 turns; did you mean 10 deg (0.1745 rad)?"]
+    assert not simulate(vsa_3r(), short, initial_error=InitialError(1.0)).report.warnings
+
+
 def test_conditions_that_contradict_themselves_are_refused():
-    with pytest.raises(InputError, match="measured positions need the controller feedback-linearization"):
+    with pytest.raises(InputError, match="positions as feedback need the controller feedback-linearization"):
         simulate(vsa_3r(), short_motion(3), feedback="positions")
     with pytest.raises(InputError, match="unknown feedback 'position'; did you mean 'positions'"):
         simulate(vsa_3r(), short_motion(3), gains=GAINS, feedback="position")
-    with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
+    with pytest.raises(InputError, match=r"the relative tolerance must be from 1e-13 to 0\.001, not 1e-15"):
         Tolerances(rtol=1e-15)
-    with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):
+    with pytest.raises(InputError, match=r"the model error must be at least 0 and below 1, e\.g\. .* not 1"):
         perturbed(vsa_3r(), 1.0, seed=0)
     with pytest.raises(InputError, match="the seed must be zero or positive, not -1"):
         perturbed(vsa_3r(), 0.1, seed=-1)
@@ -243,7 +266,7 @@ def test_every_declared_variable_is_in_the_history():
 def test_the_report_is_plain_json():
     report = simulate(vsa_3r(), short_motion(3)).report
     content = json.loads(json.dumps(report.as_json(), allow_nan=False))
-    assert content["format"] == "vsacli-simulation-report/1"
+    assert content["format"] == "vsacli-simulation-report/2"
     assert content["controller"] == "feedforward"
     assert content["joints"][0]["q_error"].keys() == {"peak", "time", "final"}
     assert content["ending"] is None

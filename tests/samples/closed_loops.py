@@ -19,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import Boundary, boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
-from vsacli.control.simulation.simulate import InitialError, start_state
+from vsacli.control.simulation.start import InitialError, start_state
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory

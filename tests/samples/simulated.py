@@ -19,7 +19,7 @@ from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.history import History, continuous, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
-from vsacli.control.simulation.simulate import InitialError
+from vsacli.control.simulation.start import InitialError
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block

@@ -172,7 +172,7 @@ def test_a_robot_that_cannot_do_anything_is_told_why() -> None:
 @pytest.mark.parametrize("noise", [(1e308, None), (2e-5, 1e308), (-1.0, None), (0.0, float("nan"))])
 def test_a_noise_out_of_range_is_refused(noise: tuple[float, float | None]) -> None:
     """Squares of such numbers are infinite, and no spectrum has a noise or a motion then."""
-    with pytest.raises(InputError, match=r"the noise of sensors must lie between 0 and 1e\+30"):
+    with pytest.raises(InputError, match=r"the sensor noise must be from 0 to 1e\+30, not"):
         plan_excitation(shipped_robot("rp_2"), duration=5, noise=noise)
 
 

@@ -13,6 +13,7 @@ from vsacli.actuators.friction import direction_of
 from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Stored, named
+from vsacli.base.texts import counted
 from vsacli.base.units import TORQUE, time_text
 from vsacli.base.variables import Block
 from vsacli.robot.joint import Joint
@@ -72,7 +73,7 @@ class FrictionPassages:
             if not passages.size:
                 continue
             when = f"from t = {time_text(passages[0, 0])} on"
-            what = f"{joint.name}: friction between the links changes its sign within a step or two {when}"
+            what = f"{joint.name}: friction between the links changes its sign within a sample or two {when}"
             advice = "a larger rate shows them, a larger width makes them smaller"
             if not trajectory.known_between:
                 yield f"{what}; what the motors do meanwhile is not known: {advice}"
@@ -81,7 +82,7 @@ class FrictionPassages:
             torques = torques[:, index]
             most = float(np.max(torques, where=np.isfinite(torques), initial=0.0))
             if most > MORE * peak:
-                sizes = f"{most:.3g} {TORQUE.unit(joint.type)} there, {peak:.3g} at the steps"
+                sizes = f"{most:.3g} {TORQUE.unit(joint.type)} there, {peak:.3g} at the samples"
                 yield f"{what}: motor torques reach {sizes}; {advice}"
 
 
@@ -212,5 +213,5 @@ def _rests(motors: Sequence[DryFriction]) -> Iterator[str]:
     """Yield when motors rest."""
     yield "at the start" if any(each.start for each in motors) else ""
     between = max(each.between for each in motors)
-    yield f"up to {between} steps on the way" if between else ""
+    yield f"up to {counted(between, 'sample')} on the way" if between else ""
     yield "at the end" if any(each.end for each in motors) else ""

@@ -119,7 +119,7 @@ def _attainable(lower: float, upper: float) -> str:
 def _span(low: float, high: float) -> str:
     if math.isnan(low):
         return "-"
-    return "-".join(dict.fromkeys(_rounded(value, 4) for value in (low, high)))
+    return "-".join(dict.fromkeys(rounded(value, 4) for value in (low, high)))
 
 
 def number(value: float) -> str:
@@ -143,13 +143,13 @@ def percent(share: float) -> str:
 def apart(value: float, bound: float) -> tuple[str, str]:
     """Format two numbers with the digits that show their difference, at least four."""
     for digits in range(4, 17):
-        shown = _rounded(value, digits), _rounded(bound, digits)
+        shown = rounded(value, digits), rounded(bound, digits)
         if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
             return shown
     return repr(value), repr(bound)
 
 
-def _rounded(value: float, digits: int) -> str:
+def rounded(value: float, digits: int) -> str:
     """Return a number with this many significant digits, or all those before the point."""
     return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 

@@ -10,7 +10,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread, Worst
-from vsacli.analysis.report_text import apart, by_joint, kind_of, number, of_joints, of_motors, percent
+from vsacli.analysis.report_text import (
+    apart,
+    by_joint,
+    kind_of,
+    number,
+    of_joints,
+    of_motors,
+    percent,
+    rounded,
+)
 from vsacli.base.flags import Flag
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
@@ -266,15 +275,15 @@ def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
         return f"the spring is slack {where}, so that motor torques are undefined ({when})"
     change = "decrease" if worst.bound == joint.attainable[1] else "increase"
     return (
-        f"stiffness {worst.value:.6g} {worst.unit} {where} is singular: motor torques are undefined at the "
-        f"end of the attainable range; {change} it ({when})"
+        f"stiffness {rounded(worst.value, 4)} {worst.unit} {where} is singular: motor torques are undefined "
+        f"at the end of the attainable range; {change} it ({when})"
     )
 
 
 def _near_singular(joint: JointReport, worst: Worst, samples: int) -> str:
     gap, when = abs(worst.value - worst.bound) / worst.value, _when(joint, "near_singular", samples)
     return (
-        f"warning: stiffness {worst.value:.6g} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
+        f"warning: stiffness {rounded(worst.value, 4)} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
         f"from the singularity, where motor torques grow without bound ({when})"
     )
 

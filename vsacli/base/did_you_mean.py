@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from vsacli.base.texts import alternatives
+from vsacli.base.texts import joined
 
 MOST_NEAR = 3
 """Maximum number of proposals; a longer list of words with the same beginning is no help."""
@@ -28,7 +28,7 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     if hint := now_called(word, options):
         return hint
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
-        return f"; did you mean {alternatives(map(repr, near))}?"
+        return f"; did you mean {joined(map(repr, near), 'or')}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""
 
 

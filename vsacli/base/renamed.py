@@ -78,7 +78,7 @@ RENAMINGS: tuple[Renaming, ...] = (
     Renaming("parameter", "preload", "branch", "`Antagonistic`, `mechanisms.ShiftedCams`"),
     Renaming("Python name", "opposite_preload", "opposite_branch", "`mechanisms.Mechanism`"),
     Renaming("Python name", "other_preload", "other_branch", "`mechanisms.Mechanism`"),
-    Renaming("key of reports", "steps", "samples", "`joints`, and their `uncertainty`"),
+    Renaming("key of reports", "steps", "samples", "`joints`, their `uncertainty`, and `simulate`"),
     Renaming("key of reports", "reachable", "attainable", "`margin` of `joints`"),
     Renaming("key of reports", "torque_step", "torque_discontinuity", "`start` of `joints`"),
     Renaming("option", "--near-singular", "--min-margin", "check-feasibility"),

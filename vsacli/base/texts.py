@@ -58,10 +58,10 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or noun + 's'}"
 
 
-def alternatives(words: Iterable[str]) -> str:
-    """Return words to choose from: `a, b or c`."""
+def joined(words: Iterable[str], conjunction: str = "and") -> str:
+    """Return words joined for a sentence: `a, b and c`, or with another conjunction."""
     *others, last = words
-    return f"{', '.join(others)} or {last}" if others else last
+    return f"{', '.join(others)} {conjunction} {last}" if others else last
 
 
 def verdict_words(verdict: str) -> str:

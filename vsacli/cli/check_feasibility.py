@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.base.texts import alternatives
+from vsacli.base.texts import joined
 from vsacli.cli.command_parts import (
     compute,
     deflection_solver_option,
@@ -183,6 +183,6 @@ def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Tal
     else:
         count = len(found.fixes)
         there = f"are {count} fixes" if count > 1 else "is 1 fix"
-        choice = alternatives(map(str, range(1, count + 1)))
+        choice = joined(map(str, range(1, count + 1)), "or")
         reason = f"there {there}, no fix {number}; give --write-fix {choice}"
     talk.note(f"{path} is not written: {reason}")

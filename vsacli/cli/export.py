@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
-from vsacli.base.texts import alternatives
+from vsacli.base.texts import joined
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -148,7 +148,7 @@ def _endings(form: str) -> tuple[str, ...]:
 
 def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
     """Return the format named by --format or by the ending of the output; CSV without either."""
-    words, name = alternatives(formats), output or ""
+    words, name = joined(formats, "or"), output or ""
     if form is not None and form not in formats:
         others = "robots" if formats is OF_RESULTS else "results"
         raise InputError.one(f"--format {form} is for {others}; a {kind} is written as {words}", file)
@@ -165,7 +165,7 @@ def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind:
             raise InputError.one(message, name)
         return form
     if len(able) != 1 and formats is not OF_RESULTS:
-        options = alternatives([f"--format {each}" for each in formats])
+        options = joined([f"--format {each}" for each in formats], "or")
         raise InputError.one(f"is a {kind}; choose its format: {options}", file)
     return able[0] if able else "csv"
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from vsacli.base.errors import InputError, InvalidRecordError, Problem, StorageError
 from vsacli.base.storage import STANDARD
-from vsacli.base.texts import alternatives
+from vsacli.base.texts import joined
 
 
 @contextmanager
@@ -70,7 +70,7 @@ def naming_kind(argument: str, path: str | None, expected: tuple[str, ...]) -> I
             raise
         if kind == "urdf" and argument in _INPUTS:  # readers of these say more of XML files
             raise
-        needed = alternatives(map(in_words, expected))
+        needed = joined(map(in_words, expected), "or")
         message = f"is {in_words(kind)}, but {argument} must be {needed}"
         raise InputError.one(message + _advice(kind, argument, path, expected), path) from error
 

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from vsacli.control.simulation.joint_tracking import GoalTolerance
     from vsacli.control.simulation.perturbation import perturbed, simulate_perturbed
     from vsacli.control.simulation.sensors import Sensors
-    from vsacli.control.simulation.simulate import InitialError, simulate
+    from vsacli.control.simulation.simulate import simulate
+    from vsacli.control.simulation.start import InitialError
 
 __all__ = [
     "FeedbackLinearization",

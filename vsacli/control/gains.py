@@ -139,8 +139,12 @@ def _coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[Fl
     for pole in table.ravel():
         check_stable(name, pole)
     polynomials = [np.poly(row) for row in table]
-    if any(np.iscomplexobj(polynomial) for polynomial in polynomials):
-        raise InputError.one(f"a complex pole of the {name} error lacks its conjugate")
+    for row, polynomial in zip(table.tolist(), polynomials, strict=True):
+        if np.iscomplexobj(polynomial):
+            pole = next(each for each in row if row.count(each) > row.count(each.conjugate()))
+            missing = pole_text(pole.conjugate())
+            reason = f"the complex pole {pole_text(pole)} of the {name} error has no conjugate"
+            raise InputError.one(f"{reason}; add {missing}")
     rows = np.array(polynomials)[:, :0:-1]
     return (rows[:, 1:], rows[:, 0]) if rows.shape[1] % 2 else (rows, np.zeros(len(rows)))
 
@@ -152,10 +156,14 @@ def check_stable(name: str, pole: complex) -> None:
         InputError: its real part is not negative.
     """
     if not pole.real < 0:
-        shown = f"{pole:g}" if pole.imag else f"{pole.real:g}"
-        raise InputError.one(
-            f"the pole {shown} of the {name} error is unstable; its real part must be negative"
-        )
+        stable = f", e.g. {pole_text(complex(-pole.real, pole.imag))}" if pole.real > 0 else ""
+        shown = f"{pole_text(pole)} of the {name} error"
+        raise InputError.one(f"the pole {shown} is unstable; its real part must be negative{stable}")
+
+
+def pole_text(pole: complex) -> str:
+    """Return a pole as users write it."""
+    return f"{pole:g}" if pole.imag else f"{pole.real:g}"
 
 
 def _check_hurwitz(name: str, gains: FloatArray, integral: float) -> None:

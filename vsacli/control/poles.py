@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -53,8 +53,12 @@ class PolesFile:
         check_fields(self)
 
 
-def parse_poles(written: str) -> Poles:
+def parse_poles(written: str, alternative: str = "") -> Poles:
     """Parse poles separated by commas, e.g. `-20, -21, -10+5j, -10-5j`.
+
+    Args:
+        written: text of a user.
+        alternative: clause on what else the text may be, for the error.
 
     Raises:
         InputError: the text is something else.
@@ -62,7 +66,8 @@ def parse_poles(written: str) -> Poles:
     try:
         return tuple(complex(re.sub(r"\s", "", word)) for word in written.split(","))
     except ValueError:
-        raise InputError.one(f"expected poles such as -20,-21,-10+5j,-10-5j, not {written!r}") from None
+        expected = f"expected poles such as -20,-21,-10+5j,-10-5j{alternative}"
+        raise InputError.one(f"{expected}, found {written!r}") from None
 
 
 def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bool) -> Gains:
@@ -71,7 +76,9 @@ def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bo
     Raises:
         InputError: poles are invalid, or their number is not the one that the robot needs.
     """
-    return _gains(robot, [parse_poles(position)], [parse_poles(stiffness)], integral)
+    return _gains(
+        robot, {"": parse_poles(position, ", or a YAML file")}, {"": parse_poles(stiffness)}, integral
+    )
 
 
 def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) -> Gains:
@@ -88,9 +95,9 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
     missing = [name for name in robot.joint_names if name not in given]
     if missing:
         raise InputError.one(f"no poles for {', '.join(missing)}; each joint needs them", source.path)
-    joints = [given[name] for name in robot.joint_names]
     position, stiffness = (
-        [parse_poles(getattr(joint, name)) for joint in joints] for name in ("position", "stiffness")
+        {f"{name}: ": parse_poles(getattr(given[name], error)) for name in robot.joint_names}
+        for error in ("position", "stiffness")
     )
     try:
         return replace(_gains(robot, position, stiffness, integral), sources=(source,))
@@ -98,23 +105,25 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
         raise InputError.one(str(error), source.path) from None
 
 
-def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], integral: bool) -> Gains:
+def _gains(
+    robot: Robot, position: Mapping[str, Poles], stiffness: Mapping[str, Poles], integral: bool
+) -> Gains:
+    """Return the gains for the poles of each joint, by the beginnings of error messages on them."""
     sprung = any(actuator.sprung for actuator in robot.actuators)
     order = POSITION_ORDER if sprung else RIGID_ORDER
     return Gains.from_poles(
-        [_counted("position", poles, order, integral) for poles in position],
-        [_counted("stiffness", poles, STIFFNESS_ORDER, integral) for poles in stiffness],
+        [_completed(of, "position", poles, order, integral) for of, poles in position.items()],
+        [_completed(of, "stiffness", poles, STIFFNESS_ORDER, integral) for of, poles in stiffness.items()],
     )
 
 
-def _counted(name: str, poles: Poles, order: int, integral: bool) -> Poles:
+def _completed(of: str, name: str, poles: Poles, order: int, integral: bool) -> Poles:
     """Return one pole for each state of the error; a single one is repeated."""
     count = order + integral
     if len(poles) == 1:
         return poles * count
     if len(poles) != count:
-        action = "with" if integral else "without"
-        raise InputError.one(
-            f"the {name} error of this robot has {count} poles {action} integral action, not {len(poles)}"
-        )
+        other = f"{order} without" if integral else f"{order + 1} with"
+        expected = f"{of}expected {count} poles of the {name} error ({other} integral action)"
+        raise InputError.one(f"{expected}, or 1 that is repeated, found {len(poles)}")
     return poles

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
-from vsacli.base.texts import sentence
+from vsacli.base.texts import counted, sentence
 from vsacli.base.version import __version__
 from vsacli.compute.tracing import TooLongError
 from vsacli.control.codegen.cost import worst_cost
@@ -33,8 +33,8 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
 WITHOUT_PARAMETERS = (
-    "feedback_linearization: its mass matrix, springs and motors have the parameters of the "
-    "robot file, so that it has none as inputs; to generate it, omit --parameters"
+    "feedback_linearization with --parameters, since it uses the values of the robot file; leave out "
+    "--parameters to get it"
 )
 
 
@@ -76,7 +76,7 @@ def generate(
             that cannot be an argument.
     """
     prefix = prefix_of(robot)
-    joints = "1 joint" if len(robot.joints) == 1 else f"{len(robot.joints)} joints"
+    joints = counted(len(robot.joints), "joint")
     title = f"{robot.name}, {joints}, {precision}. Written by vsacli {__version__}."
     about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
     chosen = parameters(robot, patterns) if patterns else ()
@@ -150,9 +150,10 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
     names = [
         each.joints[0].name for each in alone if worst_cost(inverse_dynamics_function(each).program).loops
     ]
+    solved = f"{', '.join(names)} of {robot.name} {'is' if len(names) == 1 else 'are'} solved by iteration"
     raise InputError.one(
-        f"{robot.name} needs loops at {', '.join(names)}: code without loops needs actuators with a closed "
-        "solution, such as pairs of equal cubic, sinh, exponential or quadratic springs"
+        f"{solved}; only pairs of equal cubic, sinh, exponential or quadratic springs have a closed-form "
+        "solution"
     )
 
 

@@ -28,7 +28,7 @@ from vsacli.robot.model import Robot
 DIGEST = "0xd19e5700u"
 """Placeholder for the digest of all texts until it is known; a valid C constant, so that texts compile."""
 
-_STEPS = "As a rule a loop ends after a handful of steps; near double solutions it takes more.\n"
+_STEPS = "As a rule a loop ends after a few iterations; near double solutions it takes more.\n"
 
 
 class _Template(string.Template):

@@ -4,7 +4,8 @@ from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.perturbation import perturbed
 from vsacli.control.simulation.sensors import Sensors
-from vsacli.control.simulation.simulate import Feedback, InitialError, Simulation, check_feedback, simulate
+from vsacli.control.simulation.simulate import Feedback, Simulation, check_feedback, simulate
+from vsacli.control.simulation.start import InitialError
 
 __all__ = [
     "Feedback",

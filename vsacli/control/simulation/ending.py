@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
+from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 
 DIVERGED = "diverged"
@@ -36,7 +38,8 @@ class Ending:
     def described(self, joint_names: Sequence[str], first: float) -> str:
         """Return a sentence on the end; `first` is the stamp of time zero, s."""
         place = "" if self.joint is None else f"{joint_names[self.joint]}: "
-        return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}"
+        early = "" if self.time > 0 else ", before the first step"
+        return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}{early}"
 
 
 LEAST_DEFAULT = 200_000
@@ -61,6 +64,10 @@ Progress = Callable[[float], None]
 """Function called with the time reached, s."""
 
 
+class SpentError(Exception):
+    """The budget does not allow an evaluation; raised inside the integration, which then ends the run."""
+
+
 class Budget:
     """A budget of evaluations of the equations of motion.
 
@@ -70,7 +77,9 @@ class Budget:
 
     Attributes:
         limit: number of evaluations after which a run ends.
-        used: evaluations so far.
+        used: evaluations so far, at most `limit`.
+        reserved: evaluations that must be left over; see `stopping`.
+        exhausted: whether an evaluation was refused.
 
     Raises:
         InputError: the limit is below 1.
@@ -78,10 +87,25 @@ class Budget:
 
     def __init__(self, limit: int | None, times: FloatArray) -> None:
         if limit is not None and limit < 1:
-            raise InputError.one(f"the budget must be at least 1 evaluation, not {limit}")
+            raise InputError.one(f"the budget must be at least 1, not {limit}")
         self.limit = max(LEAST_DEFAULT, DEFAULT_PER_STEP * len(times)) if limit is None else limit
-        self.used = 0
+        self.used, self.reserved, self.exhausted = 0, 0, False
         self._first, self._last = float(times[0]), float(times[-1])
+
+    def check(self, evaluations: int) -> None:
+        """Raise an error if so many further evaluations would exceed the limit.
+
+        Raises:
+            SpentError: they would.
+        """
+        if self.used + evaluations > self.limit - self.reserved:
+            self.exhausted = True
+            raise SpentError
+
+    def ending(self, time: float) -> Ending:
+        """Return the end of a run at a time, s, at which the budget is used up."""
+        reason = f"the budget of {counted(self.limit, 'evaluation')} of the equations of motion is used up"
+        return Ending(time, reason, verdict=INCOMPLETE)
 
     def spent(self, _time: float) -> bool:
         """Return whether the budget is used up."""
@@ -95,13 +119,36 @@ class Budget:
         return self.used > TRIAL * self.limit and projected > share * (time - self._first)
 
 
+def stopping(method: Any, budget: Budget, reserve: int) -> Any:
+    """Return a method of `solve_ivp` that fails, and keeps earlier samples, in a step beyond the budget.
+
+    Args:
+        method: class of the method.
+        budget: budget that `check` guards.
+        reserve: evaluations for dense output, which a step must leave over.
+    """
+
+    class Stopping(method):  # type: ignore[misc]
+        def step(self) -> Any:
+            budget.reserved = reserve
+            try:
+                return super().step()
+            except SpentError:
+                self.status = "failed"
+                return None
+            finally:
+                budget.reserved = 0
+
+    return Stopping
+
+
 class Deadline:
     """An event of `solve_ivp` at the end of the step in which the budget is used up.
 
     It is called at each step, and reports the progress.
 
     Args:
-        limit: budget, for the message.
+        budget: budget of the run.
         is_due: function that returns whether to stop at a time, s.
         last: time at which the run ends regularly, s.
         progress: function called with the time reached, s.
@@ -113,8 +160,10 @@ class Deadline:
     terminal = True
     direction = -1.0
 
-    def __init__(self, limit: int, is_due: Callable[[float], bool], last: float, progress: Progress) -> None:
-        self._limit = limit
+    def __init__(
+        self, budget: Budget, is_due: Callable[[float], bool], last: float, progress: Progress
+    ) -> None:
+        self._budget = budget
         self._is_due, self._last, self._progress = is_due, last, progress
         self.time = math.inf
 
@@ -127,5 +176,4 @@ class Deadline:
 
     def ending(self, time: float, _vector: FloatArray) -> Ending:
         """Return the end of a run at this time."""
-        reason = f"the budget of {self._limit} evaluations of the equations of motion is used up"
-        return Ending(time, reason, verdict=INCOMPLETE)
+        return self._budget.ending(time)

@@ -91,6 +91,8 @@ def sampled(
     loop.hold(demands[0])
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
         time, after, ending = integrator.over(interval, states[-1][-1])
+        if time[-1] == time[0]:  # the budget was used up before the first step of the interval
+            break
         reached.append(time[1:])
         states.append(after[1:])
         measurement.add(read(after[-1], sample), time[-1] - time[0])

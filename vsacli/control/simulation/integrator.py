@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -17,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored
 from vsacli.control.simulation.compiled_loop import dop853_with_stages
-from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress
+from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress, SpentError, stopping
 from vsacli.control.simulation.loop_equations import Edge, Equations
 from vsacli.control.simulation.stick_slip import StickSlip, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
@@ -47,12 +49,12 @@ class Tolerances:
     atol: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not (SMALLEST_RTOL <= self.rtol <= LARGEST_TOLERANCE and 0 < self.atol <= LARGEST_TOLERANCE):
-            raise InputError.one(
-                f"the tolerances of the integration must be positive and at most {LARGEST_TOLERANCE:g}, the "
-                f"relative one at least {SMALLEST_RTOL:g}, not {self.rtol:g} (relative) and {self.atol:g} "
-                "(absolute)"
-            )
+        if not SMALLEST_RTOL <= self.rtol <= LARGEST_TOLERANCE:
+            bounds = f"from {SMALLEST_RTOL:g} to {LARGEST_TOLERANCE:g}"
+            raise InputError.one(f"the relative tolerance must be {bounds}, not {self.rtol:g}")
+        if not 0 < self.atol <= LARGEST_TOLERANCE:
+            bounds = f"above 0 and at most {LARGEST_TOLERANCE:g}"
+            raise InputError.one(f"the absolute tolerance must be {bounds}, not {self.atol:g}")
 
 
 @dataclass(frozen=True)
@@ -119,23 +121,33 @@ class Integrator:
         if self._methods[-1].name == IMPLICIT:
             return self._implicit(times, start)
         reached, states, ending = self._explicit(times, start)
-        if ending is None or ending.verdict != INCOMPLETE:
+        if ending is None or ending.verdict != INCOMPLETE or self._budget.exhausted:
             return reached, states, ending
-        self._methods.append(Method(IMPLICIT, ending.time))
-        rest = np.concatenate((reached[-1:], times[times > ending.time]))
+        change = ending.time
+        rest = np.concatenate((reached[-1:], times[times > change]))
         later, after, ending = self._implicit(rest, states[-1])
+        if len(later) == 1:  # the budget is too small for the implicit method
+            return reached, states, ending
+        self._methods.append(Method(IMPLICIT, change))
         return np.append(reached[:-1], later[1:]), np.concatenate((states[:-1], after[1:])), ending
 
     def _explicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
-        steps: dict[str, Any] = {"method": dop853_with_stages(), "stages": self.equations.stages}
+        method = dop853_with_stages()
+        within = stopping(method, self._budget, reserve=len(method.C_EXTRA))
+        steps: dict[str, Any] = {"method": within, "stages": self.equations.stages}
         return self._solve(times, start, self._budget.too_slow, atol=self._tolerances.atol, **steps)
 
     def _implicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
+        from scipy.integrate import Radau
+
         slope = partial(jacobian, self.equations)
-        floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
+        try:
+            floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
+        except SpentError:
+            return times[:1], start[None], self._budget.ending(float(times[0]))
         atol = np.maximum(self._tolerances.atol, floor)
-        spent = self._budget.spent
-        return self._solve(times, start, spent, method=IMPLICIT, atol=atol, jac=slope)
+        within = stopping(Radau, self._budget, reserve=0)
+        return self._solve(times, start, self._budget.spent, method=within, atol=atol, jac=slope)
 
     def _solve(
         self,
@@ -144,7 +156,7 @@ class Integrator:
         is_due: Callable[[float], bool],
         **options: Any,
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
-        deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
+        deadline = Deadline(self._budget, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may have changed since the last call
             self._sliding.settle(float(times[0]), start)
@@ -162,6 +174,8 @@ class Integrator:
         reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
         if not len(reached):  # a span of zero length, or a failure of the first step
             reached, states = first, start[None]
+        if self._budget.exhausted:
+            return reached, states, self._budget.ending(float(reached[-1]))
         if solution.status < 0:
             reason = "the motion became too fast to integrate"
             return reached, states, Ending(float(reached[-1]), reason)
@@ -176,11 +190,16 @@ class Integrator:
         events: Sequence[Any],
         options: Mapping[str, Any],
     ) -> Any:
-        """Return a solution from a time on, at further times, up to the first event or the last time."""
+        """Return a solution from a time on, at further times, up to the first event or the last time.
+
+        It is empty if the budget is too small even for a first step.
+        """
         from scipy.integrate import solve_ivp
 
         time, times = span
-        with np.errstate(all="ignore"):  # a trial step may leave the range of a law
+        none: list[Any] = [()] * len(events)
+        empty = SimpleNamespace(t=(), t_events=none, y_events=none, status=-1)
+        with np.errstate(all="ignore"), suppress(SpentError):  # a trial step may leave the range of a law
             return solve_ivp(
                 self.equations,
                 (time, float(times[-1])),
@@ -191,6 +210,7 @@ class Integrator:
                 max_step=self._sliding.longest_step if self._sliding else math.inf,
                 **options,
             )
+        return empty
 
 
 def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray]:

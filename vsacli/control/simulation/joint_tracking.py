@@ -26,7 +26,7 @@ from vsacli.dynamics.losses import positive_part, trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
-_GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%, not {!r}"
+_GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class GoalTolerance:
 
     def __post_init__(self) -> None:
         if not (0 <= self.share <= 1 and 0 <= self.absolute < math.inf and self.share + self.absolute > 0):
+            parts = f"share={self.share:g} and absolute={self.absolute:g}"
             raise InputError.one(
-                "the tolerance must be positive and finite, as a share at most 100 %: "
-                f"not {100 * self.share:g} % + {self.absolute:g} rad (m)"
+                f"a goal tolerance must be positive and finite, its share at most 1: not {parts}"
             )
 
     @classmethod
@@ -62,8 +62,13 @@ class GoalTolerance:
         try:
             number = float(text.removesuffix("%"))
         except ValueError:
-            raise InputError.one(f"--goal-tolerance: {_GRAMMAR.format(written)}") from None
-        return cls(share=number / 100) if text.endswith("%") else cls(0.0, number)
+            raise InputError.one(f"{_GRAMMAR}, found {written!r}") from None
+        share = text.endswith("%")
+        try:
+            return cls(share=number / 100) if share else cls(0.0, number)
+        except InputError:
+            bounds = "from 0 % to 100 % of a joint's range" if share else "positive and finite"
+            raise InputError.one(f"the goal tolerance must be {bounds}, not {text}") from None
 
     def of(self, commanded_range: float) -> float:
         """Return the tolerance of a joint commanded over a range, rad (m)."""
@@ -214,19 +219,25 @@ def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
-    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
+    motors = " / ".join(error_text(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
     return (joint.name, *map(_pair, (joint.q, joint.stiffness)), motors)
 
 
 def _pair(deviation: Deviation) -> str:
     if math.isnan(deviation.peak):
         return "-"
-    return f"{_number(deviation.peak)} / {_number(deviation.final)}"
+    return f"{error_text(deviation.peak)} / {error_text(deviation.final)}"
 
 
-def _number(value: float) -> str:
-    """Return a number as reports show it, with two digits if it is small."""
-    return number(value) if abs(value) >= 10 else "-" if math.isnan(value) else f"{value:.2g}"
+SMALLEST_ERROR = 1e-12
+"""Magnitude below which an error or torque is shown as 0: rounding of values near 1."""
+
+
+def error_text(value: float) -> str:
+    """Return a number as reports show it: with two digits if it is small, 0 if it is rounding."""
+    if math.isnan(value):
+        return "-"
+    return number(value) if abs(value) >= 10 else "0" if abs(value) < SMALLEST_ERROR else f"{value:.2g}"
 
 
 def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Problem]:

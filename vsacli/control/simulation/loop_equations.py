@@ -44,8 +44,13 @@ class Equations:
         return {"engine": "numpy", "compiler": "", "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
-        """Return the time derivatives of state vectors, (..., entries), at a time, s."""
-        self.budget.used += vectors.size // vectors.shape[-1]
+        """Return the time derivatives of state vectors, (..., entries), at a time, s.
+
+        Raises:
+            SpentError: the budget does not allow it.
+        """
+        self.budget.check(evaluations := vectors.size // vectors.shape[-1])
+        self.budget.used += evaluations
         return self.loop.derivative(time, vectors)
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
@@ -55,7 +60,11 @@ class Equations:
     def stages(
         self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
     ) -> FloatArray | None:
-        """Compute stages of an explicit step; see `CompiledLoop.stages`. None leaves them to SciPy."""
+        """Compute stages of an explicit step; see `CompiledLoop.stages`. None leaves them to SciPy.
+
+        Raises:
+            SpentError: the budget does not allow it.
+        """
         return None
 
     def distance(self, vector: FloatArray) -> float:
@@ -178,10 +187,11 @@ class RecordedEquations(Equations):
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
         """See `Equations.__call__`; NumPy evaluates again where a result is not finite."""
         self._improve()
+        self.budget.check(evaluations := vectors.size // vectors.shape[-1])
         rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
         if rates is None:
             return super().__call__(time, vectors)
-        self.budget.used += vectors.size // vectors.shape[-1]
+        self.budget.used += evaluations
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
@@ -196,10 +206,11 @@ class RecordedEquations(Equations):
         self._improve()
         if self._compiled is None:
             return None
+        self.budget.check(evaluations := which.last - which.first + 1)
         state = self._compiled.stages(time, step, vector, which, rates)
         if not math.isfinite(rates[which.last].sum()):
             return None
-        self.budget.used += which.last - which.first + 1
+        self.budget.used += evaluations
         return state
 
     def distance(self, vector: FloatArray) -> float:

@@ -39,7 +39,8 @@ def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
         InputError: the error is not in that range, or an actuator cannot have a constant that results.
     """
     if not 0 <= relative < 1:
-        raise InputError.one(f"the relative error of the model must lie between 0 and 1, not {relative:g}")
+        bounds = "at least 0 and below 1, e.g. 0.05 for 5 %"
+        raise InputError.one(f"the model error must be {bounds}, not {relative:g}")
     if seed < 0:
         raise InputError.one(f"the seed must be zero or positive, not {seed}")
     if relative == 0:

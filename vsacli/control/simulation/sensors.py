@@ -42,10 +42,11 @@ class Sensors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not all(0 <= each <= LARGEST for each in (self.position, self.torque)):
-            raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
+        for noise in (self.position, self.torque):
+            if not 0 <= noise <= LARGEST:
+                raise InputError.one(f"the sensor noise must be from 0 to {LARGEST:g}, not {noise:g}")
         if self.encoder_bits is not None and not 1 <= self.encoder_bits <= MOST_BITS:
-            raise InputError.one(f"encoders have 1 to {MOST_BITS} bits, not {self.encoder_bits}")
+            raise InputError.one(f"an encoder must have 1 to {MOST_BITS} bits, not {self.encoder_bits}")
         if self.seed < 0:
             raise InputError.one(f"the seed must be zero or positive, not {self.seed}")
 
@@ -117,7 +118,8 @@ def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
     lower, upper = joint.limits.position
     if not math.isfinite(upper - lower):
         raise InputError.one(
-            f"encoder bits: joint {joint.name} slides, nobody knows how far; give it limits.position"
+            f"{joint.name}: the resolution of its encoder is unknown, since it is prismatic without position "
+            "limits; give it limits.position"
         )
     return upper - lower
 

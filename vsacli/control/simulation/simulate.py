@@ -11,14 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from vsacli.analysis.run import Run
 from vsacli.analysis.trouble_text import undetermined_text
-from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, has
 from vsacli.base.progress import Tell, unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
@@ -30,66 +27,14 @@ from vsacli.control.simulation.joint_tracking import GoalTolerance, joint_tracki
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
+from vsacli.control.simulation.start import InitialError, start_state, strange_errors
 from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
-
-
-@dataclass(frozen=True)
-class InitialError:
-    """Difference of the initial state from the command, one value for all joints or one for each.
-
-    Attributes:
-        q: error of the position, rad (m).
-        stiffness: error of the joint stiffness, N m/rad (N/m).
-    """
-
-    q: npt.ArrayLike = 0.0
-    stiffness: npt.ArrayLike = 0.0
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether the initial state is as commanded."""
-        return not (np.any(self.q) or np.any(self.stiffness))
-
-
-def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> State:
-    """Return the initial state by inverse dynamics, with position and stiffness off by the error.
-
-    All derivatives of both are as commanded.
-
-    Raises:
-        InputError: the error has a wrong length, or the state is infeasible or singular.
-    """
-    motion = trajectory.at(np.array(trajectory.times.span[:1]))
-    joints = len(robot.joints)
-    offsets = {name: _per_joint(name, getattr(error, name), joints) for name in ("q", "stiffness")}
-    arrays = motion.of_joints
-    shifted = {**arrays, **{name: arrays[name] + offset for name, offset in offsets.items()}}
-    block = compute_block(robot, Motion.of(motion.time, shifted, motion.wrench))
-    failing = has(block.flags[0], Flag.INFEASIBLE | Flag.SINGULAR)
-    if failing.any():
-        names = ", ".join(name for name, fails in zip(robot.joint_names, failing, strict=True) if fails)
-        raise InputError.one(
-            f"no state at the start has this position and stiffness ({names}: out of reach, or singular); "
-            "raise the stiffness at the start, or choose smaller initial errors"
-        )
-    return State(q=block.q[0], dq=block.dq[0], theta=block.theta[0], dtheta=block.dtheta[0])
-
-
-def _per_joint(name: str, values: npt.ArrayLike, joints: int) -> FloatArray:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (1,), (joints,)) or not np.isfinite(array).all():
-        raise InputError.one(
-            f"the initial error of {name} must be one finite number, or one for each of the {joints} joints"
-        )
-    return np.broadcast_to(array, (joints,))
-
 
 Feedback = Literal["state", "positions"]
 
@@ -184,7 +129,7 @@ def simulate(
         integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine, "runs": runs}
         full = simulate(robot, trajectory, **conditions, **integration).report
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
-    report = _report(robot, trajectory, gains, past, integrated, goal_tolerance, exact, full)
+    report = _report(robot, trajectory, gains, past, integrated, goal_tolerance, initial_error, exact, full)
     return Simulation(past, report, integrated.effort.provenance)
 
 
@@ -195,6 +140,7 @@ def _report(
     past: History,
     integrated: StateTrajectory,
     goal_tolerance: GoalTolerance,
+    initial_error: InitialError,
     exact: bool,
     full: SimulationReport | None,
 ) -> SimulationReport:
@@ -207,6 +153,7 @@ def _report(
         past: variables of the run.
         integrated: integrated states, with the effort and end of the integration.
         goal_tolerance: see `simulate`.
+        initial_error: see `simulate`.
         exact: whether the controller has the exact model, and the initial state is as commanded.
         full: report on the same run with the full state measured; None unless positions are measured.
     """
@@ -226,6 +173,7 @@ def _report(
         methods=tuple(replace(each, start=trajectory.start + each.start) for each in effort.methods),
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
+            *strange_errors(robot, initial_error),
             *_undetermined(robot, trajectory),
             *([_AMPLIFIED] if exact and verdict == "off_target" else []),
             *(stiffness_warnings(robot, past) if ending is None else []),
@@ -247,7 +195,8 @@ def check_feedback(feedback: Feedback, gains: Gains | None) -> None:
         raise InputError.one(f"unknown feedback {feedback!r}{did_you_mean(feedback, words)}")
     if gains is None and feedback == "positions":
         raise InputError.one(
-            "feedforward measures nothing: measured positions need the controller feedback-linearization"
+            "positions as feedback need the controller feedback-linearization; feedforward uses no "
+            "measurements"
         )
 
 
@@ -292,7 +241,9 @@ def _integrate(
     last = loop.controller.ending
     times = trajectory.times.block(0, trajectory.samples)
     if last is not None and last.time <= times[0]:
-        raise InputError.one("the controller's model cannot execute the start of the trajectory")
+        raise InputError.one(
+            "the controller's model cannot execute the start of the trajectory; choose smaller model errors"
+        )
     vector = loop.packing.pack(*loop.plant.unpacked(start))
     slides = sliding(loop)
     if slides is not None:

@@ -15,6 +15,7 @@ from vsacli.analysis.trouble_text import grouped, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
+from vsacli.base.texts import counted
 from vsacli.base.units import POSITION, time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.history import History
@@ -22,6 +23,7 @@ from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
     Deviation,
     JointTracking,
+    error_text,
     problems,
     rows,
 )
@@ -101,7 +103,7 @@ class SimulationReport(Stored):
     budget: int = 0
     methods: tuple[Method, ...] = ()
 
-    format: ClassVar = "vsacli-simulation-report/1"
+    format: ClassVar = "vsacli-simulation-report/2"
     shape: ClassVar = {
         **named("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
         "largest_error?": "largest_error",
@@ -144,9 +146,9 @@ class SimulationReport(Stored):
     def _title(self) -> str:
         """Return names, controller, the largest error, and how many joints fail which requirement."""
         parts = [f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"]
-        if (error := self.largest_error) is not None:
+        if self.samples > 1 and (error := self.largest_error) is not None:
             where = f"{error.joint}, t = {time_text(error.time)}"
-            parts.append(f"largest q error {error.value:.2g} {error.unit} ({where})")
+            parts.append(f"largest q error {error_text(error.value)} {error.unit} ({where})")
         failing = {
             "off target": sum(self.complete and joint.off_course for joint in self.joints),
             "over a limit": sum(bool(joint.worst) for joint in self.joints),
@@ -159,12 +161,12 @@ class SimulationReport(Stored):
             unit = POSITION.unit(joint.type)
             yield (
                 f"{joint.name}: with feedback of the full state the q error would be at most "
-                f"{ideal.peak:.2g} {unit}, {ideal.final:.2g} {unit} at the end"
+                f"{error_text(ideal.peak)} {unit}, {error_text(ideal.final)} {unit} at the end"
             )
 
     def _effort(self) -> Iterator[str]:
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)
-            effort = f"{self.evaluations} of at most {self.budget} evaluations"
+            effort = f"{self.evaluations} of at most {counted(self.budget, 'evaluation')}"
             yield f"integration: {first.name}{changes}; {effort}"

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.texts import alternatives
+from vsacli.base.texts import joined
 from vsacli.base.units import WrenchQuantity, time_text
 from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
@@ -211,7 +211,7 @@ def stride_of(result: StoredResult, rate: float) -> int:
             f"{result.command} with --set rate={rate:.9g}"
         )
     if abs(ratio - stride) > RATE_TOLERANCE * ratio:
-        choices = alternatives(f"{each:.9g}" for each in _near_rates(stored, ratio))
+        choices = joined((f"{each:.9g}" for each in _near_rates(stored, ratio)), "or")
         raise InputError.one(
             f"the stored rate of {stored:.9g} Hz is not a multiple of {rate:.9g} Hz; use {choices} Hz"
         )

@@ -20,7 +20,7 @@ import numpy as np
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
-from vsacli.base.texts import alternatives, one_line, shown
+from vsacli.base.texts import joined, one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     SCALES,
@@ -457,7 +457,7 @@ def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
     for kind in kinds:
         if found is not None and found.startswith(f"{OURS}{kind.kind}/"):
             return other_version(found, kind.format, kind.command)
-    return f"is {kind_of_format(found)}, expected {alternatives(f'a {kind.kind}' for kind in kinds)}"
+    return f"is {kind_of_format(found)}, expected {joined((f'a {kind.kind}' for kind in kinds), 'or')}"
 
 
 def kind_of_format(found: str | None) -> str:

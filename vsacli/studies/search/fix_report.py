@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
+from vsacli.base.texts import joined
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -248,14 +249,9 @@ class Fixes(Published):
             return
         yield from map(str, self.causes)
         left = [cause.joint for cause in self.causes if not cause.fixable]
-        rest = f"every step of all joints but {and_joined(left)}" if left and self.fixes else "every step"
+        rest = f"every step of all joints but {joined(left)}" if left and self.fixes else "every step"
         if self.fixes:
             yield f"fixes, with any one of which {rest} has {margin} and keeps every limit:"
         else:
             yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
         yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
-
-
-def and_joined(names: Sequence[str]) -> str:
-    """Return names joined for a sentence: "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -167,7 +167,10 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     share = PER_CENT.fullmatch(size.text)
     if share is None:
         return Tolerance(shape, _number(size.text, size.text, unit))
-    return Tolerance(shape, _number(share["number"], size.text) / 100 * abs(value))
+    percent = _number(share["number"], size.text)
+    if percent > 100:
+        raise InputError.one(f"{shape}: must be at most 100 %, not {size.text}")
+    return Tolerance(shape, percent / 100 * abs(value))
 
 
 def _number(text: str, whole: str, unit: str = "") -> float:

@@ -101,7 +101,8 @@ class CatalogMotor:
             if getattr(self, name) is not None and missing:
                 yield FieldProblem((name,), f"needs {' and '.join(missing)}, too")
         if all(getattr(self, name) is None for name in _BEARING):
-            yield FieldProblem((), f"nothing bounds its torque: give one of {', '.join(_BEARING)}")
+            columns = f"{', '.join(_BEARING[:-1])} or {_BEARING[-1]}"
+            yield FieldProblem((), f"motor {self.name!r} has no torque limit; give {columns}")
 
     def _stuck(self) -> Iterator[FieldProblem]:
         """Yield a problem if the motor cannot overcome its friction, by torque or voltage."""

@@ -18,6 +18,7 @@ from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published, named
+from vsacli.base.texts import counted
 from vsacli.robot.joint import Joint
 from vsacli.studies.sizing.catalog import CatalogMotor
 from vsacli.studies.sizing.demand import MotorDemand
@@ -82,18 +83,23 @@ def usual_criterion(motors: Sequence[CatalogMotor]) -> str:
     return "copper_loss" if known else "utilization"
 
 
-def check_criterion(criterion: str, motors: Sequence[CatalogMotor]) -> None:
-    """Check that all motors have the value that a criterion needs.
+MOST_NAMED = 5
+"""Largest number of motors that a message lists."""
+
+
+def check_criterion(criterion: str, motors: Sequence[CatalogMotor], path: str) -> None:
+    """Check that all motors of a catalog have the value that a criterion needs.
 
     Raises:
-        InputError: some motors lack it; the error names the first.
+        InputError: some motors lack it; the error names them.
     """
     needed = {"copper_loss": "resistance", "mass": "mass"}.get(criterion)
     lacking = [motor.name for motor in motors if needed and getattr(motor, needed) is None]
     if lacking:
-        more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        reason = f"needs the column {needed}, which {lacking[0]}{more} lacks"
-        raise InputError.one(f"{CRITERIA[criterion]} {reason}")
+        names = ", ".join([*lacking[:MOST_NAMED], *(["..."] if len(lacking) > MOST_NAMED else [])])
+        several = f"{counted(len(lacking), 'motor')} {'lacks' if len(lacking) == 1 else 'lack'}"
+        reason = f"needs the column {needed} in {path}, which {several} ({names})"
+        raise InputError.one(f"minimizing {criterion} {reason}")
 
 
 def choices(

@@ -24,7 +24,8 @@ from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.shaft import Shaft
 
 _RANGE = re.compile(r"(?P<low>[^,]+?)\s*\.\.\s*(?P<high>[^,]+)")
-FORM = "expected ratios such as 50,80,100, or a range such as 30..160"
+_TO_ONE = re.compile(r"\s*(?P<ratio>\d+(\.\d+)?)\s*:\s*1\s*")
+FORM = "expected ratios such as 50,80,100 or a range such as 30..160"
 
 
 class Gears(NamedTuple):
@@ -51,14 +52,18 @@ class Gears(NamedTuple):
         try:
             numbers = [float(word) for word in words]
         except ValueError:
-            raise InputError.one(f"{FORM}, found {text!r}") from None
-        if not all(0 < number < math.inf for number in numbers):
-            raise InputError.one(f"gear ratios must be positive and finite, not {text!r}")
+            to_one = _TO_ONE.fullmatch(text)
+            hint = f"; write {to_one['ratio']}" if to_one else ""
+            raise InputError.one(f"{FORM}, found {text!r}{hint}") from None
+        for word, number in zip(words, numbers, strict=True):
+            if not 0 < number < math.inf:
+                raise InputError.one(f"gear ratios must be positive and finite, not {word.strip()}")
         if ends is None:
             return cls(listed=tuple(sorted(set(numbers))))
         low, high = numbers
         if low > high:
-            raise InputError.one(f"the range {text!r} of gear ratios is empty; the smaller one comes first")
+            upward = "..".join(word.strip() for word in reversed(words))
+            raise InputError.one(f"{text!r} runs downward; write {upward}")
         return cls(low=low, high=high)
 
 
@@ -78,9 +83,9 @@ def gears_of_joints(texts: Sequence[str], joints: Sequence[str]) -> dict[str, Ge
         name, equals, ratios = (part.strip() for part in text.rpartition("="))
         gears = Gears.read(ratios)
         if equals and name not in joints:
-            raise InputError.one(f"{text!r}: there is no joint {name!r}{did_you_mean(name, joints)}")
+            raise InputError.one(f"{text}: there is no joint {name!r}{did_you_mean(name, joints)}")
         if name in found or (not equals and common is not None):
-            raise InputError.one(f"{text!r}: the gears of {name or 'all joints'} were given already")
+            raise InputError.one(f"{text}: the gears of {name or 'all joints'} were given already")
         if equals:
             found[name] = gears
         else:

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from vsacli.actuators.motor import SHAFT, JointMotor
 from vsacli.actuators.reach import LIMIT_ROUNDING
@@ -76,7 +79,8 @@ def size_drives(
     own = [motor for joint in robot.joints for motor in joint.actuator.motors]
     offered = _offered(robot, demand.motors, table, by_joint, criterion)
     found = [_sized(*each, table) for each in zip(demand.motors, own, offered, strict=True)]
-    warnings = [*robot.warnings, *(warning for motion in trajectories for warning in motion.warnings)]
+    of_motions = [warning for motion in trajectories for warning in motion.warnings]
+    warnings = [*robot.warnings, *of_motions, *_repeated(trajectories)]
     return Sizing(
         robot=robot.name,
         outcomes=demand.outcomes,
@@ -90,18 +94,37 @@ def size_drives(
     )
 
 
+INSTANTS = 9
+"""Evenly spread times at which two trajectories with the same file are compared."""
+
+
+def _repeated(trajectories: Sequence[Trajectory]) -> Iterator[str]:
+    """Yield a warning for each trajectory that is given several times, which weights means."""
+
+    def content(trajectory: Trajectory) -> tuple[Any, ...]:
+        motion = trajectory.at(np.linspace(*trajectory.times.span, INSTANTS))
+        path = trajectory.sources[0].path if trajectory.sources else trajectory.name
+        return (path, *(array.tobytes() for array in motion.of_joints.values()))
+
+    for (path, *_), times in Counter(map(content, trajectories)).items():
+        if times > 1:
+            often = "twice" if times == 2 else f"{times} times"
+            yield f"{path} is given {often}; give each trajectory once"
+
+
 def _criterion(
     table: RecordTable[CatalogMotor] | None, gears: Sequence[str], minimize: str | None
 ) -> str | None:
     if table is None:
-        if gears or minimize is not None:
-            raise InputError.one("gears and a criterion are for motors of a catalog; give one")
+        for given, words in ((gears, "gears need"), (minimize, "minimize needs")):
+            if given:
+                raise InputError.one(f"{words} a catalog of motors; give one")
         return None
     if minimize is None:
         return usual_criterion(table.records)
     if minimize not in CRITERIA:
         raise InputError.one(f"unknown criterion {minimize!r}{did_you_mean(minimize, CRITERIA)}")
-    check_criterion(minimize, table.records)
+    check_criterion(minimize, table.records, table.source.path)
     return minimize
 
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText, cell, headline
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, joined
 from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, in_header, time_text, units_of
 from vsacli.studies.sizing.choices import CRITERIA, Choice
 from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
@@ -107,14 +107,17 @@ class Sizing(Published):
         which = f"{places - lacking} of {places} motors" if lacking else every
         if self.catalog is None:
             if not any(motor.own and motor.own.shares for motor in self.motors):
-                return "demands on its motors, for which the robot file has no limits"
+                limits = "the robot file has no motor limits to compare with (such as max_torque)"
+                return f"requirements on the motors; {limits}, and no catalog is given"
             suffice = "suffices" if places - lacking == 1 else "suffice"
             return f"{which} {suffice}{_highest(self.motors)}"
         assert self.criterion is not None, "as of every catalog"
-        offered = f"{self.catalog} ({counted(self.candidates, 'motor')}) has"
+        offered = f"{self.catalog} ({counted(self.candidates, 'motor')})"
         if lacking == places:
-            return f"{offered} none that suffices"
-        return f"{offered} a choice for {which}{_highest(self.motors)}, chosen by {CRITERIA[self.criterion]}"
+            return f"no motor of {offered} suffices"
+        return (
+            f"{offered} has a choice for {which}{_highest(self.motors)}, chosen by {CRITERIA[self.criterion]}"
+        )
 
 
 def _highest(motors: Sequence[MotorSizing]) -> str:
@@ -145,9 +148,10 @@ def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
     for outcome in outcomes:
         if outcome.left_out:
             missing = f"{outcome.left_out} of {counted(outcome.samples, 'sample')}"
+            were = "was" if outcome.left_out == 1 else "were"
             yield (
-                f"{outcome.trajectory}: {missing} infeasible or singular and left out, so the answer is not "
-                "for the whole motion; check-feasibility says why"
+                f"{outcome.trajectory}: {missing} {were} left out as infeasible or singular, so the result "
+                "does not hold for the whole motion; see vsacli check-feasibility"
             )
 
 
@@ -259,17 +263,15 @@ def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
     """Yield a sentence for each motor for which nothing suffices: nearest choice and violated limits."""
     for motor in motors:
         shares = _shares(motor)
-        beyond = [
-            f"{_share(shares[name])} of its {WORDS[name]}" for name in LIMITS if shares.get(name, 0) > 1
-        ]
+        beyond = [_used(shares[name], WORDS[name]) for name in LIMITS if shares.get(name, 0) > 1]
         if motor.asked is None:
             yield f"{motor.name}: no sample is feasible, so nothing is known of it"
         elif motor.best is not None:
             with_gear = f"{motor.best.motor} with the gear {motor.best.ratio:.4g}"
             others = "" if math.isnan(motor.best.low) else f"; gears {_gears(motor.best)} would suffice"
-            yield f"{motor.name}: no motor suffices; {with_gear} would use {_listed(beyond)}{others}"
+            yield f"{motor.name}: no motor suffices; {with_gear} would use {joined(beyond)}{others}"
         else:
-            reason = f"it uses {_listed(beyond)}{_other_gears(motor)}"
+            reason = f"it uses {joined(beyond)}{_other_gears(motor)}"
             yield f"{motor.name}: {reason}"
 
 
@@ -338,17 +340,21 @@ def _percentage(share: float) -> str:
     return cell(100 * share)
 
 
+MANY = 10
+"""Share of a limit from which on it is shown as a multiple."""
+
+
 def _share(share: float) -> str:
     if math.isnan(share):
         return "-"
-    return f"{100 * share:.3g} %" if share < 10 else f"{share:.3g} times"
+    return f"{100 * share:.3g} %" if share < MANY else f"{share:.3g} times"
+
+
+def _used(share: float, limit: str) -> str:
+    return f"{_share(share)} {'of ' if share < MANY else ''}its {limit}"
 
 
 def _when(peak: Peak, *, several: bool) -> str:
     if math.isnan(peak.time):
         return "-"
     return f"{peak.trajectory} {time_text(peak.time)}" if several else time_text(peak.time)
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join(words)

@@ -234,6 +234,11 @@ class Entries:
         problems, held_numbers = Problems(self._path), self._numbers()
         for varied in self._file.vary:
             with _noting(problems, varied):
+                if self._file.method == GRID and isinstance(varied.way, Drawn | Ranged):
+                    raise InputError.one(
+                        "has a distribution, which the method grid cannot draw; set method: random or "
+                        "latin_hypercube, or list values"
+                    )
                 further = dimensions_of(varied, held_numbers, self._dimensions)
                 self._found += [(varied, dimension) for dimension in further]
         counts = Counter(dimension.path for dimension in self._dimensions)
@@ -277,8 +282,9 @@ def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
         yield
     except InputError as error:
         for problem in error.problems:
-            message = problem.message.removeprefix(f"{varied.path}: ")
-            problems.add(varied.line, f"{varied.path}: {message}")
+            place, colon, fault = problem.message.partition(": ")
+            repeated = colon and fnmatchcase(place, varied.path)  # also with the number of a joint for a *
+            problems.add(varied.line, f"{varied.path}: {fault if repeated else problem.message}")
 
 
 MOST_RUNS = 1_000_000

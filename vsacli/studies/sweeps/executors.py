@@ -275,9 +275,12 @@ class Cluster(Executor):
         try:
             get_address_host_port(self._address, strict=True)
             return distributed.Client(self._address, timeout=CONNECT_SECONDS)
-        except (OSError, ValueError) as error:
-            expected = "expected the address of a Dask scheduler such as tcp://host:8786, or local"
-            raise InputError.one(f"--dask {self._address}: {error}; {expected}") from None
+        except ValueError:
+            expected = "expected the address of a scheduler such as tcp://host:8786, or local"
+            raise InputError.one(f"{expected}, found {self._address!r}") from None
+        except OSError:
+            reason = f"no Dask scheduler answers at {self._address} within {CONNECT_SECONDS:g} s"
+            raise InputError.one(f"{reason}; check the address and that it runs") from None
 
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
         """See `Executor.next_task`; about `TASK_SECONDS` of runs, fewer at the end to end together."""

@@ -14,13 +14,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
 from vsacli.compute.engine import Settled, settle
 from vsacli.documents.reading import Changes, read_document
-from vsacli.documents.source import Source
+from vsacli.documents.source import Problems, Source
+from vsacli.documents.tree import Mapping, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.file import ReadRobot, read_robot
 from vsacli.robot.model import Robot
@@ -252,12 +254,13 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     """
     file, source = read_document(path, StudyFile, FORMAT)
     folder = Path(source.path).parent
+    _check_named(source, "robot", file.robot)
     read = read_robot(folder / file.robot)
     robot = read.robot()
     for each in over_time(file.variables or ()):
         if not robot.has(VARIABLES[each.name]):
             raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
-    trajectories = _trajectories(file, folder, source.path)
+    trajectories = _trajectories(file, folder, source)
     loaded = [load_trajectory(each, robot) for each in trajectories]
     entries = Entries(file, source.path, read, robot, trajectories)
     dimensions = entries.dimensions()
@@ -271,14 +274,30 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     return Study(file, source, read, robot, trajectories, sources, dimensions, design, *settled)
 
 
-def _trajectories(file: StudyFile, folder: Path, path: str) -> tuple[str, ...]:
+def _check_named(source: Source, key: str, name: str) -> None:
+    """Raise an error at the line of a key that names a missing file, relative to the study."""
+    folder = Path(source.path).parent
+    if not (folder / name).exists():
+        hint = near_file(folder / name).replace(f"'{folder}{os.sep}", "'")
+        raise InputError.one(f"{key}: {name}: no such file{hint}", source.path, _line_of(source, key))
+
+
+def _line_of(source: Source, key: str) -> int:
+    root = parse_yaml(source.text or "", Problems(source.path))
+    return root.key_lines.get(key, 0) if isinstance(root, Mapping) else 0
+
+
+def _trajectories(file: StudyFile, folder: Path, source: Source) -> tuple[str, ...]:
     found: list[str] = []
     for pattern in file.trajectory:
         place = str(folder / pattern)
-        matching = (
-            [place] if os.path.exists(place) or not glob.has_magic(pattern) else sorted(glob.glob(place))
-        )
+        if os.path.exists(place) or not glob.has_magic(pattern):
+            _check_named(source, "trajectory", pattern)
+            matching = [place]
+        else:
+            matching = sorted(glob.glob(place))
         if not matching:
-            raise InputError.one(f"trajectory: no file fits {pattern!r}", path)
+            line = _line_of(source, "trajectory")
+            raise InputError.one(f"trajectory: no file fits {pattern!r}", source.path, line)
         found += [each for each in matching if each not in found]
     return tuple(found)

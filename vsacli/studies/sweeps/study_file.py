@@ -307,14 +307,10 @@ class StudyFile:
 
     def _problems(self) -> Iterator[FieldProblem]:
         if self.method != GRID and self.samples is None:
-            yield FieldProblem(("samples",), f"how many runs? The method {self.method} draws them")
+            reason = f"the number of runs that the method {self.method} draws"
+            yield FieldProblem((), f"missing key 'samples': {reason}")
         if self.method == GRID and self.samples is not None:
-            yield FieldProblem(("samples",), "a grid has as many runs as its values make; leave this key out")
-        drawn = [varied.path for varied in self.vary if isinstance(varied.way, Drawn | Ranged)]
-        if self.method == GRID and drawn:
-            advice = "take the method random or latin_hypercube, or list values"
-            yield FieldProblem(
-                ("vary",), f"a grid has no values drawn from distributions, as of {drawn[0]}; {advice}"
-            )
+            reason = "the values of a grid determine the number of runs"
+            yield FieldProblem(("samples",), f"{reason}; leave this key out")
         if self.method != GRID and not self.vary:
-            yield FieldProblem(("vary",), f"nothing varies that the method {self.method} could draw")
+            yield FieldProblem((), f"missing key 'vary': the values that the method {self.method} draws")

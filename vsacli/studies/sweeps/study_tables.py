@@ -13,6 +13,7 @@ import numpy as np
 from vsacli.base.arrays import IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
+from vsacli.base.texts import counted
 from vsacli.documents.source import Source
 from vsacli.results.store.study_table import (
     TEXTS,
@@ -134,9 +135,10 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
         **provenance: root attributes that replace those of the parts.
 
     Raises:
-        InputError: the parts belong to different studies, or some runs are in none of them.
+        InputError: the parts belong to different studies, one is given twice, or some runs are in none.
         StorageError: the disk is full or fails.
     """
+    _check_repeated(paths)
     with ExitStack() as stack:
         parts = [stack.enter_context(StoredStudy(path)) for path in paths]
         _check_alike(parts)
@@ -147,6 +149,14 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
                 rows = order[start : start + rows_at_once(steps)]
                 writer.write(Rows(range(start, start + len(rows)), _arrays(parts, rows, steps)))
             writer.finish()
+
+
+def _check_repeated(paths: Sequence[str | Path]) -> None:
+    seen: set[Path] = set()
+    for path in paths:
+        if (place := Path(path).resolve()) in seen:
+            raise InputError.one("is given twice; give each table once", path)
+        seen.add(place)
 
 
 def _check_alike(parts: Sequence[StoredStudy]) -> None:
@@ -169,7 +179,10 @@ def _order(parts: Sequence[StoredStudy]) -> IndexArray:
     absent = np.flatnonzero(order < 0)
     if len(absent):
         shown = ", ".join(map(str, absent[:MOST_NAMED])) + (", ..." if len(absent) > MOST_NAMED else "")
-        raise InputError.one(f"{len(absent):,} of {len(order):,} runs are in none of the files: {shown}")
+        missing = f"run {shown} is missing" if len(absent) == 1 else f"runs {shown} are missing"
+        held = f"{parts[0].path} holds" if len(parts) == 1 else "the tables hold"
+        found = f"{held} {len(order) - len(absent)} of {counted(len(order), 'run')}"
+        raise InputError.one(f"{found}; {missing}: give the tables of all shards (--shard K/N)")
     return order
 
 

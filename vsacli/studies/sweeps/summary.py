@@ -58,6 +58,7 @@ class StudySummary(Stored):
         verdicts: number of runs by verdict.
         failures: runs that could not be computed.
         worst: smallest margin of each joint that has one.
+        warnings: warnings about the study.
     """
 
     study: str
@@ -66,9 +67,13 @@ class StudySummary(Stored):
     verdicts: dict[str, int]
     failures: tuple[Failure, ...]
     worst: tuple[Extreme, ...]
+    warnings: tuple[str, ...] = ()
 
     format: ClassVar = "vsacli-study-summary/1"
-    shape: ClassVar = named("format", "study", "robot", "runs", "verdicts", "failures", "worst")
+    shape: ClassVar = {
+        **named("format", "study", "robot", "runs", "verdicts", "failures", "worst"),
+        "warnings?": "warnings",
+    }
 
     @classmethod
     def of(cls, table: StoredStudy) -> StudySummary:
@@ -85,6 +90,7 @@ class StudySummary(Stored):
                 if verdict == FAILED
             ),
             worst=tuple(_worst(table)),
+            warnings=() if table.parameters or table.runs > 1 else ("nothing varies; add vary:",),
         )
 
     def __str__(self) -> str:
@@ -106,10 +112,11 @@ class StudySummary(Stored):
         return ReportText(self.title, list(self._findings()), [self._rows()], lines)
 
     def _findings(self) -> Iterator[str]:
+        yield from (f"warning: {warning}" for warning in self.warnings)
         without = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))
         if without:
             runs = counted(without, "run")
-            yield f"{runs} with infeasible or singular samples; peaks and energies there are NaN"
+            yield f"infeasible or singular samples in {runs}; peaks and energies there are NaN"
         if impossible := self.verdicts.get(IMPOSSIBLE, 0):
             runs = counted(impossible, "run")
             yield f"nothing feasible was found in {runs}; the column error of the table says why"

@@ -159,8 +159,9 @@ def plan_excitation(
     """
     if not SHORTEST <= duration < np.inf:
         raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
-    if not all(each is None or 0 <= each <= LARGEST for each in noise):
-        raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
+    for each in noise:
+        if each is not None and not 0 <= each <= LARGEST:
+            raise InputError.one(f"the sensor noise must be from 0 to {LARGEST:g}, not {each:g}")
     middle = None
     if own is not None:
         q = executed(robot, own).q
