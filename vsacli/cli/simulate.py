@@ -289,7 +289,7 @@ def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
 def _initial_error(inputs: Inputs, options: Options) -> InitialError:
     """Return the error of the initial state, after a check that the robot can start there."""
     from vsacli.control.simulation import InitialError
-    from vsacli.control.simulation.simulate import start_state
+    from vsacli.control.simulation.start import start_state
 
     of_position = InitialError(options.initial_error)
     error = replace(of_position, stiffness=options.initial_stiffness_error)
