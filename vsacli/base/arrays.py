@@ -35,7 +35,8 @@ def over_time(rows: FloatArray) -> FloatArray:
 
 def by_joint(array: ArrayLike) -> FloatArray:
     """Invert `over_time`; the samples are contiguous, and copied only if the memory layout differs."""
-    return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
+    values = np.asarray(array, dtype=np.float64)
+    return np.ascontiguousarray(values.transpose(*range(1, values.ndim), 0))
 
 
 def contiguous_rows(array: FloatArray) -> list[FloatArray]:

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, by_joint, checked_shape, over_time
+from vsacli.base.arrays import FloatArray, by_joint, checked_shape
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.control_flow import Keyed, call
-from vsacli.compute.engine import Engine, choose
+from vsacli.compute.engine import KEPT_PROGRAMS, Engine, engine_of_call
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import (
     ZERO,
@@ -96,14 +96,14 @@ class LinkTorques(RowKernel):
     robot: Robot
     frame: str | None = None
 
-    @property
+    @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
         joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
         of_joints = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
         return RowLayout(dict.fromkeys(of_joints, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
 
-    @property
+    @cached_property
     def results(self) -> RowLayout:
         """Layout of the output rows."""
         return RowLayout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
@@ -188,17 +188,23 @@ def link_torques(
         check_wrench(wrench)
     given = _given(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
     shape = given[0].shape
-    motion = [by_joint(np.atleast_2d(array)) for array in given]
+    motion = list(map(_rows, given))
     motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
-    kernel = LinkTorques(robot, None if wrench is None else wrench.frame)
-    dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping))
+    kernel = _kernel(robot, None if wrench is None else wrench.frame)
+    damped = DAMPING.key in kernel.arguments.shapes
+    dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
     every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
     rows = dict(zip(kernel.arguments.shapes, every, strict=True))
-    chosen = choose(engine, kernel, motion[0].shape[1]).engine if isinstance(engine, str) else engine
+    chosen = engine_of_call(engine, kernel, motion[0].shape[1])
     computed = kernel.results.arrays(chosen.run(kernel, kernel.arguments.pack(rows)))
-    tau_e, dtau_e, ddtau_e = (over_time(computed[name]).reshape(shape) for name in TORQUES)
+    tau_e, dtau_e, ddtau_e = (computed[name].T.reshape(shape) for name in TORQUES)
     return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
+
+
+@lru_cache(maxsize=KEPT_PROGRAMS)
+def _kernel(robot: Robot, frame: str | None) -> LinkTorques:
+    return LinkTorques(robot, frame)
 
 
 def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
@@ -213,24 +219,27 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
             f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "
             "else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
         )
-    if len({array.shape for array in given}) > 1:
+    if any(array.shape != given[0].shape for array in given):
         shapes = ", ".join(str(array.shape) for array in given)
         raise InputError.one(f"{', '.join(names)} must have one shape, not {shapes}")
     return given
 
 
+def _rows(array: FloatArray) -> FloatArray:
+    """Return the rows of an array of one sample, (n,), or over time, (samples, n)."""
+    return array[:, None] if array.ndim == 1 else by_joint(array)
+
+
 def _damping_rows(
     robot: Robot, shape: tuple[int, ...], given: Sequence[ArrayLike | None]
 ) -> Iterator[FloatArray]:
-    """Yield the damping and its derivatives, if there are dampers between the links."""
-    if not link_damped(robot):
-        return
+    """Yield the damping and its derivatives of a robot with dampers between the links."""
     least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
     for name, array, default in zip(DAMPING.names, given, (least, 0 * least, 0 * least), strict=True):
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")
-        yield by_joint(np.atleast_2d(values))
+        yield _rows(values)
 
 
 def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
@@ -241,7 +250,7 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
         array, expected = getattr(wrench, name), (*samples, len(WRENCH_AXES))
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
-        yield by_joint(np.atleast_2d(array))
+        yield _rows(np.asarray(array, dtype=np.float64))
 
 
 def _state_of(joint: Joint) -> Keyed:

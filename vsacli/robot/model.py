@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 from vsacli.actuators.actuator import Actuator
@@ -55,6 +56,14 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        """Hash of all parameters, computed once: robots are keys of recorded functions."""
+        return hash(tuple(getattr(self, each.name) for each in fields(self) if each.compare))
 
     def __repr__(self) -> str:
         return "\n".join([f"Robot {self.name}", *aligned(self._joint_rows())])

@@ -1,9 +1,11 @@
 """Backends of computations on rows of samples: NumPy, or code from a C compiler."""
 
 from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
-from vsacli.compute.engine.engines import Engine, Kernel, samples_per_pass
+from vsacli.compute.engine.engines import KEPT_PROGRAMS, Engine, Kernel, samples_per_pass
+from vsacli.compute.engine.number_engine import engine_of_call
 
 __all__ = [
+    "KEPT_PROGRAMS",
     "NAMES",
     "NUMPY",
     "Choice",
@@ -11,6 +13,7 @@ __all__ = [
     "Kernel",
     "Settled",
     "choose",
+    "engine_of_call",
     "processors",
     "samples_per_pass",
     "settle",

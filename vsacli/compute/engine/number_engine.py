@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine.choice import NUMPY
-from vsacli.compute.engine.engines import KEPT_PROGRAMS, Kernel, kernel_program
-from vsacli.compute.tracing import is_of_calls
-from vsacli.compute.tracing.python_functions import NumberFunction, number_function
+from vsacli.compute.engine.choice import NUMPY, choose
+from vsacli.compute.engine.engines import KEPT_PROGRAMS, Engine, Kernel, kernel_program
+
+if TYPE_CHECKING:
+    from vsacli.compute.tracing.python_functions import NumberFunction
 
 MOST_SAMPLES = 8
 """Largest number of samples for which plain numbers are surely faster: NumPy takes the time of 30 to 60
@@ -39,13 +41,35 @@ class NumberEngine:
         function = _recorded(kernel).called() if samples <= MOST_SAMPLES else None
         if function is None:
             return NUMPY.run(kernel, rows)
+        outputs = np.empty((kernel.outputs, samples))
         try:
             with np.errstate(all="ignore"):
-                columns = [function(sample) for sample in zip(*(row.tolist() for row in rows), strict=True)]
+                for sample in range(samples):
+                    outputs[:, sample] = function([row.item(sample) for row in rows])
         except (ArithmeticError, ValueError):
             return NUMPY.run(kernel, rows)
-        outputs: FloatArray = np.array(columns, dtype=np.float64).T
         return outputs
+
+
+NUMBERS: Engine = NumberEngine()
+
+
+def engine_of_call(engine: str | Engine, kernel: Kernel, samples: int) -> Engine:
+    """Return the engine for a call from Python: plain numbers for few samples, unless another is requested.
+
+    Args:
+        engine: One of `NAMES`, or an engine, which is returned.
+        kernel: Kernel to compute.
+        samples: Number of samples.
+
+    Raises:
+        InputError: See `choose`.
+    """
+    if not isinstance(engine, str):
+        return engine
+    if engine in ("numpy", "auto") and samples <= MOST_SAMPLES:
+        return NUMBERS
+    return choose(engine, kernel, samples).engine
 
 
 class _Recorded:
@@ -60,6 +84,9 @@ class _Recorded:
         """Count a call, and return the function; None while calls are few, or if it cannot be recorded."""
         self._calls += 1
         if self._calls == RECORDED_FROM:
+            from vsacli.compute.tracing import is_of_calls
+            from vsacli.compute.tracing.python_functions import number_function
+
             program = kernel_program(self._kernel)
             if not is_of_calls(program):
                 self._function = number_function(program, exactly=True)

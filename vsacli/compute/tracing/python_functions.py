@@ -70,6 +70,8 @@ deeper expressions save no more, and Python's parser has a limit."""
 def _as_number(name: str) -> Callable[..., float]:
     """Return a function of NumPy that returns a plain number, with which Python computes faster."""
     function = getattr(np, name)
+    if function.nin == 1:
+        return lambda operand: float(function(operand))
     return lambda *operands: float(function(*operands))
 
 
