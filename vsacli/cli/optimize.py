@@ -162,11 +162,12 @@ def _draw(
         )
         for index, joint in enumerate(found.robot.joints)
     ]
-    title = f"{found.robot_name}, {found.asked}"
-    figures = {CHANGE: change_sheet(joints, title, along_path=found.pace is not None)}
+    title = f"optimum of {found.robot_name}, {found.asked}: {found.words}"
+    change = f"{title}, before and after"
+    figures = {CHANGE: change_sheet(joints, change, along_path=found.pace is not None)}
     if found.pace is not None:
         uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        figures[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, title)
+        figures[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, f"timing of the {title}")
     FigureFiles(figures, folder, stem, "png", outputs).save(figures)
 
 

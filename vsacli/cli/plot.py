@@ -96,6 +96,9 @@ def plot(
     margin) and <stem>-feasibility (share of runs with at least a given margin, compared if there are several
     tables). Where runs were optimized, <stem>-cost replaces the first two.
 
+    The file of vsacli sensitivity -o gives <stem>-ranking: the parameters with the largest effect on the
+    motor torques.
+
     --format html writes one page <stem>.html for a browser, without network access: the report, zoomable
     plots of every variable, and the robot at the time cursor; for results that fail, the fixes of
     check-feasibility --fixes; for several FILEs, their differences; for studies, margin and cost of each run.
@@ -146,17 +149,25 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
 
 
 def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw results, simulations or study tables."""
-    studies = _are_studies(paths)
-    if studies and shown != _EVERYTHING:
-        raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
-    if target.file_format == "html":
+    """Draw results, simulations, study tables or a sensitivity analysis."""
+    from vsacli.results.store.reader import stored_format
+    from vsacli.results.store.schema import SENSITIVITY
+    from vsacli.results.store.study_table import FORMAT
+
+    found = stored_format(paths[0])  # a file of another kind among the others is refused by the readers
+    if found in (FORMAT, SENSITIVITY) and shown != _EVERYTHING:
+        what = "studies" if found == FORMAT else "sensitivity analyses"
+        raise click.UsageError(f"times, joints and variables can be chosen of results, not of {what}")
+    if found == SENSITIVITY:
+        _draw_ranking(paths, target, talk)
+    elif target.file_format == "html":
         from vsacli.cli.plot_page import write_page
 
         if shown._replace(span=_EVERYTHING.span) != _EVERYTHING:
             raise click.UsageError("a page shows all joints and variables; leave these options out")
-        write_page(paths, None if studies else shown.span, target.folder, target.outputs, talk)
-    elif studies:
+        span = None if found == FORMAT else shown.span
+        write_page(paths, span, target.folder, target.outputs, talk)
+    elif found == FORMAT:
         _draw_studies(paths, target)
     elif len(paths) == 1:
         _draw_file(paths[0], shown, target, talk)
@@ -194,12 +205,24 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
     return span
 
 
-def _are_studies(paths: list[Path]) -> bool:
-    """Return whether the first file is a study table; then all files must be."""
-    from vsacli.results.store.reader import stored_format
-    from vsacli.results.store.study_table import FORMAT
+def _draw_ranking(paths: list[Path], target: _Target, talk: Talk) -> None:
+    """Draw the ranking of a sensitivity file."""
+    from vsacli.cli.sensitivity import RANKING
+    from vsacli.results.charts.ranking import Ranking
+    from vsacli.results.plots import ranking_figure
+    from vsacli.results.store.damage import reporting_damage
+    from vsacli.results.store.sensitivity_file import StoredSensitivity
 
-    return stored_format(paths[0]) == FORMAT
+    if len(paths) > 1:
+        raise click.UsageError("sensitivity analyses are drawn one at a time")
+    if target.file_format == "html":
+        raise click.UsageError("--format html is for results, simulations and studies; leave it out")
+    with StoredSensitivity.open(paths[0]) as stored, reporting_damage(paths[0]):
+        talk.detail(result_line(stored))
+        ranking = Ranking.of(stored.report_json, stored.joint_names)
+        if stored.report_json.get("band"):
+            talk.note(f"{paths[0]}: no figure of the tolerance bands: `vsacli sensitivity --plot` draws it")
+    target.figures([RANKING], paths[0].stem).save({RANKING: ranking_figure(ranking)})
 
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:

@@ -9,7 +9,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -22,6 +22,7 @@ from matplotlib.patheffects import withStroke
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.ranking import Ranking
 from vsacli.results.charts.study_points import StudyPoints
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.point_labels import BELOW, label_points
@@ -295,22 +296,9 @@ def _label(points: StudyPoints, path: str, length: int) -> str:
     return _fitting(f"{words} [{unit}]" if unit else words, length)
 
 
-class Bar(NamedTuple):
-    """The effect of a change of a parameter.
-
-    Attributes:
-        label: parameter and its change.
-        share: largest change of a motor torque, relative to the largest torque of its joint.
-        joint: joint of that motor.
-    """
-
-    label: str
-    share: float
-    joint: str
-
-
-def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
+def ranking_figure(ranking: Ranking) -> Figure:
     """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
+    bars = ranking.bars
     with house_style():
         figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
         axes = figure.add_subplot()
@@ -324,5 +312,5 @@ def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
             axes.text(100 * bar.share, place, text, va="center", fontsize=8, parse_math=False)
         axes.margins(x=ROOM_FOR_LABELS)
         axes.grid(visible=False, axis="y")
-        axes.set_xlabel("change of motor torque at the named joint [% of its peak]")
-        return complete(figure, title, [])
+        axes.set_xlabel("change of motor torque [% of its peak]")
+        return complete(figure, ranking.title, [])
