@@ -44,14 +44,14 @@ def parameter_words(path: str, unit: str, joints: Sequence[str]) -> str:
         joints: names of the joints, base to tip.
     """
     keys, where = path.split("."), ""
-    if keys[0] == "joints" and len(keys) > 2:
+    of_joint = keys[0] == "joints" and len(keys) > 2
+    if of_joint:
         where, keys = _joint(keys[1], joints), keys[2:]
     elif keys[-1] in joints and len(keys) > 1:
         where, keys = keys[-1], keys[:-1]
     words = [word for place in range(len(keys)) if (word := _word(keys, place))]
-    symbol = keys[-1]
-    if len(symbol) <= SYMBOL_LENGTH and unit in SYMBOLS and len(words) > 1:
-        words = [SYMBOLS[unit].format(" ".join(words[:-1])), symbol]
+    if of_joint and len(keys[-1]) <= SYMBOL_LENGTH and unit in SYMBOLS and len(words) > 1:
+        words = [SYMBOLS[unit].format(" ".join(words[:-1])), keys[-1]]
     return ", ".join(filter(None, (" ".join(words), where)))
 
 
