@@ -1,4 +1,4 @@
-"""`vsacli plot`: figures and pages of results, simulations and studies, and of recordings."""
+"""`vsacli plot`: figures and pages of results, simulations, studies, recordings and sensitivities."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def plot(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw the figures of a result, a simulation, a recording or a study, or compare several results.
+    """Draw results, simulations, recordings, studies and sensitivities, or compare several results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
