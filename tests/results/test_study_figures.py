@@ -178,7 +178,7 @@ def test_optimized_runs_show_costs_before_and_after(own_folder: Path) -> None:
     assert run(["study", "study.yaml", "-q"]) == 0
     with StoredStudy("study.h5") as table:
         figure = study_figures(table)["cost"]
-        before, after = (np.nanmax(table.read(f"cost_{when}"), axis=1) for when in ("before", "after"))
+        before, after = (table.read(f"cost_{when}").max(axis=1) for when in ("before", "after"))
     (axes,) = figure.axes
     assert axes.get_ylabel() == "rms motor torque [N m]"
     assert texts(figure) == ["as commanded (1 of 2 feasible)", "optimum"]
