@@ -116,7 +116,7 @@ def test_a_comparison_shows_the_position_errors(tmp_path: Path, simulated: Path)
         file["q_error"][...] *= 2
     with open_stored(simulated / "s.h5") as first, open_stored(other) as second:
         figure = compare_files([first, second])["compare"]
-    assert figure.get_suptitle() == "vsa-3r, position errors"
+    assert figure.get_suptitle() == "comparison of 2 simulations of vsa-3r: position errors"
     error = stored(simulated / "s.h5", "q_error")
     for joint, axes in enumerate(figure.axes[::2]):
         assert (axes.get_title(loc="left"), axes.get_ylabel()) == (JOINTS[joint], "$q - q_d$ [rad]")

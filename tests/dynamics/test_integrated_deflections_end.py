@@ -24,7 +24,7 @@ from vsacli.dynamics.integrated_deflections import (
     REASONS,
     SINGULAR,
     STALLED,
-    UNREACHABLE,
+    UNATTAINABLE,
     Task,
     integrate_deflections,
 )
@@ -105,7 +105,7 @@ def test_end_of_a_spring_is_not_singular():
     ).stops
     assert base is None
     assert shoulder is not None
-    assert shoulder.reason == REASONS[UNREACHABLE]
+    assert shoulder.reason == REASONS[UNATTAINABLE]
 
 
 def test_another_sign_of_the_determinant_is_beyond_the_singular_set():
@@ -136,10 +136,10 @@ def test_start_out_of_reach_is_not_followed():
     result = integrated(ARM, motion(start=(850.0, 790.0), end=(850.0, 850.0)), COARSE)
     shoulder = result.report.drifts[1]
     assert shoulder.stop is not None
-    assert (shoulder.stop.time, shoulder.stop.reason) == (0.0, REASONS[UNREACHABLE])
+    assert (shoulder.stop.time, shoulder.stop.reason) == (0.0, REASONS[UNATTAINABLE])
     assert np.isnan(result.phi[:, 1]).all()
     assert np.isfinite(result.phi[:, 0]).all()
-    assert shoulder.as_json()["stopped"] == {"time": 0.0, "reason": REASONS[UNREACHABLE]}
+    assert shoulder.as_json()["stopped"] == {"time": 0.0, "reason": REASONS[UNATTAINABLE]}
     assert "shoulder none (no sample integrated)" in str(result.report)
 
 

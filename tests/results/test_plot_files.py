@@ -59,7 +59,9 @@ def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
         figures = plot_stored(result)
         comparison = compare_files([result, result])["compare"]
     assert list(figures) == ["motion", "motor-torque", "elastic-torque", "energy"]
-    assert comparison.get_suptitle() == "two, motor torques"
+    assert comparison.get_suptitle() == "comparison of 2 results of two: motor torques"
+    titles = [axes.get_title(loc="left") for axes in comparison.axes]
+    assert sum(title.startswith("minus the first, rms") for title in titles) == len(titles) / 2
 
 
 def test_no_display_is_needed() -> None:

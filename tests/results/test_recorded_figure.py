@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.patches import Patch
 
 from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
 from vsacli.results.charts.reduction import Curve
@@ -39,10 +40,36 @@ def test_each_component_has_four_panels() -> None:
     figure = recorded_figure([curve(), curve("wrist.q", rms=0.0, cutoff=np.nan)], "log")
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     smoothed = ["elbow.q", "smoothed, noise 0.0001 rad", "motion to 5 Hz, 65 knots", "d4q +- 1.2 %"]
-    assert titles == [*smoothed, "wrist.q", "interpolated, noise 0.0001 rad", "all is motion", "d4q"]
+    assert titles == [
+        *smoothed,
+        "wrist.q",
+        "interpolated, noise 0.0001 rad",
+        "motion at all frequencies",
+        "d4q",
+    ]
     units = [axes.get_ylabel() for axes in figure.axes[:4]]
     assert units == ["[rad]", "", r"[rad/$\sqrt{\mathrm{Hz}}$]", r"[rad/s^4/$\sqrt{\mathrm{Hz}}$]"]
     assert [axes.get_xlabel() for axes in figure.axes[4:]] == ["time [s]"] * 2 + ["frequency [Hz]"] * 2
+
+
+def test_the_legend_names_every_curve_and_area() -> None:
+    """Areas differ by their hatch too, so that they do in gray."""
+    figure = recorded_figure([curve(above=2.0)], "log")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [
+        "recorded",
+        "spline",
+        "reported noise (difference: twice)",
+        "ends: derivatives unreliable",
+        "recorded minus spline",
+        "frequencies of the motion",
+        "low-pass filtered noise",
+        "cut-off of the spline",
+    ]
+    areas = [handle for handle in figure.legends[0].legend_handles if isinstance(handle, Patch)]
+    assert len({area.get_hatch() for area in areas}) == len(areas)
+    whole = recorded_figure([curve(rms=0.0, cutoff=np.nan)._replace(inside=(0.0, 10.0))], "log")
+    assert "ends: derivatives unreliable" not in [text.get_text() for text in whole.legends[0].get_texts()]
 
 
 def test_the_report_s_numbers_are_drawn_where_they_belong() -> None:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.collections import QuadMesh
-from samples.studies import study
+from matplotlib.axes import Axes
+from matplotlib.collections import FillBetweenPolyCollection, QuadMesh
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from samples.studies import DRAWN, study
+from scipy.stats import binomtest
 
 from vsacli.base.errors import InputError
+from vsacli.base.tables import ReportText
 from vsacli.cli.main import run
 from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.pages.study_page import study_page
 from vsacli.results.plots import compared_studies, study_figures
 from vsacli.results.store.study_table import StoredStudy
 
@@ -29,6 +37,22 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with contextlib.chdir(folder):
         assert run(["study", "study.yaml", "-q"]) == 0
     return folder / "study.h5"
+
+
+@pytest.fixture(scope="module")
+def drawn_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table of six random draws."""
+    folder = tmp_path_factory.mktemp("drawn")
+    study(folder, DRAWN)
+    with contextlib.chdir(folder):
+        assert run(["study", "study.yaml", "-q"]) == 0
+    return folder / "study.h5"
+
+
+@pytest.fixture
+def drawn(drawn_path: Path) -> Iterator[StoredStudy]:
+    with StoredStudy(drawn_path) as opened:
+        yield opened
 
 
 @pytest.fixture
@@ -70,8 +94,106 @@ def test_shares_fall_from_all_runs_at_their_margins(table: StoredStudy) -> None:
         assert (np.asarray(share)[place] if place < len(np.asarray(share)) else 0.0) == pytest.approx(
             expected
         )
-    labels = [text.get_text() for text in axes.figure.legends[0].get_texts()]
-    assert labels == ["one: 66.7 % (35.4 to 87.9 %)", "two: 66.7 % (35.4 to 87.9 %)"]  # of 6 in 9 (Wilson)
+    assert (share[0], share[-1]) == (100, 0)
+
+
+def texts(figure: Figure) -> list[str]:
+    """Labels of the legend."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def bands(axes: Axes) -> list[FillBetweenPolyCollection]:
+    """Bands of intervals in a panel."""
+    return [each for each in axes.collections if isinstance(each, FillBetweenPolyCollection)]
+
+
+def test_a_grid_has_no_intervals(table: StoredStudy) -> None:
+    """Its runs are chosen: their share is the probability of nothing."""
+    figure = study_figures(table)["feasibility"]
+    assert texts(figure) == ["feasible: 66.7 %"]
+    assert not bands(figure.axes[0])
+    assert not figure.axes[0].get_title(loc="left")
+
+
+def test_random_draws_have_intervals_with_a_mark_in_the_legend(drawn: StoredStudy) -> None:
+    figure = study_figures(drawn)["feasibility"]
+    share, label = texts(figure)
+    feasible, runs = int(StudyPoints(drawn).feasible.sum()), drawn.rows
+    low, high = binomtest(feasible, runs).proportion_ci(method="wilson")
+    assert share == f"feasible: {100 * feasible / runs:.3g} % ({100 * low:.3g} to {100 * high:.3g} %)"
+    assert label == "95 % interval (random samples)"
+    assert isinstance(figure.legends[0].legend_handles[1], Patch)
+    (band,) = bands(figure.axes[0])
+    edges = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    ends = [binomtest(count, runs).proportion_ci(method="wilson") for count in range(1, runs + 1)]
+    np.testing.assert_allclose(
+        np.unique(np.round(edges, 6)), np.unique(np.round(100 * np.ravel(ends), 6)), rtol=1e-3
+    )
+
+
+def test_draws_that_several_motions_share_have_no_intervals(
+    drawn: StoredStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Runs of the same draw are not independent."""
+    trajectories = ["one.yaml", "two.yaml"] * (drawn.rows // 2)
+    read = drawn.texts
+    monkeypatch.setattr(drawn, "texts", lambda name: trajectories if name == "trajectory" else read(name))
+    assert not bands(study_figures(drawn)["feasibility"].axes[0])
+
+
+def test_axes_and_titles_are_words(table: StoredStudy, drawn: StoredStudy) -> None:
+    figures = study_figures(table)
+    labels = [figures["margin"].axes[0].get_xlabel(), figures["margin"].axes[0].get_ylabel()]
+    assert labels == ["spring stiffness k, all joints\n[N m/rad]", "duration [s]"]
+    assert {figure.get_suptitle() for figure in figures.values()} == {"study springs of vsa-3r: 9 runs, grid"}
+    of_draws = study_figures(drawn)["margin"]
+    assert of_draws.get_suptitle() == "study springs of vsa-3r: 6 runs, Latin hypercube samples"
+    last = [axes.get_xlabel() for axes in of_draws.axes if axes.get_xlabel()]
+    assert last == [f"spring stiffness k, {name}\n[N m/rad]" for name in ("base", "shoulder", "elbow")]
+    assert (
+        compared_studies([table, drawn], ["a", "b"]).get_suptitle()
+        == "comparison of 2 studies: feasible runs"
+    )
+
+
+def test_the_legend_of_a_map_has_what_is_drawn(table: StoredStudy) -> None:
+    """Runs without a cost are hatched, so that they are none of the colors in gray either."""
+    figure = study_figures(table)["margin"]
+    assert texts(figure) == ["margin zero", "infeasible"]
+    assert figure.axes[1].patch.get_hatch() == figure.legends[0].legend_handles[1].get_hatch()  # type: ignore[union-attr]
+    np.testing.assert_array_equal(figure.axes[0].get_xticks(), [380, 400, 440])
+
+
+def test_legends_name_the_points(drawn: StoredStudy) -> None:
+    """Marks of feasible and infeasible runs, and numbers of the worst, if there are any."""
+    points = StudyPoints(drawn)
+    expected = ["feasible"] * bool(points.feasible.any()) + ["infeasible"] * bool((~points.feasible).any())
+    assert texts(study_figures(drawn)["margin"]) == [*expected, "runs of the smallest margins"]
+
+
+@pytest.mark.slow
+def test_optimized_runs_show_costs_before_and_after(own_folder: Path) -> None:
+    """Their margin is the one that was required, which is no finding."""
+    study(own_folder, "vary:\n  joints.*.actuator.spring.k: [400, 430]\noptimize: {minimize: torque}\n")
+    assert run(["study", "study.yaml", "-q"]) == 0
+    with StoredStudy("study.h5") as table:
+        figure = study_figures(table)["cost"]
+        before, after = (table.read(f"cost_{when}").max(axis=1) for when in ("before", "after"))
+    (axes,) = figure.axes
+    assert axes.get_ylabel() == "rms motor torque [N m]"
+    assert texts(figure) == ["as commanded (1 of 2 feasible)", "optimum"]
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), before[np.isfinite(before)])
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), after)
+    assert axes.lines[0].get_markerfacecolor() == "none"
+    assert axes.lines[1].get_markerfacecolor() != "none"
+
+
+def test_a_page_gives_intervals_of_random_draws_alone(table: StoredStudy, drawn: StoredStudy) -> None:
+    pytest.importorskip("bokeh")
+    page = study_page([table, drawn], [ReportText(""), ReportText("")])
+    shares = [json.loads(each) for each in re.findall(r'"share": ?(\[[^]]*\])', page)]
+    assert [len(each) for each in shares] == [1, 3]
+    assert '"spring stiffness k, all joints"' in page
 
 
 @pytest.mark.slow

@@ -13,6 +13,8 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
 from vsacli.dynamics.inverse import compute_block
+from vsacli.results.charts.ranking import Ranking
+from vsacli.results.plots import ranking_figure
 from vsacli.robot.parameters import parameters
 from vsacli.studies.sensitivities import SensitivityRun
 
@@ -193,6 +195,41 @@ def test_figures_show_ranking_and_bands(vsacli, tmp_path):
     assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "figures").code == 4
     assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "others").code == 0
     assert [path.name for path in (tmp_path / "others").iterdir()] == ["vsa_3r-coarse-ranking.png"]
+
+
+def test_plot_draws_the_ranking_of_a_file(vsacli, tmp_path):
+    """The same figure as `sensitivity --plot`; the bands need curves that the file does not have."""
+    rest_to_rest(tmp_path / "coarse.yaml")
+    made = vsacli(
+        "sensitivity", ROBOT, "coarse.yaml", "--tolerances", "2%", "-o", "s.h5", "--plot", "figures"
+    )
+    assert made.code == 0
+    done = vsacli("plot", "s.h5", "-o", "again")
+    assert done.code == 0
+    assert "no figure of the tolerance bands: `vsacli sensitivity --plot` draws it" in done.err
+    (figure,) = (tmp_path / "again").iterdir()
+    assert figure.name == "s-ranking.png"
+    assert figure.read_bytes() == (tmp_path / "figures" / "vsa_3r-coarse-ranking.png").read_bytes()
+    for options, part in (
+        (["s.h5"], "one at a time"),
+        (["--format", "html"], "for results, simulations and studies"),
+        (["--joints", "elbow"], "not of sensitivity analyses"),
+    ):
+        refused = vsacli("plot", "s.h5", *options, "-o", "other")
+        assert refused.code == 2
+        assert part in " ".join(refused.err.split())
+
+
+def test_figures_say_what_they_show_in_words(arm, motion):
+    found = sensitivity(arm, motion)
+    ranking = Ranking.of(json.loads(json.dumps(found.as_json())), arm.joint_names)
+    assert ranking.title == f"sensitivity of {found.robot}, {found.trajectory}: 15 of 72 parameters"
+    assert ranking.bars[0].label == "1 % of spring stiffness k, shoulder"
+    assert [bar.share for bar in ranking.bars] == [each.share for each in found.top]
+    changes = {bar.label.partition(" of ")[0] for bar in ranking.bars}
+    assert changes == {each.words for each in found.top}
+    figure = ranking_figure(ranking)
+    assert [text.get_text() for text in figure.axes[0].texts][:3] == [" shoulder", " base", " elbow"]
 
 
 def test_without_a_feasible_step_there_is_no_torque_to_be_off(vsacli, tmp_path):

@@ -102,7 +102,8 @@ def _draw(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outp
 
     curves = _curves(comparison)
     files = target.files(curves, stem, outputs)
-    title = ", ".join(Path(path).stem for path in (comparison.result, comparison.recording))
+    recording, result = (Path(path).stem for path in (comparison.recording, comparison.result))
+    title = f"comparison of recording {recording} with {result}"
     files.save(
         {variable: measured_sheet(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
     )

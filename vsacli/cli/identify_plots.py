@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from vsacli.results.charts.measured import MeasuredCurve
     from vsacli.studies.identification import Identification
 
+PREDICTED = "predicted"
+"""Label of the torques that follow from the identified parameters."""
+
 
 def draw_figures(found: Identification, robot: str, target: FigureTarget, outputs: Outputs) -> None:
     """Draw a figure for each recording."""
@@ -22,7 +25,7 @@ def draw_figures(found: Identification, robot: str, target: FigureTarget, output
     files.save(
         {
             names[record]: measured_sheet(
-                of_it, f"{found.robot}, {Path(record).stem}: predicted by the parameters found, filtered"
+                of_it, f"identification of {found.robot}: fit to {Path(record).stem}, filtered", PREDICTED
             )
             for record, of_it in curves.items()
         }
@@ -58,7 +61,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
         provenance=provenance,
         inputs=[source_text(source) for source in found.sources],
     )
-    return measured_page(facts, _curves(found), "predicted")
+    return measured_page(facts, _curves(found), PREDICTED)
 
 
 def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:

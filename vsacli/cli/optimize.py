@@ -185,11 +185,12 @@ def _sheets(found: Optimum, best: Trajectory, asked: Trajectory) -> dict[str, Sh
         )
         for index, joint in enumerate(found.robot.joints)
     ]
-    title = f"{found.robot_name}, {found.asked}"
-    sheets = {CHANGE: change_sheet(joints, title, along_path=found.pace is not None)}
+    title = f"optimum of {found.robot_name}, {found.asked}: {found.words}"
+    change = f"{title}, before and after"
+    sheets = {CHANGE: change_sheet(joints, change, along_path=found.pace is not None)}
     if found.pace is not None:
         uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        sheets[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, title)
+        sheets[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, f"timing of the {title}")
     return sheets
 
 

@@ -1,4 +1,4 @@
-"""`vsacli plot`: figures and pages of results, simulations and studies, and of recordings."""
+"""`vsacli plot`: figures and pages of results, simulations, studies, recordings and sensitivities."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def plot(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw the figures of a result, a simulation, a recording or a study, or compare several results.
+    """Draw results, simulations, recordings, studies and sensitivities, or compare several results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
@@ -109,6 +109,9 @@ def plot(
     The table of a study gives <stem>-margin (margin over the varied parameters), <stem>-pareto (cost over
     margin) and <stem>-feasibility (share of runs with at least a given margin, compared if there are several
     tables). Where runs were optimized, <stem>-cost replaces the first two.
+
+    The file of vsacli sensitivity -o gives <stem>-ranking: the parameters with the largest effect on the
+    motor torques.
 
     --format html writes one page <stem>.html for a browser, without network access: the report, zoomable
     plots of every variable, and the robot at the time cursor; for results that fail, the fixes of
@@ -164,17 +167,23 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
 
 
 def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw results, simulations or study tables."""
-    studies = _are_studies(paths)
-    if studies and shown != _EVERYTHING:
-        raise click.UsageError(f"{shown.option} cannot be used with study tables; leave it out")
-    if target.place.file_format == PAGE:
+    """Draw results, simulations, study tables or a sensitivity analysis."""
+    from vsacli.results.store.schema import SENSITIVITY
+    from vsacli.results.store.study_table import FORMAT
+
+    kind = _kind_of(paths)
+    if kind in (FORMAT, SENSITIVITY) and shown != _EVERYTHING:
+        words = "study tables" if kind == FORMAT else "sensitivity files"
+        raise click.UsageError(f"{shown.option} cannot be used with {words}; leave it out")
+    if kind == SENSITIVITY:
+        _draw_ranking(paths, target, talk)
+    elif target.place.file_format == PAGE:
         from vsacli.cli.plot_page import write_page
 
         if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
             raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
-        write_page(paths, None if studies else shown.span, *target, talk)
-    elif studies:
+        write_page(paths, None if kind == FORMAT else shown.span, *target, talk)
+    elif kind == FORMAT:
         _draw_studies(paths, target)
     elif len(paths) == 1:
         _draw_file(paths[0], shown, target, talk)
@@ -224,20 +233,41 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
     return span
 
 
-def _are_studies(paths: list[Path]) -> bool:
-    """Return whether all files are study tables, or none is.
+def _kind_of(paths: list[Path]) -> str | None:
+    """Return the format of the first file; study tables are only drawn among themselves.
 
     Raises:
-        click.UsageError: only some are.
+        click.UsageError: some files are study tables, and others are not.
     """
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    are = [stored_format(path) == FORMAT for path in paths]
+    formats = [stored_format(path) for path in paths]
+    are = [each == FORMAT for each in formats]
     if any(are) and not all(are):
         table, other = paths[are.index(True)], paths[are.index(False)]
         raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
-    return any(are)
+    return formats[0]
+
+
+def _draw_ranking(paths: list[Path], target: _Target, talk: Talk) -> None:
+    """Draw the ranking of a sensitivity file."""
+    from vsacli.cli.sensitivity import RANKING
+    from vsacli.results.charts.ranking import Ranking
+    from vsacli.results.plots import ranking_figure
+    from vsacli.results.store.damage import reporting_damage
+    from vsacli.results.store.sensitivity_file import StoredSensitivity
+
+    if len(paths) > 1:
+        raise click.UsageError("sensitivity analyses are drawn one at a time")
+    if target.place.file_format == PAGE:
+        raise click.UsageError("--format html is for results, simulations and studies; leave it out")
+    with StoredSensitivity.open(paths[0]) as stored, reporting_damage(paths[0]):
+        talk.detail(result_line(stored))
+        ranking = Ranking.of(stored.report_json, stored.joint_names)
+        if stored.report_json.get("band"):
+            talk.note(f"{paths[0]}: no figure of the tolerance bands: `vsacli sensitivity --plot` draws it")
+    target.figures([RANKING], paths[0].stem).save({RANKING: ranking_figure(ranking)})
 
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.texts import counted
 from vsacli.cli.command_parts import (
     Inputs,
     example,
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from vsacli.results.store.derived_files import SensitivityWriter
     from vsacli.robot.model import Robot
     from vsacli.studies.sensitivities import Sensitivity, SensitivityRun
+
+RANKING, BAND = "ranking", "band"
+"""Names of the figures."""
 
 SHOWN_FROM = 20_000
 """Number of samples from which a progress bar is shown; each costs some twenty times that of a run."""
@@ -110,7 +114,7 @@ def sensitivity(
         file = None if output is None else outputs.file(Path(output))
         found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
         if figures is not None:
-            _draw(found, inputs.robot, figures, run_stem(robot, trajectory), outputs)
+            _draw(found, inputs.robot, tolerances, figures, run_stem(robot, trajectory), outputs)
     say(found, as_json)
     talk.wrote(outputs)
 
@@ -161,21 +165,29 @@ def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
     return SensitivityWriter(file, run.robot, run.trajectory, numbers, run.slopes, provenance=provenance)
 
 
-def _draw(found: Sensitivity, robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> None:
+def _draw(
+    found: Sensitivity,
+    robot: Robot,
+    tolerances: str | None,
+    target: FigureTarget,
+    stem: str,
+    outputs: Outputs,
+) -> None:
     """Draw the ranking, and the bands of motor torques if tolerances are given."""
     from vsacli.results.charts.optimum import Torque, band_sheet
-    from vsacli.results.plots import Bar, ranking_figure
+    from vsacli.results.charts.ranking import Ranking
+    from vsacli.results.plots import ranking_figure
 
-    title = f"{found.robot}, {found.trajectory}"
-    bars = [Bar(f"{each.words} of {each.path}", each.share, each.most[0]) for each in found.top if each.most]
-    names = ["ranking"] if found.curves is None else ["ranking", "band"]
+    names = [RANKING] if found.curves is None else [RANKING, BAND]
     files = target.files(names, stem, outputs)
-    files.save({"ranking": ranking_figure(bars, title)})
-    if found.curves is not None:
+    files.save({RANKING: ranking_figure(Ranking.of(found.as_json(), robot.joint_names))})
+    if found.curves is not None and tolerances is not None:
         time, values, deviation = found.curves
         torques = [
             Torque(joint.name, joint.type, motor, values[:, index, motor - 1], deviation[:, index, motor - 1])
             for index, joint in enumerate(robot.joints)
             for motor in range(1, joint.actuator.motor_count + 1)
         ]
-        files.save({"band": band_sheet(time, torques, title)})
+        parameters = counted(len(found.parameters), "parameter")
+        title = f"sensitivity of {found.robot}, {found.trajectory}: {parameters}, tolerances "
+        files.save({BAND: band_sheet(time, torques, title + Path(tolerances).name)})

@@ -122,7 +122,7 @@ def _draw(found: Sizing, target: FigureTarget, stem: str, outputs: Outputs, talk
     from vsacli.results.plots import torque_speed_figure
 
     files = target.files(["torque-speed"], stem, outputs)
-    files.save({"torque-speed": torque_speed_figure(motors, found.title)})
+    files.save({"torque-speed": torque_speed_figure(motors, f"sizing of motors: {found.title}")})
 
 
 def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
@@ -137,4 +137,5 @@ def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
     }
     constants = {name: getattr(shaft, name) for name in Bounds._fields}
     rms = points.rms_velocity, points.rms_torque
-    return TorqueSpeed(motor.name, motor.drive, *motor.units, Bounds(**constants), runs, rms)
+    name = f"{motor.joint}, motor {motor.motor}"
+    return TorqueSpeed(name, motor.drive, *motor.units, Bounds(**constants), runs, rms)

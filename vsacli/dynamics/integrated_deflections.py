@@ -35,7 +35,7 @@ REASONS = (
     "its stiffness leaves the range that its springs can reach",
     "the integration cannot go on",
 )
-FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
+FOLLOWED, SINGULAR, UNATTAINABLE, STALLED = range(len(REASONS))
 
 
 def integrable(joint: Joint) -> bool:
@@ -101,7 +101,7 @@ def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.ND
     flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
     singular = has(flags, Flag.SINGULAR) | (here != on_branch)
-    return np.where(has(flags, Flag.INFEASIBLE), UNREACHABLE, np.where(singular, SINGULAR, FOLLOWED))
+    return np.where(has(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 
 
 MOST_PIECES = 500

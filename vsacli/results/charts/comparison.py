@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.errors import InputError
-from vsacli.base.texts import one_line
+from vsacli.base.texts import counted, one_line
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet
 from vsacli.results.charts.figures import (
     axis_label,
@@ -144,7 +144,8 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
     size = (max(2, folds * there.shape[1]) * PANEL_WIDTH, sum(HEIGHTS) * height + 1.2)
     robots = " / ".join(dict.fromkeys(file.robot_name for file in charts.files))
     legend = {label: number for number, label in enumerate(distinct_labels(charts.files))}
-    return Sheet(f"{robots}, {compared.title}", size, legend, [block])
+    files = counted(len(charts.files), charts.first.kind)
+    return Sheet(f"comparison of {files} of {robots}: {compared.title}", size, legend, [block])
 
 
 def _over(
@@ -171,7 +172,7 @@ def _apart(
     lines = differences.lines(column, [joint], "file")
     unit = charts.first.declared[compared.variable].quantity.unit(charts.first.joint_types[joint])
     rms = [line.rms for line in lines if line.rms is not None]
-    title = f"difference, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
+    title = f"minus the first, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
     if not any(value >= 0 for value in rms):
         title = "no values in common"
     shown = charts.calm(lines, 0) if compared.variable in GROWING and lines else None

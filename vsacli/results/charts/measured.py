@@ -55,14 +55,21 @@ class MeasuredCurve(NamedTuple):
         )
 
 
-def measured_sheet(curves: Sequence[MeasuredCurve], title: str) -> Sheet:
-    """Return a figure with two panels for each signal."""
+def measured_sheet(curves: Sequence[MeasuredCurve], title: str, computed: str = "computed") -> Sheet:
+    """Return a figure with two panels for each signal.
+
+    Args:
+        curves: signals to draw.
+        title: title of the figure.
+        computed: label of the curves compared with the measured ones.
+    """
     columns = 2 * math.ceil(len(curves) / MOST_ROWS)
     rows = math.ceil(2 * len(curves) / columns)
     time = np.array([min(c.time[0] for c in curves), max(c.time[-1] for c in curves)])
-    block = Block(time, [curve.charts() for curve in curves], MOST_ROWS)
+    block = Block(time, [curve.charts(computed) for curve in curves], MOST_ROWS)
     size = (PANEL_WIDTH * columns, ROW_HEIGHT * rows + 1)
-    return Sheet(title, size, {"computed": 0, "measured": 1}, [block])
+    legend = {computed: 0, "measured": 1, f"measured minus {computed}": DIFFERENCE}
+    return Sheet(title, size, legend, [block])
 
 
 class Spectrum(NamedTuple):

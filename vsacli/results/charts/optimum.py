@@ -24,14 +24,15 @@ from vsacli.results.charts.chart import (
 )
 from vsacli.results.charts.reduction import Curve, visible_range
 
-MOST_ROWS = 6
+MOST_ROWS = 7
 ROW_HEIGHT, PACE_HEIGHT = 1.7, 3.0
 """Heights of panels, inches."""
 
 BEFORE, AFTER, UNIFORM = 1, 0, 3
 """Looks of lines; the optimum is the solid line."""
 
-PATH = f"place on the path, as the time at which it was commanded [{TIME}]"
+PATH = f"place on the path, as commanded time [{TIME}]"
+SHORT_PATH = f"place on the path [{TIME}]"
 
 
 class Moved(NamedTuple):
@@ -56,9 +57,9 @@ class Moved(NamedTuple):
         there = look == AFTER and not np.isnan(self.lower).all()
         return Line(Curve.reduced(self.place, self.stiffness), look, band=band if there else None)
 
-    def torque_lines(self, look: int) -> list[Line]:
-        """Return a line for each motor."""
-        return [Line(Curve.reduced(self.place, torque), look) for torque in self.torques]
+    def torque_line(self, motor: int, look: int) -> Line:
+        """Return the torque of a motor, 1 or 2, as a line."""
+        return Line(Curve.reduced(self.place, self.torques[motor - 1]), look)
 
 
 class JointChange(NamedTuple):
@@ -95,16 +96,23 @@ class JointChange(NamedTuple):
         )
 
     @property
-    def torques(self) -> Chart:
-        """Chart of the torques of all motors with their limits."""
+    def motors(self) -> range:
+        """Numbers of the motors."""
+        return range(1, len(self.after.torques) + 1)
+
+    def torque(self, motor: int) -> Chart | None:
+        """Return the chart of the torque of a motor with its limits; None if there is no such motor."""
+        if motor not in self.motors:
+            return None
         unit = TORQUE.unit(self.joint_type)
-        lines = [*self.before.torque_lines(BEFORE), *self.after.torque_lines(AFTER)]
+        lines = [self.before.torque_line(motor, BEFORE), self.after.torque_line(motor, AFTER)]
         limits = [Limit(AFTER, 0, float(value)) for value in self.limits if np.isfinite(value)]
-        return Chart(f"{self.name}: motors", unit, lines, rf"$\tau$ [{unit}]", limits=limits)
+        title, axis = f"{self.name}, motor {motor}", rf"$\tau_{motor}$ [{unit}]"
+        return Chart(title, unit, lines, axis, limits=limits)
 
 
 def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool) -> Sheet:
-    """Return a figure with a row of panels for each joint: stiffness and motor torques.
+    """Return a figure with a row of panels for each joint: stiffness, and the torque of each motor.
 
     Args:
         joints: motions before and after.
@@ -112,13 +120,15 @@ def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool)
         along_path: whether places are positions on the path instead of times.
     """
     rows, folds = folding(len(joints), MOST_ROWS)
-    panels = [[joint.stiffness, joint.torques] for joint in joints]
-    if not any(stiffness for stiffness, _ in panels):
-        panels = [[torques] for _, torques in panels]
+    stiffness = [joint.stiffness for joint in joints]
+    motors = range(1, 1 + max(len(joint.motors) for joint in joints))
+    panels = [[joint.torque(motor) for motor in motors] for joint in joints]
+    if any(stiffness):
+        panels = [[chart, *torques] for chart, torques in zip(stiffness, panels, strict=True)]
     block = Block(joints[0].before.place, panels, MOST_ROWS)
     if along_path:
-        block = block._replace(xlabel=f"place on the path [{TIME}]")
-    size = (2 * PANEL_WIDTH * folds, ROW_HEIGHT * rows + 1)
+        block = block._replace(xlabel=SHORT_PATH)
+    size = (max(2, len(panels[0]) * folds) * PANEL_WIDTH, ROW_HEIGHT * rows + 1)
     return Sheet(title, size, {"as commanded": BEFORE, "optimum": AFTER}, [block])
 
 
@@ -133,11 +143,11 @@ def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str)
     """
     ends = place[[0, -1]]
     lines, legend = [Line(Curve.reduced(place, speed), AFTER)], {"optimum": AFTER}
-    for label, look, value in (("as commanded", BEFORE, 1.0), ("fastest as a whole", UNIFORM, uniform)):
+    for label, look, value in (("as commanded", BEFORE, 1.0), ("fastest uniform scaling", UNIFORM, uniform)):
         if np.isfinite(value):
             lines.append(Line(Curve(ends, np.full(2, value)), look))
             legend[label] = look
-    chart = Chart("", "", lines, "times as fast", from_zero=True)
+    chart = Chart("", "", lines, "relative speed", from_zero=True)
     return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT), legend, [Block(ends, [[chart]], xlabel=PATH)])
 
 

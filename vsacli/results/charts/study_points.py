@@ -2,31 +2,59 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.errors import InputError
+from vsacli.base.texts import counted
+from vsacli.results.charts.parameter_words import parameter_words
 from vsacli.results.store.study_table import StoredStudy
 
 NAMED_RUNS = 3
 """Number of runs with the smallest margins that are labeled with their numbers."""
+
+METHODS = {"grid": "grid", "random": "random samples", "latin_hypercube": "Latin hypercube samples"}
+"""Sampling methods in words."""
+
+DRAWN = ("random", "latin_hypercube")
+"""Methods whose runs are random draws, so that shares of runs estimate probabilities."""
 
 NORMAL_95 = 1.96
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
 COSTS = {
     "cost_after": "{}",
-    "energy_spent": "energy that motors spend",
-    "peak_tau_motor": "largest motor torque",
+    "energy_spent": "positive motor work",
+    "peak_tau_motor": "peak motor torque",
 }
 """Columns that hold the cost of a motion, in order of preference, with their labels; `{}` stands for the
 table's."""
 
+OF_OPTIMUM = " of the optimum"
+"""End of the description of a cost after the optimization."""
+
 ADDED = "J"
 """Unit of costs that are summed over the joints; of other costs the maximum counts."""
+
+
+class Shares(NamedTuple):
+    """Shares of runs, with the ends of their intervals of 95 % confidence; all arrays of one shape."""
+
+    values: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, counts: FloatArray, runs: int) -> Shares:
+        """Return the shares of counts in a number of runs, with Wilson's intervals (1927)."""
+        values, square = counts / runs, NORMAL_95**2
+        center = (values + square / (2 * runs)) / (1 + square / runs)
+        spread = np.sqrt(values * (1 - values) / runs + square / (4 * runs**2))
+        half = NORMAL_95 * spread / (1 + square / runs)
+        return cls(values, np.maximum(0.0, center - half), np.minimum(1.0, center + half))
 
 
 class StudyPoints:
@@ -37,6 +65,7 @@ class StudyPoints:
         runs: numbers of the runs, (rows,).
         margin: smallest margin of all joints, (rows,), relative; NaN if a run failed.
         feasible: whether every sample was feasible and regular, (rows,).
+        random: whether the runs are independent random draws, so that shares of them have intervals.
 
     Raises:
         InputError: the table has no margins, or no rows.
@@ -49,6 +78,15 @@ class StudyPoints:
         self.name, self.runs, self._table = table.study_name, table.read("run"), table
         self.margin = _least(table.read("margin"))
         self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "unreliable"))
+        self._method = str(table.attributes.get("method", ""))
+        # each trajectory has the same draws, so that runs of several are not independent
+        self.random = self._method in DRAWN and len(set(table.texts("trajectory"))) == 1
+
+    @property
+    def title(self) -> str:
+        """Names of study and robot, number of runs, and sampling method."""
+        runs = [counted(len(self.runs), "run"), *filter(None, [METHODS.get(self._method)])]
+        return f"study {self.name} of {self._table.robot_name}: {', '.join(runs)}"
 
     @cached_property
     def varying(self) -> dict[str, FloatArray]:
@@ -68,10 +106,21 @@ class StudyPoints:
         return "cost_after" in self._table.columns
 
     @property
+    def cost_before(self) -> tuple[str, FloatArray]:
+        """Label and values of the costs as commanded; for studies whose runs are optimized."""
+        return self._cost("cost_before")
+
+    @property
+    def cost_words(self) -> str:
+        """Label of the cost, without saying of which motion; requires a cost."""
+        assert self.cost is not None, "a label requires a cost"
+        return self.cost[0].replace(OF_OPTIMUM, "")
+
+    @property
     def shown(self) -> list[tuple[str, FloatArray]]:
         """Columns to draw over the parameters: margin and cost, or for optima the costs before and after."""
         cost = [] if self.cost is None else [self.cost]
-        first = self._cost("cost_before") if self.optimized else ("smallest margin [%]", 100 * self.margin)
+        first = self.cost_before if self.optimized else ("smallest margin [%]", 100 * self.margin)
         return [first, *cost]
 
     def _cost(self, name: str) -> tuple[str, FloatArray]:
@@ -82,19 +131,19 @@ class StudyPoints:
 
     @property
     def share(self) -> tuple[float, float, float]:
-        """Share of the feasible runs, with the interval of 95 % confidence (Wilson 1927)."""
-        count, feasible = len(self.feasible), int(self.feasible.sum())
-        share, square = feasible / count, NORMAL_95**2
-        center = (share + square / (2 * count)) / (1 + square / count)
-        spread = math.sqrt(share * (1 - share) / count + square / (4 * count**2))
-        half = NORMAL_95 * spread / (1 + square / count)
-        return share, max(0.0, center - half), min(1.0, center + half)
+        """Share of the feasible runs, with its interval of 95 % confidence, which holds for random draws."""
+        share, low, high = Shares.of(np.array(float(self.feasible.sum())), len(self.feasible))
+        return float(share), float(low), float(high)
 
     @property
-    def exceedance(self) -> tuple[FloatArray, FloatArray]:
+    def exceedance(self) -> tuple[FloatArray, Shares]:
         """Margins, ascending, and for each the share of runs with at least this margin."""
         margins = np.sort(self.margin[np.isfinite(self.margin)])
-        return margins, np.arange(len(margins), 0, -1) / len(self.margin)
+        return margins, Shares.of(np.arange(len(margins), 0.0, -1), len(self.margin))
+
+    def words(self, path: str) -> str:
+        """Return a parameter in words."""
+        return parameter_words(path, self.unit(path), self._table.joint_names)
 
     def unit(self, path: str) -> str:
         """Return the unit of a parameter, empty if it has none."""

@@ -94,7 +94,7 @@
   /* The worst runs; whatever is chosen in a plot is added. */
   function addTable(study, parent) {
     const heads = ["run", "verdict", "smallest margin [%]", ...(study.cost === null ? [] : [study.cost_words]),
-                   ...study.varying.map(({ path, unit }) => (unit ? `${path} [${unit}]` : path))];
+                   ...study.varying.map(({ words, unit }) => (unit ? `${words} [${unit}]` : words))];
     study.table = element("table", { class: "runs" },
       element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
       element("tbody", {}, ...study.worst.map((row) => line(study, row))));
@@ -111,7 +111,8 @@
       const source = new Bokeh.ColumnDataSource({ data: { x: Float64Array.from(array(study.exceeded)), y: array(study.exceeding) } });
       figure.step({ field: "x" }, { field: "y" }, "before", { source, line_color: curveColor(index), line_width: 1.8 });
       const [share, low, high] = study.share.map((each) => number(Number((100 * each).toPrecision(3))));
-      addKey(legend, curveColor(index), `${study.label}: ${share} % feasible (95 % interval ${low} to ${high} %)`);
+      const interval = low === undefined ? "" : ` (95 % interval ${low} to ${high} %)`;  // a grid has none
+      addKey(legend, curveColor(index), `${study.label}: ${share} % feasible${interval}`);
     });
     figure.add_layout(new Bokeh.Span({ dimension: "height", location: 0, line_color: color("soft"), line_width: 1 }));
     plots.push({ figure, plot, choose: () => {} });
@@ -129,11 +130,11 @@
     const margin = [array(study.margin), "smallest margin [%]"];
     const cost = study.cost === null ? null : [array(study.cost), study.cost_words];
     if (cost) addFront(study, scatter(study, charts, "cost over margin, and the Pareto front", margin, cost), margin[0], cost[0]);
-    for (const { path, unit, values } of study.varying) {
+    for (const { words, unit, values } of study.varying) {
       const varied = [array(values), unit ? `[${unit}]` : ""];
-      const figure = scatter(study, charts, `margin over ${path}`, varied, margin);
+      const figure = scatter(study, charts, `margin over ${words}`, varied, margin);
       figure.add_layout(new Bokeh.Span({ dimension: "width", location: 0, line_color: color("soft"), line_width: 1 }));
-      if (cost) scatter(study, charts, `cost over ${path}`, varied, cost);
+      if (cost) scatter(study, charts, `cost over ${words}`, varied, cost);
     }
   }
 

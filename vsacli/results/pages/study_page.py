@@ -61,12 +61,12 @@ def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) 
         "front": [] if points.cost is None else np.searchsorted(drawn, points.front).tolist(),
         "worst": np.searchsorted(drawn, points.worst).tolist(),
         "varying": [
-            {"path": path, "unit": points.unit(path), "values": packed.add(values[drawn])}
+            {"words": points.words(path), "unit": points.unit(path), "values": packed.add(values[drawn])}
             for path, values in points.varying.items()
         ],
-        "share": points.share,
+        "share": points.share if points.random else points.share[:1],
         "exceeded": packed.add(100 * margins[kept]),
-        "exceeding": packed.add(100 * shares[kept]),
+        "exceeding": packed.add(100 * shares.values[kept]),
     }
 
 

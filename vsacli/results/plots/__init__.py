@@ -20,11 +20,10 @@ from vsacli.results.plots.figures import (
 from vsacli.results.plots.recorded_figure import recorded_figure
 from vsacli.results.plots.sheets import drawn
 from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
-from vsacli.results.plots.study_figures import Bar, compared_studies, ranking_figure, study_figures
+from vsacli.results.plots.study_figures import compared_studies, ranking_figure, study_figures
 
 __all__ = [
     "FORMATS",
-    "Bar",
     "Bounds",
     "FigureFiles",
     "Figures",

@@ -29,9 +29,9 @@ LEAST_DENSITY = 1e-12
 _SAMPLES: dict[str, Any] = {"color": "0.65", "linewidth": 3.0}
 _NOISE: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (1, 2))}
 _CUTOFF: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (5, 2))}
-_BAND: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "none", "zorder": 0.4}
-_FILTERED: dict[str, Any] = {"facecolor": "#f3d9d9", "edgecolor": "none", "zorder": 0.4}
-_ENDS: dict[str, Any] = {"facecolor": "#fde9c8", "edgecolor": "none", "zorder": 0.4}
+_BAND: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "none", "linewidth": 0, "zorder": 0.4}
+_FILTERED: dict[str, Any] = {**_BAND, "facecolor": "#f3d9d9", "edgecolor": "#cfa3a3", "hatch": "////"}
+_ENDS: dict[str, Any] = {**_BAND, "facecolor": "#fde9c8", "edgecolor": "#d9b77a", "hatch": "....."}
 _FIT = LineStyle(line_style(1).color, "-", "")
 
 
@@ -86,17 +86,22 @@ def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     if curve.rms > 0:
         for level in (-2 * curve.noise, 2 * curve.noise):
             axes.axhline(level, **_NOISE)
-        handles.append(Line2D([], [], **_NOISE, label="noise as stated (residual: twice)"))
+        handles.append(_noise_handle())
     else:
         axes.set_yticks([0.0])
     first, last = axes.get_xlim()
     for start, end in ((first, curve.inside[0]), (curve.inside[1], last)):
         if start < end:
             axes.axvspan(start, end, **_ENDS)
+            handles.append(Patch(**_ENDS, label="ends: derivatives unreliable"))
     axes.set_xlim(first, last)
-    handles.append(Patch(**_ENDS, label="ends: derivatives unreliable"))
+    handles.append(line_handle(line_style(DIFFERENCE), "recorded minus spline"))
     add_title(axes, f"{curve.fit}, noise {curve.noise:.2g} {curve.unit}")
     return handles
+
+
+def _noise_handle() -> Artist:
+    return Line2D([], [], **_NOISE, label="reported noise (difference: twice)")
 
 
 def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> list[Artist]:
@@ -112,13 +117,15 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
     top = float(np.max(recorded))
     if top == 0:
         return []
+    handles: list[Artist] = []
     axes.loglog(spectrum.frequencies, recorded, **_SAMPLES)
     axes.loglog(spectrum.frequencies, fitted, **_FIT.words)
     if spectrum.noise > LEAST_DENSITY * float(np.max(spectrum.recorded)):
         axes.loglog(spectrum.frequencies, noise, **_NOISE)
+        handles.append(_noise_handle())
     axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
     axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
-    return _draw_bands(axes, spectrum)
+    return [*handles, *_draw_bands(axes, spectrum)]
 
 
 def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
@@ -129,10 +136,10 @@ def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
     motion = float(np.fmin(spectrum.cutoff, spectrum.above))
     if not math.isnan(motion):
         axes.axvspan(first, motion, **_BAND)
-        handles.append(Patch(**_BAND, label="motion's band"))
+        handles.append(Patch(**_BAND, label="frequencies of the motion"))
     if spectrum.above < end:
         axes.axvspan(spectrum.above, end, **_FILTERED)
-        handles.append(Patch(**_FILTERED, label="noise that a filter made smooth"))
+        handles.append(Patch(**_FILTERED, label="low-pass filtered noise"))
     if end < last:
         axes.axvline(end, **_CUTOFF)
         handles.append(Line2D([], [], **_CUTOFF, label="cut-off of the spline"))
@@ -144,7 +151,7 @@ def _followed(curve: RecordedCurve) -> str:
     if not np.any(curve.spectrum.recorded):
         return "at rest"
     end = np.fmin(cutoff, above)
-    return "all is motion" if math.isnan(end) else f"motion to {end:.3g} Hz, {curve.knots} knots"
+    return "motion at all frequencies" if math.isnan(end) else f"motion to {end:.3g} Hz, {curve.knots} knots"
 
 
 def _determined(highest: Highest) -> str:

@@ -45,7 +45,9 @@ RMS_LOOK: dict[str, Any] = {
     "color": "white",
     "markeredgecolor": "black",
 }
-EDGE, BRAKING = "0.35", 0.3
+EDGE: dict[str, Any] = {"color": "0.35", "linewidth": 1.0}
+BRAKING = 0.3
+"""Opacity of curves while the motor brakes."""
 
 
 class Bounds(NamedTuple):
@@ -113,9 +115,7 @@ def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
         for unused in panels[len(motors) :]:
             unused.remove()
         names = list(dict.fromkeys(name for motor in motors for name in motor.runs))
-        handles: list[Artist] = [
-            Line2D([], [], color=line_style(at).color, label=name) for at, name in enumerate(names)
-        ]
+        handles: list[Artist] = [Line2D([], [], **_run_look(at), label=name) for at, name in enumerate(names)]
         for axes, motor in zip(panels, motors, strict=False):
             handles += _draw(axes, motor, names)
         return complete(figure, title, handles)
@@ -128,18 +128,24 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
     top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
     handles = _draw_bounds(axes, motor.bounds, right, top)
     for name, (velocity, torque) in motor.runs.items():
-        _draw_run(axes, velocity, torque, line_style(names.index(name)).color)
+        _draw_run(axes, velocity, torque, _run_look(names.index(name)))
     axes.plot(*motor.rms, **RMS_LOOK, zorder=5)
     handles.append(Line2D([], [], **RMS_LOOK, label="root mean square"))
     if any((velocity * torque < 0).any() for velocity, torque in motor.runs.values()):
-        handles.append(Line2D([], [], color="black", alpha=BRAKING, label="while it brakes"))
+        handles.append(Line2D([], [], color="black", alpha=BRAKING, label="pale: while it brakes"))
     axes.set_xlim(0, right)
     axes.set_ylim(0, top)
     title = "\n".join(shortened(line, TITLE_LENGTH) for line in (motor.name, motor.drive))
     axes.set_title(title, loc="left", parse_math=False)
-    axes.set_xlabel(f"speed [{motor.velocity_unit}]")
-    axes.set_ylabel(f"torque [{motor.torque_unit}]" if motor.torque_unit != "N" else "force [N]")
+    axes.set_xlabel(f"|speed| [{motor.velocity_unit}]")
+    axes.set_ylabel(f"|torque| [{motor.torque_unit}]" if motor.torque_unit != "N" else "|force| [N]")
     return handles
+
+
+def _run_look(index: int) -> dict[str, Any]:
+    """Return the style of a trajectory: its color and dashes."""
+    style = line_style(index)
+    return {"color": style.color, "linestyle": style.linestyle}
 
 
 def _end(used: float, bounds: Sequence[float]) -> float:
@@ -160,26 +166,28 @@ def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[A
     if np.isinf(edge).all():
         return handles
     axes.fill_between(speed, np.minimum(edge, 2 * top), **PEAK_LOOK, zorder=0.4)
-    handles.append(Patch(**PEAK_LOOK, label="within the limits"))
+    handles.append(
+        Patch(facecolor=PEAK_LOOK["facecolor"], edgecolor=EDGE["color"], label="within the peak limits")
+    )
     if math.isfinite(bounds.continuous_torque):
         lasting = np.minimum(edge, bounds.continuous_torque)
         axes.fill_between(speed, np.minimum(lasting, 2 * top), **CONTINUOUS_LOOK, zorder=0.5)
-        handles.append(Patch(**CONTINUOUS_LOOK, label="continuously"))
-    axes.plot(speed, np.minimum(edge, 2 * top), color=EDGE, linewidth=1.0)
+        handles.append(Patch(**CONTINUOUS_LOOK, label="within the continuous limits"))
+    axes.plot(speed, np.minimum(edge, 2 * top), **EDGE)
     last = speed[np.isfinite(edge)]
     if last.size and last[-1] < right * (1 - 1 / POINTS):
-        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], color=EDGE, linewidth=1.0)
+        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **EDGE)
     return handles
 
 
-def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, color: str) -> None:
+def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, look: Mapping[str, Any]) -> None:
     """Draw |torque| over |speed|, dark where the motor drives."""
     drives = velocity * torque >= 0
     for shown, alpha, order in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
         axes.plot(
             np.where(shown, np.abs(velocity), np.nan),
             np.where(shown, np.abs(torque), np.nan),
-            color=color,
+            **look,
             alpha=alpha,
             zorder=order,
             linewidth=1.2,

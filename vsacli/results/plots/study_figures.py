@@ -6,20 +6,26 @@ The ranking of a sensitivity analysis has a bar for each parameter.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.ranking import Ranking
 from vsacli.results.charts.study_points import StudyPoints
-from vsacli.results.plots.panels import ZERO, add_title
+from vsacli.results.plots.panels import ZERO
+from vsacli.results.plots.point_labels import BELOW, label_points
 from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import house_style, line_handle, line_style, shortened
 from vsacli.results.store.study_table import StoredStudy
@@ -31,7 +37,7 @@ PANEL_HEIGHT = 2.4
 """Height of a panel, inches."""
 
 MOST_LETTERS = 30
-"""Longest label on one line along a panel, characters."""
+"""Longest line of a label along a panel, characters."""
 
 MOST_PANELS = 6
 """Maximum number of parameters in one figure: those with the highest correlation to the margin."""
@@ -42,7 +48,35 @@ BAR_HEIGHT = 0.28
 LABEL_LENGTH, ROOM_FOR_LABELS = 16, 0.35
 """Characters of a joint's name next to its bar, and the space for it, relative to the longest bar."""
 
-_FINE, _LOST = line_style(2).color, line_style(1).color
+MOST_TICKS = 8
+"""Maximum number of values of a grid that are ticks of a map; of more, some are."""
+
+ROOM_BESIDE, LEAST_ROOM = 0.04, 0.002
+"""Space next to the smallest and the largest margin, relative to their distance, and its minimum."""
+
+ROOM_FOR_RUNS = 0.13
+"""Space around a Pareto front for the labels of its ends, relative to its size."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+_POINT: dict[str, Any] = {"linestyle": "", "markersize": 3}
+_FEASIBLE: dict[str, Any] = {**_POINT, "marker": "o", "color": line_style(2).color}
+_INFEASIBLE: dict[str, Any] = {**_POINT, "marker": "x", "markersize": 4, "color": line_style(1).color}
+_BEFORE: dict[str, Any] = {
+    **_POINT,
+    "marker": "o",
+    "markersize": 4,
+    "color": line_style(1).color,
+    "markerfacecolor": "none",
+}
+_ANY: dict[str, Any] = {**_POINT, "marker": "o", "color": "0.6"}
+_NAMED: dict[str, Any] = {"linestyle": "", "marker": r"$\mathrm{7}$", "color": "black", "markersize": 6}
+_BOUNDARY: dict[str, Any] = {
+    "color": "black",
+    "path_effects": [withStroke(linewidth=3.5, foreground="white")],
+}
+_NOTHING: dict[str, Any] = {"facecolor": "0.9", "edgecolor": "0.6", "linewidth": 0, "hatch": "////"}
+_INTERVAL: dict[str, Any] = {"alpha": 0.2, "linewidth": 0}
 
 
 def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
@@ -53,7 +87,7 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
     """
     points = StudyPoints(table)
     with house_style():
-        figures = {FEASIBILITY_OF_RUNS: _feasibility([points], [points.name])}
+        figures = {FEASIBILITY_OF_RUNS: _feasibility([points], ["feasible"], points.title)}
         if points.varying:
             figures[COST if points.optimized else MARGIN] = (
                 _over_map(points) if _is_grid(points) else _over_numbers(points)
@@ -70,61 +104,88 @@ def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Fi
         InputError: a study has nothing to draw.
     """
     with house_style():
-        return _feasibility([StudyPoints(table) for table in tables], labels)
+        title = f"comparison of {counted(len(tables), 'study', 'studies')}: feasible runs"
+        return _feasibility([StudyPoints(table) for table in tables], labels, title)
 
 
 def _over_numbers(points: StudyPoints) -> Figure:
-    """Draw margin, and cost below, over each varying parameter."""
+    """Draw margin, and cost below, over each varying parameter; of optimized runs the costs alone."""
     paths = _most_followed(points)
-    rows = 1 if points.cost is None else 2
+    rows = 1 if points.cost is None or points.optimized else 2
     figure = Figure((PANEL_WIDTH * max(2, len(paths)), PANEL_HEIGHT * rows + 0.9), layout="constrained")
     panels = figure.subplots(rows, len(paths), squeeze=False, sharex="col", sharey="row")
+    handles: list[Artist] = []
     for column, path in zip(panels.T, paths, strict=True):
-        _scatter(column[0], points, points.varying[path], 100 * points.margin)
-        column[0].axhline(0.0, **ZERO)
-        _name_worst(column[0], points, points.varying[path])
+        if not points.optimized:
+            handles += _margins_over(column[0], points, points.varying[path])
         if points.cost is not None:
-            _scatter(column[1], points, points.varying[path], points.cost[1])
-        column[-1].set_xlabel(_label(points, path), parse_math=False)
-    panels[0, 0].set_ylabel("smallest margin [%]")
+            handles += _costs_over(column[-1], points, points.varying[path])
+        column[-1].set_xlabel(
+            _label(points, path, MOST_LETTERS * (2 if len(paths) == 1 else 1)), parse_math=False
+        )
     if points.cost is not None:
-        panels[1, 0].set_ylabel(points.cost[0])
-    return complete(figure, points.name, _handles(points))
+        panels[-1, 0].set_ylabel(_fitting(points.cost_words))
+    if not points.optimized:
+        panels[0, 0].set_ylabel("smallest margin [%]")
+    return complete(figure, points.title, handles)
 
 
 def _most_followed(points: StudyPoints) -> list[str]:
-    """Return the parameters with the highest correlation to the margin, in the order of the table."""
-    there = np.isfinite(points.margin)
+    """Return the parameters most correlated to the margin, or to the cost of optima, in the table's order."""
+    followed = points.cost[1] if points.optimized and points.cost is not None else points.margin
+    there = np.isfinite(followed)
 
-    def followed(path: str) -> float:
-        values, margin = points.varying[path][there], points.margin[there]
-        if len(values) < 2 or np.ptp(values) == 0 or np.ptp(margin) == 0:
+    def correlation(path: str) -> float:
+        values, others = points.varying[path][there], followed[there]
+        if len(values) < 2 or np.ptp(values) == 0 or np.ptp(others) == 0:
             return 0.0
-        return abs(float(np.corrcoef(values, margin)[0, 1]))
+        return abs(float(np.corrcoef(values, others)[0, 1]))
 
-    chosen = sorted(points.varying, key=followed, reverse=True)[:MOST_PANELS]
+    chosen = sorted(points.varying, key=correlation, reverse=True)[:MOST_PANELS]
     return [path for path in points.varying if path in chosen]
 
 
-def _scatter(axes: Axes, points: StudyPoints, x: FloatArray, y: FloatArray) -> None:
-    for rows, color, marker in ((points.feasible, _FINE, "o"), (~points.feasible, _LOST, "x")):
-        axes.plot(x[rows], y[rows], linestyle="", marker=marker, color=color, markersize=3)
-    axes.margins(0.06)
+def _margins_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
+    """Draw margins with the numbers of the worst runs; yield legend entries."""
+    margin = 100 * points.margin
+    yield from _scatter(axes, x, margin, points.feasible, "feasible", _FEASIBLE)
+    yield from _scatter(axes, x, margin, ~points.feasible, "infeasible", _INFEASIBLE)
+    axes.axhline(0.0, **ZERO)
+    worst = points.worst
+    if worst.size:
+        places = [(float(x[row]), float(margin[row])) for row in worst]
+        label_points(axes, places, [str(points.runs[row]) for row in worst])
+        yield Line2D([], [], **_NAMED, label="runs of the smallest margins")
 
 
-def _name_worst(axes: Axes, points: StudyPoints, x: FloatArray) -> None:
-    for row in points.worst:
-        place = (x[row], 100 * points.margin[row])
-        axes.annotate(f" {points.runs[row]}", place, fontsize=8, va="center")
+def _costs_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
+    """Draw the costs of all runs, or before and after their optimization; yield legend entries."""
+    assert points.cost is not None, "see _over_numbers"
+    cost, every = points.cost[1], np.ones(len(x), dtype=np.bool_)
+    if points.optimized:
+        before = points.cost_before[1]
+        yield from _scatter(axes, x, before, every, _known("as commanded", before), _BEFORE)
+        yield from _scatter(axes, x, cost, every, _known("optimum", cost), _FEASIBLE)
+    else:
+        yield from _scatter(axes, x, cost, points.feasible, "feasible", _FEASIBLE)
+        yield from _scatter(axes, x, cost, ~points.feasible, "infeasible", _INFEASIBLE)
 
 
-def _handles(points: StudyPoints) -> list[Line2D]:
-    kinds = (("feasible", points.feasible, _FINE, "o"), ("infeasible", ~points.feasible, _LOST, "x"))
-    return [
-        Line2D([], [], linestyle="", marker=marker, color=color, label=label)
-        for label, rows, color, marker in kinds
-        if rows.any()
-    ]
+def _known(label: str, costs: FloatArray) -> str:
+    """Return a label, with the number of runs that have a cost unless all have one."""
+    known = int(np.isfinite(costs).sum())
+    return label if known == len(costs) else f"{label} ({known} of {len(costs)} feasible)"
+
+
+def _scatter(
+    axes: Axes, x: FloatArray, y: FloatArray, chosen: BoolArray, label: str, look: Mapping[str, Any]
+) -> Iterator[Artist]:
+    """Draw the chosen points that have a value; yield their legend entry if there are any."""
+    rows = chosen & np.isfinite(y)
+    axes.plot(x[rows], y[rows], **look)
+    axes.margins(0.08)
+    if rows.any():
+        yield Line2D([], [], **{**look, "markersize": 5}, label=label)
 
 
 def _is_grid(points: StudyPoints) -> bool:
@@ -142,29 +203,34 @@ def _over_map(points: StudyPoints) -> Figure:
     maps = points.shown
     figure = Figure((1.5 * PANEL_WIDTH * len(maps), PANEL_HEIGHT + 1.2), layout="constrained")
     panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
-    panels[0].set_ylabel(_label(points, up), parse_math=False)
-    order = np.lexsort((x, y))
-    shape = (len(np.unique(y)), len(np.unique(x)))
+    panels[0].set_ylabel(_label(points, up, MOST_LETTERS), parse_math=False)
+    order, shape = np.lexsort((x, y)), (len(np.unique(y)), len(np.unique(x)))
+    margin = points.margin[order].reshape(shape)
+    bounded = not points.optimized and np.nanmin(margin, initial=0.0) < 0 < np.nanmax(margin, initial=0.0)
     for axes, (label, values) in zip(panels, maps, strict=True):
         place = [each[order].reshape(shape) for each in (x, y, values)]
         shown = axes.pcolormesh(*place, shading="nearest", cmap="viridis", rasterized=True)
-        axes.contour(
-            place[0], place[1], 100 * points.margin[order].reshape(shape), levels=[0], colors=[_LOST]
-        )
-        axes.set_xlabel(_label(points, across), parse_math=False)
+        if bounded:
+            boundary = axes.contour(*place[:2], margin, levels=[0], colors=[_BOUNDARY["color"]])
+            boundary.set_path_effects(_BOUNDARY["path_effects"])
+        for axis, grid in ((axes.xaxis, np.unique(x)), (axes.yaxis, np.unique(y))):
+            if len(grid) <= MOST_TICKS:
+                axis.set_ticks(grid)
+        axes.set_xlabel(_label(points, across, MOST_LETTERS), parse_math=False)
         axes.grid(visible=False)
-        axes.set_facecolor("0.8")
+        axes.patch.set(**_NOTHING)
         figure.colorbar(shown, ax=axes, label=_fitting(label))
-    zero, none = (
-        Line2D([], [], color=_LOST, label="margin zero"),
-        Patch(color="0.8", label="infeasible steps"),
-    )
-    return complete(figure, points.name, [none] if points.optimized else [zero, none])
+    handles: list[Artist] = [Line2D([], [], **_BOUNDARY, label="margin zero")] if bounded else []
+    if any(np.isnan(values).any() for _, values in maps):
+        handles.append(Patch(**_NOTHING, label="infeasible"))
+    return complete(figure, points.title, handles)
 
 
-def _fitting(label: str) -> str:
-    """Return a label with its unit, on two lines if it is longer than a panel is high."""
-    return label if len(label) <= MOST_LETTERS else label.replace(" [", "\n[")
+def _fitting(label: str, length: int = MOST_LETTERS) -> str:
+    """Return a label with its unit in lines of limited length; the unit is not divided."""
+    words, unit = label.rsplit(" [", 1) if label.endswith("]") else (label, "")
+    joined = f"{words} [{unit.replace(' ', NO_BREAK)}" if unit else words
+    return "\n".join(textwrap.wrap(joined, length)).replace(NO_BREAK, " ")
 
 
 def _pareto(points: StudyPoints) -> Figure:
@@ -173,59 +239,66 @@ def _pareto(points: StudyPoints) -> Figure:
     words, cost = points.cost
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
     axes = figure.add_subplot()
-    rows, front = points.feasible & np.isfinite(cost), points.front
-    axes.plot(100 * points.margin[rows], cost[rows], linestyle="", marker="o", color="0.6", markersize=3)
-    axes.plot(100 * points.margin[front], cost[front], **line_style(2).words)
-    for row in {front[0], front[len(front) // 2], front[-1]}:
-        place = (100 * points.margin[row], cost[row])
-        axes.annotate(f"run {points.runs[row]}", place, (4, -9), textcoords="offset points", fontsize=8)
+    margin, front = 100 * points.margin, points.front
+    runs = list(_scatter(axes, margin, cost, points.feasible, "feasible runs", _ANY))
+    axes.plot(margin[front], cost[front], **line_style(2).words)
+    axes.margins(ROOM_FOR_RUNS)
+    named = list(dict.fromkeys([front[0], front[-1], front[len(front) // 2]]))
+    places = [(float(margin[row]), float(cost[row])) for row in named]
+    label_points(axes, places, [f"run {points.runs[row]}" for row in named], BELOW)
     axes.set_xlabel("smallest margin [%]")
-    axes.set_ylabel(words)
-    axes.margins(0.08)
-    runs = Line2D([], [], linestyle="", marker="o", color="0.6", markersize=3, label="feasible runs")
-    return complete(figure, points.name, [runs, line_handle(line_style(2), "Pareto front")])
+    axes.set_ylabel(_fitting(words))
+    return complete(figure, points.title, [*runs, line_handle(line_style(2), "Pareto front")])
 
 
-def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figure:
-    """Draw the share of runs with at least a given margin; the legend gives the share of feasible runs."""
+def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: str) -> Figure:
+    """Draw the share of runs with at least a given margin; the legend gives the share of feasible runs.
+
+    Shares of random draws estimate probabilities, and have a band of their 95 % intervals; shares of a grid
+    have none, since its runs are chosen.
+    """
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
     axes, handles = figure.add_subplot(), []
     for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
-        margins, shares = points.exceedance
-        style = replace(line_style(index), marker="").words
-        axes.step(100 * margins, 100 * shares, where="pre", **style)
-        share = "{:.3g} % ({:.3g} to {:.3g} %)".format(*(100 * each for each in points.share))
-        handles.append(Line2D([], [], **style, label=f"{label}: {share}"))
+        style = replace(line_style(index), marker="")
+        _draw_shares(axes, points, style.words)
+        share, low, high = (100 * each for each in points.share)
+        interval = f" ({low:.3g} to {high:.3g} %)" if points.random else ""
+        handles.append(line_handle(style, f"{label}: {share:.3g} %{interval}"))
+    if any(points.random for points in studies):
+        handles.append(Patch(facecolor="0.3", **_INTERVAL, label="95 % interval (random samples)"))
     axes.axvline(0.0, **ZERO)
     axes.set_xlabel("smallest margin [%]")
     axes.set_ylabel("runs with at least this margin [%]")
     axes.set_ylim(0, 103)
-    add_title(axes, "feasible runs, with 95 % intervals")
-    return complete(figure, labels[0] if len(labels) == 1 else "studies", handles)
+    return complete(figure, title, handles)
 
 
-def _label(points: StudyPoints, path: str) -> str:
-    """Return the axis label of a parameter."""
+def _draw_shares(axes: Axes, points: StudyPoints, look: Mapping[str, Any]) -> None:
+    """Draw the share of runs over the margin, which falls to zero beyond the largest margin."""
+    margins, shares = points.exceedance
+    if not margins.size:
+        return
+    room = max(ROOM_BESIDE * float(np.ptp(margins)), LEAST_ROOM)
+    x = 100 * np.concatenate([margins[:1] - room, margins, margins[-1] + np.array([0.0, room])])
+    values, low, high = (100 * np.concatenate([each[:1], each, np.zeros(2)]) for each in shares)
+    axes.step(x, values, where="pre", **look)
+    if points.random:
+        inside = slice(1, len(margins) + 1)
+        area = {"color": look["color"], **_INTERVAL}
+        axes.fill_between(x[inside], low[inside], high[inside], step="pre", **area)
+
+
+def _label(points: StudyPoints, path: str, length: int) -> str:
+    """Return the axis label of a parameter, in lines of limited length."""
     unit = points.unit(path)
-    return f"{shortened(path)}\n[{unit}]" if unit else shortened(path)
+    words = shortened(points.words(path), 2 * MOST_LETTERS)
+    return _fitting(f"{words} [{unit}]" if unit else words, length)
 
 
-class Bar(NamedTuple):
-    """The effect of a change of a parameter.
-
-    Attributes:
-        label: parameter and its change.
-        share: largest change of a motor torque, relative to the largest torque of its joint.
-        joint: joint of that motor.
-    """
-
-    label: str
-    share: float
-    joint: str
-
-
-def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
+def ranking_figure(ranking: Ranking) -> Figure:
     """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
+    bars = ranking.bars
     with house_style():
         figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
         axes = figure.add_subplot()
@@ -240,4 +313,4 @@ def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
         axes.margins(x=ROOM_FOR_LABELS)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("change of motor torque [% of its peak]")
-        return complete(figure, title, [])
+        return complete(figure, ranking.title, [])

@@ -1,0 +1,72 @@
+"""Words for the parameters of robots and trajectories, whose paths are too technical for axes and titles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vsacli.base import units
+
+AXES, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
+ENTRIES = {
+    "gravity": AXES,
+    "com": AXES,
+    "xyz": AXES,
+    "rpy": ANGLES,
+    "motor": ("1", "2"),
+    "spring": ("1", "2"),
+}
+"""Names of the entries of lists, by key."""
+
+KEYS = {"com": "center of mass", "dh": "DH", "xyz": "", "rpy": "", "joints": "", "actuator": ""}
+"""Words in place of keys; empty for keys that say nothing next to the others."""
+
+SYMBOL_LENGTH = 3
+"""Maximum length of a key that is a symbol, e.g. `k_c`, and needs its quantity in words."""
+
+SYMBOLS = {
+    unit: words
+    for quantity, words in (
+        (units.STIFFNESS, "{} stiffness"),
+        (units.QUADRATIC_STIFFNESS, "quadratic {} stiffness"),
+        (units.CUBIC_STIFFNESS, "cubic {} stiffness"),
+    )
+    for unit in (quantity.revolute, quantity.prismatic)
+}
+"""Quantities of symbols by their unit; `{}` stands for the part that they belong to."""
+
+
+def parameter_words(path: str, unit: str, joints: Sequence[str]) -> str:
+    """Return a parameter in words, e.g. "spring stiffness k, all joints" for `joints.*.actuator.spring.k`.
+
+    Args:
+        path: path of the parameter in the file of a robot or a trajectory; `*` matches anything.
+        unit: unit of the parameter, which says what a symbol such as k is; empty if unknown.
+        joints: names of the joints, base to tip.
+    """
+    keys, where = path.split("."), ""
+    of_joint = keys[0] == "joints" and len(keys) > 2
+    if of_joint:
+        where, keys = _joint(keys[1], joints), keys[2:]
+    elif keys[-1] in joints and len(keys) > 1:
+        where, keys = keys[-1], keys[:-1]
+    words = [word for place in range(len(keys)) if (word := _word(keys, place))]
+    if of_joint and len(keys[-1]) <= SYMBOL_LENGTH and unit in SYMBOLS and len(words) > 1:
+        words = [SYMBOLS[unit].format(" ".join(words[:-1])), keys[-1]]
+    return ", ".join(filter(None, (" ".join(words), where)))
+
+
+def _joint(key: str, joints: Sequence[str]) -> str:
+    """Return the joints to which a key of a path applies: a name, an index from 0, or a pattern."""
+    if key == "*":
+        return "all joints"
+    if key.isdecimal() and key not in joints and int(key) < len(joints):
+        return joints[int(key)]
+    return f"joints {key}" if "*" in key else key
+
+
+def _word(keys: Sequence[str], place: int) -> str:
+    key = keys[place]
+    entries = ENTRIES.get(keys[place - 1], ()) if place else ()
+    if key.isdecimal() and int(key) < len(entries):
+        return entries[int(key)]
+    return KEYS.get(key, key if len(key) <= SYMBOL_LENGTH else key.replace("_", " "))

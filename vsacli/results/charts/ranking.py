@@ -1,0 +1,72 @@
+"""The ranking of parameters by their effect on motor torques, from the report of a sensitivity analysis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from vsacli.base.texts import counted
+from vsacli.results.charts.parameter_words import parameter_words
+
+MOST_BARS = 15
+"""Maximum number of parameters in the figure, the most important ones."""
+
+ABSOLUTE = {"m": (1e-3, "1 mm"), "rad": (math.radians(1), "1 deg")}
+"""Absolute changes of lengths and angles, by unit; other parameters change by a share of their value."""
+
+
+class Bar(NamedTuple):
+    """The effect of a change of a parameter.
+
+    Attributes:
+        label: parameter and its change.
+        share: largest change of a motor torque, relative to the largest torque of its joint.
+        joint: joint of that motor.
+    """
+
+    label: str
+    share: float
+    joint: str
+
+
+class Ranking(NamedTuple):
+    """The most important parameters, in order, with the title of their figure."""
+
+    title: str
+    bars: Sequence[Bar]
+
+    @classmethod
+    def of(cls, report: Mapping[str, Any], joints: Sequence[str]) -> Ranking:
+        """Return the ranking in a report.
+
+        Args:
+            report: report of a sensitivity analysis as JSON.
+            joints: names of the joints, base to tip.
+
+        Raises:
+            LookupError, TypeError, AttributeError, ArithmeticError: the content is not such a report.
+        """
+        effects = report["parameters"]
+        bars = list(_bars(effects[:MOST_BARS], joints))
+        parameters = counted(len(effects), "parameter")
+        shown = parameters if len(bars) == len(effects) else f"{len(bars)} of {parameters}"
+        return cls(f"sensitivity of {report['robot']}, {report['trajectory']}: {shown}", bars)
+
+
+def _bars(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> Iterator[Bar]:
+    """Yield a bar for each parameter that changes a motor torque."""
+    for effect in effects:
+        shares = {joint: each["share"] or 0.0 for joint, each in effect["joints"].items()}
+        joint = max(shares, key=lambda name: shares[name], default=None)
+        if joint is not None and shares[joint] > 0:
+            words = parameter_words(effect["path"], effect["unit"], joints)
+            yield Bar(f"{_change(effect)} of {words}", shares[joint], joint)
+
+
+def _change(effect: Mapping[str, Any]) -> str:
+    """Return the change of a parameter in words."""
+    step, words = ABSOLUTE.get(effect["unit"], (math.nan, ""))
+    if math.isclose(effect["step"], step):
+        return words
+    return f"{100 * effect['step'] / abs(effect['value']):.3g} %"
