@@ -16,7 +16,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     result_line,
 )
-from vsacli.cli.console import Talk, say, talk_options
+from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def compare(
     file_format: str,
     overwrite: bool,
     talk: Talk,
-) -> None:
+) -> Exit:
     """Compare RESULT, the file of a result or a simulation, with RECORDING, a CSV file of the same motion.
 
     The column `time` of the recording may start at any time and have its own sampling rate. Columns have the
@@ -73,7 +73,8 @@ def compare(
 
     A sensor reading such as q_measured is preferred to q. Commands such as q_ref are ignored. For each
     signal, the report gives the error, gain and offset of measured over computed values, and the lag relative
-    to the other signals, each with its standard error.
+    to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
+    that the recording does not fit the result.
     """
     check_plotted(folder)
     from vsacli.base.outputs import Outputs
@@ -94,6 +95,7 @@ def compare(
             _draw(comparison, stem, folder, file_format, outputs)
     say(comparison, as_json)
     talk.wrote(outputs)
+    return Exit.VERDICT if comparison.warnings else Exit.OK
 
 
 def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outputs: Outputs) -> None:

@@ -25,7 +25,7 @@ from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, known_columns, preferred, read_recording
+from vsacli.studies.measured.measured_columns import Measured, preferred, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.faults import wraps
 from vsacli.trajectory.recorded.health import column_faults
@@ -109,7 +109,7 @@ def recorded_columns(
     """
     wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
     wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
-    recording = read_recording(path, known_columns(_RobotColumns(robot), wanted), "the robot", mapping)
+    recording = read_recording(path, _RobotColumns(robot), wanted, robot.name, mapping)
     united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
     for place, signal in _preferred(recording.signals).items():
