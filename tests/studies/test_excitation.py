@@ -172,10 +172,10 @@ def test_a_robot_that_cannot_do_anything_is_told_why() -> None:
 @pytest.mark.parametrize("noise", [(1e308, None), (2e-5, 1e308), (-1.0, None), (0.0, float("nan"))])
 def test_a_noise_out_of_range_is_refused(noise: tuple[float, float | None]) -> None:
     """Squares of such numbers are infinite, and no spectrum has a noise or a motion then."""
-    with pytest.raises(InputError, match=r"the noise of sensors must lie between 0 and 1e\+30"):
+    with pytest.raises(InputError, match=r"the sensor noise must be between 0 and 1e\+30"):
         plan_excitation(shipped_robot("rp_2"), duration=5, noise=noise)
 
 
 def test_a_duration_too_short_is_refused() -> None:
-    with pytest.raises(InputError, match="lasts at least 5 s, not 1 s"):
+    with pytest.raises(InputError, match="the duration must be at least 5 s, not 1 s"):
         plan_excitation(shipped_robot("rp_2"), duration=1)

@@ -158,9 +158,9 @@ def plan_excitation(
         ImpossibleError: no excitation is feasible.
     """
     if not SHORTEST <= duration < np.inf:
-        raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
+        raise InputError.one(f"the duration must be at least {SHORTEST:g} s, not {duration:g} s")
     if not all(each is None or 0 <= each <= LARGEST for each in noise):
-        raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
+        raise InputError.one(f"the sensor noise must be between 0 and {LARGEST:g}")
     middle = None
     if own is not None:
         q = executed(robot, own).q
