@@ -190,9 +190,7 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     # of the 819.4 N m/rad that gravity asks for at rest, with a margin of 1 %
     assert ", since with 827.7 N m/rad, the least it may have, joint-side torque of motor 1 is " in shoulder
     assert shoulder.endswith(" s, above its limit of 2")
-    assert heading.startswith(
-        "fixes, with any one of which every step of all joints but shoulder has a margin"
-    )
+    assert heading.startswith("fixes; with any of them every sample of all joints but shoulder has a margin")
     assert fixes
     trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
     block = compute_block(load_robot(ROBOT), trajectory.block(0, trajectory.samples))

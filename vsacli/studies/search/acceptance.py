@@ -383,7 +383,9 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     """
     variable_stiffness_actuator(joint)
     if reason := acceptance.path_reason(joint, load):
-        raise ImpossibleError(f"{reason}; the stiffness has no effect on that: change the path or the limit")
+        raise ImpossibleError(
+            f"{reason}; the stiffness has no effect on that: change the motion or the limit"
+        )
     admissible = admissible_stiffness(joint, load.command, acceptance.min_margin)
     if np.isnan(admissible.low).any():
         raise ImpossibleError(acceptance.reason(joint, load))

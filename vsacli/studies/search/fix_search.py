@@ -246,7 +246,8 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
     for index in refused:
         joint = acceptance.robot.joints[index]
         if index in beyond:
-            text = f"{_what(beyond[index])}: neither timing nor stiffness has an effect on that: change the path or the limit"
+            advice = "timing and stiffness have no effect on that: change the path or the limit"
+            text = f"{_what(beyond[index])}; {advice}"
             yield index, Cause(joint.name, text, fixable=False)
         else:
             text, hopeful = _text(acceptance, joint, moving[index], resting[index])
