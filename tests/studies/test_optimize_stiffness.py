@@ -204,7 +204,7 @@ def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
 
 
 def test_what_cannot_be_minimized_is_refused(arm, swing):
-    with pytest.raises(InputError, match=r"the motors of base have no resistance.*or --minimize torque"):
+    with pytest.raises(InputError, match=r"the motors of base have no resistance.*or use --minimize torque"):
         optimize(arm, swing, "copper_loss")
     with pytest.raises(InputError, match="unknown objective 'power'; valid: torque, energy, copper_loss"):
         optimize(arm, swing, "power")

@@ -299,7 +299,7 @@ def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
         return ""
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
     constant = asked.min() == asked.max()
-    least = f"{rounded(asked[0] + offset, up=True)} {unit}" if constant else f"{offset:+.4g} {unit}"
+    least = f"{asked[0] + offset:.4g} {unit}" if constant else f"{offset:+.4g} {unit}"
     return f", since with {least}, the least it may have, {_what(trouble)}"
 
 
