@@ -23,12 +23,12 @@ def test_fixes_follow_the_report(vsacli, too_soft):
     assert blank == ""
     assert (
         heading
-        == "fixes, with any one of which every step has a margin of at least 1 % and keeps every limit:"
+        == "fixes; with any of them every sample has a margin of at least 1 % and is within all limits:"
     )
     assert [cause.partition(":")[0] for cause in causes] == ["base", "shoulder", "elbow"]
     assert causes[0].startswith(
         "base: stiffness is 790 N m/rad at t = 4.000 s, even at rest, below the 808.1 its load allows: "
-        "no slower motion helps, a stiffness higher by 18.0"
+        "no slower motion helps, an increase of 18.0"
     )
     assert offset.startswith("2. raise the stiffness of base by 18.0")
     assert profile.startswith("1. reshape the stiffness of base by up to +18.")
@@ -63,7 +63,7 @@ def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
     again = vsacli("check-feasibility", ROBOT, slower, "--fixes")
     assert again.code == 0
     assert again.out.endswith(
-        "nothing to change: every step has a margin of at least 1 % and keeps every limit\n"
+        "nothing to change: every sample has a margin of at least 1 % and is within all limits\n"
     )
 
 
@@ -86,7 +86,7 @@ def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
         3,
         "fix 1 goes to fixed.yaml\nwrote fixed.yaml\nwrote fixed.csv\n",
     )
-    assert "fixes, with any one of which" in done.out
+    assert "fixes; with any of them" in done.out
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
     assert run.code == 0
@@ -196,7 +196,7 @@ def test_fixes_keep_the_margin_that_is_asked_for(vsacli, motion):
     again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--min-margin", "0.1", "--fixes")
     assert (again.code, again.out.splitlines()[-1]) == (
         0,
-        "nothing to change: every step has a margin of at least 10 % and keeps every limit",
+        "nothing to change: every sample has a margin of at least 10 % and is within all limits",
     )
 
 

@@ -113,11 +113,14 @@ def test_what_cannot_be_told_is_exit_code_3(vsacli: Command, own_folder: Path) -
     [
         (
             ("--fit", "sprigns"),
-            "--fit sprigns: expected springs, motors, friction or links, .*did you mean 'springs'",
+            "'sprigns' is unknown; expected springs, motors, friction, links, .*did you mean 'springs'",
         ),
-        (("--fit", "joints.wrist.*"), r"--fit joints.wrist.\*: expected"),
+        (("--fit", "joints.wrist.*"), r"'joints.wrist.\*' is unknown; expected springs"),
         (("--fit", ","), "expected names separated by commas, e.g. springs,motors"),
-        (("--bandwidth", "30"), r"record.csv: its bandwidth must lie between 1 and 12.5 Hz, not 30"),
+        (
+            ("--bandwidth", "30"),
+            r"the bandwidth must be between 1 and 12.5 Hz for .*record.csv \(100 Hz\), not 30",
+        ),
         (("--bandwidth", "0"), "0"),
     ],
 )

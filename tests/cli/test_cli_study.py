@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from samples.command_line import REPOSITORY
+from samples.command_line import REPOSITORY, ROBOT, edited
 from samples.marks import needs_compiler, slow_but
 from samples.studies import HEAD, column, content, study
 
@@ -197,3 +197,11 @@ def test_compiled_code_pays_by_the_runs_of_each_robot(own_folder: Path, vary: st
     """So that 1.2 million steps of one robot repay compiling, and 120,000 do not."""
     chosen = load_study(study(own_folder, f"vary: {{{vary}}}"), "auto")
     assert (chosen.engine, bool(chosen.compiler)) == (engine, engine == "c")
+
+
+def test_implausible_values_are_reported_once(vsacli: Any, tmp_path: Path) -> None:
+    path = study(tmp_path)
+    edited(ROBOT, tmp_path / "arm.yaml", ("com: [0, 0, 0] ", "com: [0, 0, 150] "))
+    done = vsacli("study", str(path), "--processes", "1")
+    assert done.err.count("warning: ") == 1
+    assert "joints.base.link.com.2 = 150 m is " in done.err

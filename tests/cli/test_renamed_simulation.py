@@ -82,9 +82,7 @@ def test_a_recording_with_an_old_column_is_refused_with_the_new_one(vsacli, file
     (files / "m.csv").write_text(text.replace(f",{column},", f",{old},", 1))
     outcome = vsacli("compare", "r.h5", "m.csv")
     assert outcome.code == 2
-    expected = (
-        f"m.csv:1: column '{old}' is now called '{new}'; rename it, or say in --columns what it stands for"
-    )
+    expected = f"m.csv:1: column '{old}' is now called '{new}'; rename it, or map it with --columns"
     assert expected in " ".join(outcome.err.split())
     mapped = f"columns: {{{column}: {{column: {re.sub(r' .*', '', old)}}}}}\n"
     (files / "columns.yaml").write_text("format: vsacli-columns/1\n" + mapped)

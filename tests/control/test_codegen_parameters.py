@@ -144,7 +144,7 @@ def test_what_decides_about_the_code_is_refused(name: str, path: str) -> None:
 
 
 def test_a_path_that_fits_nothing() -> None:
-    with pytest.raises(InputError, match=r"no number of the robot fits 'joints.2.link.mas'"):
+    with pytest.raises(InputError, match=r"no parameter of the robot matches 'joints.2.link.mas'"):
         generate(ROBOTS["3R"], patterns=["joints.2.link.mas"])
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import math
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from samples.command_line import ROBOT, edited
 from samples.pages import Page
 
 from vsacli import compare
+from vsacli.base.errors import InputError
 
 BEGIN = 0.5137
 """Of the result in the recording, s; no multiple of the 2 ms between its rows."""
@@ -205,9 +208,10 @@ def test_a_robot_that_stands_still_is_not_aligned(vsacli, tmp_path, moves):
     written(tmp_path / "m.csv", columns)
     done = vsacli("compare", "r.h5", "m.csv")
     assert done.code == 2
-    assert "does it move beyond its noise? --time-offset says when" in done.err
+    assert "does anything move? If the offset is known, give --time-offset" in done.err
     given = vsacli("compare", "r.h5", "m.csv", "--time-offset", "0")
-    assert given.code == 0
+    assert given.code == (3 if moves else 0)
+    assert ("warning: the recording does not fit the result" in given.out) == moves
     assert ("base.q does not move, though q was computed to" in given.out) == moves
     assert (" hold still as computed" in given.out) != moves
 
@@ -223,7 +227,7 @@ def test_other_times_of_a_periodic_motion_are_listed(vsacli, tmp_path):
     written(tmp_path / "m.csv", dict(zip(header, np.array(kept, dtype=float).T, strict=True)))
     found = compare(tmp_path / "r.h5", tmp_path / "m.csv")
     (note,) = found.notes
-    assert "it would agree as well, as periodic motions do; --time-offset chooses" in note
+    assert "as well, as in periodic motions; choose with --time-offset" in note
     assert found.time_offset % 1 == pytest.approx(0, abs=1e-3) or found.time_offset % 1 == pytest.approx(
         1, abs=1e-3
     )
@@ -281,22 +285,40 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     assert (report["time_offset"], report["found"], len(report["signals"])) == (BEGIN, False, 15)
 
 
+STILL = "time,base.q\n" + "".join(f"{t},1\n" for t in range(9))
+WILD = "time,base.q\n" + "".join(f"{t},{t % 3}e200\n" for t in range(9))
+SLOW = "time,base.q\n" + "".join(f"{1000 * t},{t}\n" for t in range(5))
+SHORT = "time,base.q\n0,1\n1,2\n2,1\n"
+
 BAD = {
-    "there is no column 'time'": ("stamp,base.q\n0,1\n1,2\n", []),
-    "no column is a variable of the result": ("time,bose.q\n0,1\n1,2\n", []),
-    "the times must ascend": ("time,base.q\n0,1\n1,2\n1,3\n", []),
-    "a recording needs two rows": ("time,base.q\n0,1\n", []),
-    "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
-    "are the same; leave one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
-    "is like the computed signals at no shift": ("time,base.q\n" + "".join(f"{t},1\n" for t in range(9)), []),
-    "write it in the header, e.g. time[ms]": (
-        "time,base.q\n" + "".join(f"{1000 * t},{t}\n" for t in range(5)),
+    "there is no column 'time'; add it, or name it with --columns": ("stamp,base.q\n0,1\n1,2\n", []),
+    "joint 'bose' is not in vsa-3r (base, shoulder, elbow); did you mean 'base'?": (
+        "time,bose.q\n0,1\n1,2\n",
         [],
     ),
-    "2 of its rows are within, 4 are needed": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "1"]),
-    "must be a finite number of seconds": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "nan"]),
-    "at no shift in time": ("time,base.q\n" + "".join(f"{t},{t % 3}e200\n" for t in range(9)), []),
-    "change --time-offset": ("time,base.q\n0,1\n1,2\n2,1\n", ["--time-offset", "50"]),
+    "joints 'a', 'b' are not in vsa-3r (base, shoulder, elbow): is this the recording of another robot?": (
+        "time,a.q,b.q\n0,1,1\n1,2,1\n",
+        [],
+    ),
+    "m.csv:1: expected columns such as time, base.q, base.tau_motor_1; if they have other names, use": (
+        "t [s],m1\n0,1\n1,2\n",
+        [],
+    ),
+    "m.csv:4: time must increase, but 1.0 follows 1.0; sort the rows by time": (
+        "time,base.q\n0,1\n1,2\n1,3\n",
+        [],
+    ),
+    "has 1 row; a recording needs at least 2": ("time,base.q\n0,1\n", []),
+    "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
+    "columns 'base.q' and 'q1' are the same signal; keep one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
+    "matches the result at no time offset; is it the recording of this motion": (STILL, []),
+    "and does anything move?": (WILD, []),
+    "write it in the header, e.g. time[ms]": (SLOW, []),
+    "2 rows overlap the result (3 s): the recording spans -1 to 1 s of it; at least 4 rows must": (
+        SHORT,
+        ["--time-offset", "1"],
+    ),
+    "with a time offset of 50 s, no row overlaps the result (3 s)": (SHORT, ["--time-offset", "50"]),
 }
 
 
@@ -309,3 +331,72 @@ def test_recordings_that_cannot_be_compared_are_refused(vsacli, tmp_path, senten
     assert (done.code, done.out) == (2, "")
     assert sentence in done.err
     assert "m.csv" in done.err
+
+
+def test_a_time_offset_must_be_finite(computed, tmp_path):
+    with pytest.raises(InputError, match="the time offset must be finite, not nan s"):
+        compare(tmp_path / "r.h5", written(tmp_path / "m.csv", recorded(computed)), math.nan)
+
+
+OTHER = """\
+format: vsacli-trajectory/1
+name: other
+duration: 3
+rate: 500
+position: {type: sinusoids, frequency: 1/3, offset: 0, sine: [[0.1, -0.2, 0.1], [0.1, 0.1, 0.1]]}
+stiffness: {type: constant, value: 1300}
+"""
+
+
+@pytest.mark.usefixtures("computed")
+def test_a_recording_of_another_motion_is_reported_first(vsacli, tmp_path):
+    (tmp_path / "other.yaml").write_text(OTHER)
+    assert vsacli("invdyn", "robot.yaml", "other.yaml", "-o", "o.h5").code == 0
+    assert vsacli("export", "o.h5", "--variables", "q,tau_motor", "-o", "m.csv").code == 0
+    done = vsacli("compare", "r.h5", "m.csv", "--time-offset", "0")
+    warning = done.out.splitlines()[1]
+    assert done.code == 3
+    assert warning.startswith("warning: the recording does not fit the result: ")
+    assert warning.endswith("; is it the recording of another robot or motion?")
+
+
+def test_mistaken_units_and_signs_are_no_other_robot(computed, tmp_path):
+    columns = recorded(computed)
+    columns |= {name: -np.degrees(values) for name, values in columns.items() if ".q" in name}
+    columns = {name: values for name, values in columns.items() if name == "time" or ".q" in name}
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    assert found.warnings == ()
+    assert "base.q looks as if it is in degrees" in " ".join(found.notes)
+
+
+def test_joints_that_the_result_does_not_have_are_reported_unless_ignored(vsacli, computed, tmp_path):
+    columns = recorded(computed)
+    columns = {name.replace("elbow.", "wrist."): values for name, values in columns.items()}
+    written(tmp_path / "m.csv", columns)
+    done = vsacli("compare", "r.h5", "m.csv")
+    assert done.code == 3
+    assert "\nwarning: joint 'wrist' is not in vsa-3r (base, shoulder, elbow): is this the" in done.out
+    (tmp_path / "names.yaml").write_text("format: vsacli-columns/1\nignore: rest\n")
+    ignored = vsacli("compare", "r.h5", "m.csv", "--columns", "names.yaml")
+    assert "wrist' is not in" not in ignored.out
+    assert ignored.code == 0
+
+
+def test_a_short_overlap_is_reported_first(vsacli, computed, tmp_path):
+    columns = recorded(computed)
+    early = columns["time"] < BEGIN + 0.1
+    written(tmp_path / "m.csv", {name: values[early] for name, values in columns.items()})
+    done = vsacli("compare", "r.h5", "m.csv", "--time-offset", str(BEGIN))
+    assert done.code == 3
+    assert "\nwarning: only 0.0983 s (50 rows) of 3 s overlap\n" in done.out
+
+
+@pytest.mark.usefixtures("computed")
+def test_an_infeasible_result_is_reported_first(vsacli):
+    soft = vsacli("invdyn", "robot.yaml", "wave.yaml", "--set", "stiffness.start=750", "-o", "bad.h5")
+    assert soft.code == 3
+    assert vsacli("export", "bad.h5", "--variables", "q", "-o", "m.csv").code == 0
+    done = vsacli("compare", "bad.h5", "m.csv")
+    assert done.code == 3
+    assert re.search(r"\nwarning: bad.h5 is infeasible at \d+ of 1501 samples; its motors are not", done.out)
+    assert json.loads(vsacli("compare", "bad.h5", "m.csv", "--json").out)["warnings"]

@@ -208,13 +208,13 @@ def test_the_limit_in_the_way_is_named(asked, change, what, limit):
     [
         (
             Limits(position=(-1.0, 1.0)),
-            "base: position is 1.571 rad at t = 1.000 s, above its limit of 1: "
-            "no timing and no stiffness changes that, another path does",
+            "base: position is 1.571 rad at t = 1.000 s, above its limit of 1; "
+            "timing and stiffness have no effect on that: change the path or the limit",
         ),
         (
             Limits(velocity=(-9.0, 3.0)),
-            "no stiffness changes that the velocity of base, 3.43612 rad/s at t = 0.500 s, "
-            "is above its limit 3",
+            "the velocity of base is 3.436 rad/s at t = 0.500 s, above its limit of 3 rad/s; "
+            "the stiffness has no effect on that: change the motion or the limit",
         ),
     ],
     ids=["position", "velocity"],
@@ -228,7 +228,7 @@ def test_limits_of_the_motion_are_none_of_the_stiffness(limits, expected):
 def test_motor_velocity_that_no_stiffness_brings_down():
     robot = changed(BASE, motor={"max_velocity": 1.0})
     assert reason(robot, rest_to_rest(1.0)).startswith(
-        "none keeps every limit of base; as it is, the joint-side velocity of motor 1 of base, 3.2972 rad/s"
+        "none keeps every limit of base; as it is, the joint-side velocity of motor 1 of base is 3.297 rad/s"
     )
 
 

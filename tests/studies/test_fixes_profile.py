@@ -240,8 +240,8 @@ def test_stiffness_limit_below_what_the_load_needs():
 def test_limits_of_the_motion_are_none_of_the_stiffness():
     robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
     assert reason(robot, rest_to_rest(1.0)) == (
-        "base: position is 1.571 rad at t = 1.000 s, above its limit of 1: "
-        "no timing and no stiffness changes that, another path does"
+        "base: position is 1.571 rad at t = 1.000 s, above its limit of 1; "
+        "timing and stiffness have no effect on that: change the path or the limit"
     )
 
 

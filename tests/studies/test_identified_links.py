@@ -172,12 +172,12 @@ def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     run = inverse_dynamics(robot, trajectory)
     unknown = identify(robot, written(robot, run, ["slide"], tmp_path))
     assert [system.title for system in unknown.systems] == ["slide"]
-    assert "links move each other, and the positions of arm were not recorded" in unknown.notes
+    assert "links are not identified, since the positions of arm were not recorded" in unknown.notes
     assert unknown.fitted.joints[0].link == robot.joints[0].link
     file = written(robot, run, robot.joint_names, tmp_path, fx=0 * run.time)
     pushed = identify(robot, file)
     assert [system.title for system in pushed.systems] == ["arm", "slide"]
-    sentence = "nothing is identified of links while something acts on the end effector"
+    sentence = "links are not identified, since a wrench acts on the end effector"
     assert pushed.notes == (f"{file}: {sentence}",)
     with pytest.raises(InputError, match=sentence):
         identify(robot, file, ["links"])

@@ -174,7 +174,14 @@ def test_several_records_are_fitted_together_and_each_is_predicted_by_the_others
 def test_a_record_counts_once_whatever_its_files_are_called(tmp_path: Path) -> None:
     record = excited(joint(), JOINT._replace(duration=12), 5).noisy(5)
     paths = [record.write(tmp_path / name, joint()) for name in ("one.csv", "copy.csv")]
-    with pytest.raises(InputError, match=r"copy.csv: has the same numbers as .*one.csv, given before"):
+    with pytest.raises(InputError, match=r"copy.csv: equals .*one.csv; give each recording once"):
+        identify(joint(), paths, fit=["springs"])
+    with pytest.raises(InputError, match=r"one.csv: is given twice; give each recording once"):
+        identify(joint(), [paths[0], paths[0]], fit=["springs"])
+    header, *rows = paths[1].read_text().splitlines()
+    rounded = [",".join(f"{float(cell):.9g}" for cell in row.split(",")) for row in rows]
+    paths[1].write_text("\n".join([header, *rounded]) + "\n")
+    with pytest.raises(InputError, match=r"copy.csv: equals .*one.csv"):
         identify(joint(), paths, fit=["springs"])
 
 

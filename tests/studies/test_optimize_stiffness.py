@@ -184,6 +184,15 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
     assert np.abs(result.ddstiffness[[0, -1]]).max() < 1e-3  # of some 1e3 N m/rad in 0.1 s^2
 
 
+def test_implausible_values_are_reported(vsacli):
+    implausible = ("--set", "joints.elbow.link.com=[0,0,150]", "--set", "rate=20")
+    done = vsacli(
+        "optimize", ROBOT, REST_TO_REST, "--set", "joints.*.actuator.motor.max_torque=5", *implausible
+    )
+    assert done.code == 3
+    assert "\nwarning: joints.elbow.link.com.2 = 150 m is " in done.out
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
 def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
@@ -195,7 +204,7 @@ def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
 
 
 def test_what_cannot_be_minimized_is_refused(arm, swing):
-    with pytest.raises(InputError, match=r"the motors of base have no resistance.*or --minimize torque"):
+    with pytest.raises(InputError, match=r"the motors of base have no resistance.*or use --minimize torque"):
         optimize(arm, swing, "copper_loss")
     with pytest.raises(InputError, match="unknown objective 'power'; valid: torque, energy, copper_loss"):
         optimize(arm, swing, "power")

@@ -55,9 +55,9 @@ def test_a_pace_that_is_the_same_everywhere_stretches(motion):
 
 
 def test_what_has_no_timing_to_choose_is_refused(arm, motion):
-    with pytest.raises(InputError, match="time is what 'timing' varies for, or 'both', not 'stiffness'"):
+    with pytest.raises(InputError, match="time needs --vary timing or both, not stiffness"):
         optimize(arm, motion, "time", "stiffness")
-    with pytest.raises(InputError, match="what varies must be 'stiffness', 'timing' or 'both', not 'pace'"):
+    with pytest.raises(InputError, match="must be stiffness, timing or both, not 'pace'"):
         optimize(arm, motion, "torque", "pace")
 
 

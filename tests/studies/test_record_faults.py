@@ -75,15 +75,15 @@ STOPPING = {
         lambda record: changed(
             record, **{name: put(np.s_[:, ELBOW], 0.25) for name in ("q", "theta", "tau_motor")}
         ),
-        "joint elbow does not move, and tells nothing",
+        "record.csv: joint elbow does not move, so nothing can be identified; remove its columns, or record",
     ),
     "milliseconds": (
         lambda record: changed(record, time=lambda time: 1000 * time),
-        r"as 14 more, has a time that looks like ms.*write time\[ms\] in the header",
+        r"record.csv: time looks like ms.*write time\[ms\] in the header",
     ),
     "a glimpse": (
         lambda record: Recorded(*(each[:150] for each in record)),
-        "column 'base.q', as 14 more, has 150 numbers; a fit needs 200 at least",
+        "has 150 rows with a value in column 'base.q'; identification needs at least 200",
     ),
 }
 """Changes of a record, and what is then said."""
@@ -101,8 +101,67 @@ def test_what_nothing_can_be_made_of_stops_the_fit(
 def test_missing_columns_are_named(arm: Robot, record: Recorded, tmp_path: Path) -> None:
     path = record.write(tmp_path / "record.csv", arm)
     path.write_text(path.read_text().replace("elbow.tau_motor_2", "elbow.torque_2", 1))
-    with pytest.raises(InputError, match=r"joint elbow: there is no column elbow.tau_motor_2"):
+    with pytest.raises(
+        InputError, match=r"the column elbow.tau_motor_2 \(motor torques\) is missing; record torques or"
+    ):
         identify(arm, path)
+
+
+def test_missing_columns_of_all_joints_are_one_message(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    path = record.write(tmp_path / "record.csv", arm)
+    path.write_text(path.read_text().replace(".q,", ".position,"))
+    with pytest.raises(InputError) as error:
+        identify(arm, path)
+    (problem,) = error.value.problems
+    listed = "base.q, shoulder.q, elbow.q (joint positions)"
+    assert problem.message == f"the columns {listed} are missing; if they have other names, use --columns"
+
+
+def test_columns_with_little_time_in_common_stop_the_fit(
+    arm: Robot, record: Recorded, tmp_path: Path
+) -> None:
+    path = record.write(tmp_path / "record.csv", arm)
+    header, *rows = path.read_text().splitlines()
+    torques = ["tau_motor" in name for name in header.split(",")]
+    halves = [
+        ",".join(
+            cell if at == 0 or torques[at] == (number > len(rows) // 2) else ""
+            for at, cell in enumerate(row.split(","))
+        )
+        for number, row in enumerate(rows)
+    ]
+    path.write_text("\n".join([header, *halves]) + "\n")
+    with pytest.raises(InputError, match=r"column '\w+.tau_motor_1' begins at .* are fewer than 200 samples"):
+        identify(arm, path)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("elbo", "joint 'elbo' is not in vsa-3r (base, shoulder, elbow); did you mean 'elbow'?"),
+        ("wrist", "joint 'wrist' is not in vsa-3r (base, shoulder, elbow): is this the recording of another"),
+    ],
+)
+def test_unknown_joints_are_unreliable(
+    name: str, words: str, arm: Robot, record: Recorded, tmp_path: Path
+) -> None:
+    path = record.write(tmp_path / "record.csv", arm)
+    path.write_text(path.read_text().replace("elbow.", f"{name}."))
+    found = identify(arm, path, fit=["springs"])
+    assert found.verdict == "unreliable"
+    assert found.records[0].doubts[0].startswith(words)
+    assert f"ignored columns: {name}.q, {name}.theta_1" in found.notes[0]
+
+
+def test_a_recording_of_another_robot_is_unreliable(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    path = record.write(tmp_path / "record.csv", arm)
+    springs = {f"joints.*.actuator.spring.{name}": 10 * value for name, value in (("k", 400), ("k_c", 2000))}
+    found = identify(arm.replace(springs), path, fit=["springs"])
+    assert found.verdict == "unreliable"
+    assert any(
+        "from the file by more than a factor of 3: is it the recording of another robot?" in note
+        for note in found.notes
+    )
 
 
 def frozen_in_motion(theta: FloatArray) -> None:

@@ -141,16 +141,18 @@ def test_json_has_every_number(vsacli, tmp_path):
 
 
 BAD = {
-    "no number of the robot fits 'joints.*.max'": ["--parameters", "joints.*.max"],
+    "no parameter of the robot matches 'joints.*.max'": ["--parameters", "joints.*.max"],
     "t.yaml: no such file": ["--tolerances", "t.yaml"],
-    "a tolerance must be positive": ["--tolerances", "-3%"],
-    "a tolerance must be at most 1e+30": ["--tolerances", "1e300%"],
-    "none of 2 drawn robots is one, choose smaller": ["--tolerances", "900%", "--monte-carlo", "2"],
-    "'x%' is no tolerance": ["--tolerances", "x%"],
-    "a tolerance of all numbers is a share: write 5 % or 0.05": ["--tolerances", "5"],
+    "must be positive, not -3%": ["--tolerances", "-3%"],
+    "must be at most 1e+30, not 1e300%": ["--tolerances", "1e300%"],
+    "must be at most 100 %, not 300%": ["--tolerances", "300%"],
+    "none of 2 drawn robots is valid; choose smaller": ["--tolerances", "wide.yaml", "--monte-carlo", "2"],
+    "'x%' is not a tolerance": ["--tolerances", "x%"],
+    "'5' has no unit; write 5% for all parameters, or name a YAML file": ["--tolerances", "5"],
+    "coarse.yaml: is a trajectory; expected a tolerances file, which": ["--tolerances", "coarse.yaml"],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
-    "bad.yaml:2: no number of the robot fits": ["--tolerances", "bad.yaml"],
+    "bad.yaml:2: no parameter of the robot matches": ["--tolerances", "bad.yaml"],
 }
 
 
@@ -158,6 +160,7 @@ BAD = {
 def test_what_cannot_be_used_is_said(vsacli, tmp_path, sentence):
     rest_to_rest(tmp_path / "coarse.yaml")
     (tmp_path / "bad.yaml").write_text("joints.*.link.mass: 3 %\njoints.foot.link.mass: {normal: 1 %}\n")
+    (tmp_path / "wide.yaml").write_text("joints.*.link.mass: {normal: 1e9}\n")
     done = vsacli("sensitivity", ROBOT, "coarse.yaml", *BAD[sentence])
     assert (done.code, done.out) == (2, "")
     assert sentence in done.err
@@ -244,6 +247,21 @@ def test_without_a_feasible_step_there_is_no_torque_to_be_off(vsacli, tmp_path):
 
 def test_steps_that_cannot_be_done_do_not_count(vsacli, tmp_path):
     rest_to_rest(tmp_path / "soft.yaml", 790)
-    out = vsacli("sensitivity", ROBOT, "soft.yaml").out
-    assert "samples of joints are infeasible and ignored" in out.splitlines()[1]
-    assert "nan" not in out
+    done = vsacli("sensitivity", ROBOT, "soft.yaml")
+    assert done.code == 3
+    first, second = done.out.splitlines()[:2]
+    assert first.startswith("INFEASIBLE  vsa-3r, ")
+    report = json.loads(vsacli("sensitivity", ROBOT, "soft.yaml", "--json").out)
+    left_out, samples = report["left_out"], report["samples"]
+    assert 0 < left_out < samples
+    assert (
+        second == f"{left_out} of {samples} samples are infeasible and left out; check-feasibility says why"
+    )
+    assert "nan" not in done.out
+
+
+def test_implausible_values_are_reported(vsacli, tmp_path):
+    rest_to_rest(tmp_path / "coarse.yaml")
+    done = vsacli("sensitivity", ROBOT, "coarse.yaml", "--set", "joints.elbow.link.com=[0,0,150]")
+    warning = "joints.elbow.link.com.2 = 150 m is "
+    assert f"\nwarning: {warning}" in done.out

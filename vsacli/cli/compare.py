@@ -15,7 +15,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     result_line,
 )
-from vsacli.cli.console import Talk, say, talk_options
+from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind
@@ -62,7 +62,7 @@ def compare(
     figures: FigureTarget | None,
     overwrite: bool,
     talk: Talk,
-) -> None:
+) -> Exit:
     """Compare RESULT, the file of a result or a simulation, with RECORDING, a CSV file of the same motion.
 
     The column `time` of the recording may start at any time and have its own sampling rate. Columns have the
@@ -71,7 +71,8 @@ def compare(
 
     A sensor reading such as q_measured is preferred to q. Commands such as q_ref are ignored. For each
     signal, the report gives the error, gain and offset of measured over computed values, and the lag relative
-    to the other signals, each with its standard error.
+    to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
+    that the recording does not fit the result.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.results.pages.document import input_text
@@ -94,6 +95,7 @@ def compare(
             _draw(comparison, stem, figures, outputs)
     say(comparison, as_json)
     talk.wrote(outputs)
+    return Exit.VERDICT if comparison.warnings else Exit.OK
 
 
 def _draw(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outputs) -> None:

@@ -23,7 +23,7 @@ from vsacli.cli.command_parts import (
     set_option,
     trajectory_argument,
 )
-from vsacli.cli.console import Talk, say, talk_options
+from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
 from vsacli.cli.input_errors import naming_option
@@ -99,11 +99,12 @@ def sensitivity(
     as_json: bool,
     overwrite: bool,
     talk: Talk,
-) -> None:
+) -> Exit:
     """Rank the parameters of ROBOT by their effect on motor torques, margins and energy of TRAJECTORY.
 
     The table begins with the parameter of which a change of 1 % (1 mm, 1 degree) changes a motor torque most.
-    With --tolerances the report also gives the resulting uncertainty of torques and margins.
+    With --tolerances the report also gives the resulting uncertainty of torques and margins. Exit code 3 if
+    samples are infeasible or singular, which are left out.
     """
     if runs is not None and tolerances is None:
         raise click.UsageError("--monte-carlo draws from tolerances: give --tolerances, e.g. 2%")
@@ -117,6 +118,7 @@ def sensitivity(
             _draw(found, inputs.robot, tolerances, figures, run_stem(robot, trajectory), outputs)
     say(found, as_json)
     talk.wrote(outputs)
+    return Exit.VERDICT if found.left_out else Exit.OK
 
 
 def _analyzed(

@@ -79,7 +79,7 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     for pattern in patterns:
         if not any(_fits(each, pattern) for each in found):
             hint = did_you_mean(pattern, [str(each) for each in found])
-            raise InputError.one(f"no number of the robot fits {pattern!r}{hint}")
+            raise InputError.one(f"no parameter of the robot matches {pattern!r}{hint}")
     return tuple(chosen)
 
 

@@ -7,6 +7,7 @@ recordings and explanations of the residuals decide the verdict.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,13 @@ from vsacli.studies.identification.identification_report import (
     torques,
 )
 from vsacli.studies.identification.identification_text import significant
-from vsacli.studies.identification.identified_values import Number, RecordReport, Residual, SystemReport
+from vsacli.studies.identification.identified_values import (
+    Number,
+    RecordReport,
+    Residual,
+    SystemReport,
+    far_from_file,
+)
 from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_equations import (
     FRICTION,
@@ -61,7 +68,7 @@ WORDS = (*GROUPS, LINKS)
 FORCES = wrench_columns("wrench")
 """Columns of the wrench on the end effector."""
 
-PUSHED = "nothing is identified of links while something acts on the end effector"
+PUSHED = "links are not identified, since a wrench acts on the end effector"
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
 """Ratios of residual to noise and of residual to torque; beyond both, the equations do not hold: the residual
@@ -99,9 +106,9 @@ def identify(
     fit = [word for word in fit if word != LINKS or not pushed]
     sought = with_friction(robot, joints) if FRICTION in fit else robot
     first = solutions(sought, joints, fit, signals)
-    notes = [*_notes(robot, joints, fit, signals), *(f"{path}: {PUSHED}" for path in pushed)]
+    notes = [*_notes(robot, joints, fit, signals, records), *(f"{path}: {PUSHED}" for path in pushed)]
     if not first:
-        nothing = "the joints that were recorded have nothing of what is to be found"
+        nothing = "the recorded joints have none of the parameters to identify"
         raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
     delays = [delay(first, each) for each in signals]
     signals, moved = _without_delays(signals, delays)
@@ -114,12 +121,14 @@ def identify(
     if not any(doubts):
         of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
         explained = _explanations(robot, found, reports, signals, of_gains)
+    far = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
         robot=robot.name,
-        verdict=_verdict(reports, used, links, explained, of_gains),
+        verdict=UNRELIABLE if far else _verdict(reports, used, links, explained, of_gains),
         records=used,
         systems=reports,
         notes=(
+            *far,
             *notes,
             *(() if links is None else doubts_of(links)),
             *(sentence for each in explained for sentence in each.sentences),
@@ -148,7 +157,7 @@ def _read(
     """
     paths = [recordings] if isinstance(recordings, str | Path) else list(recordings)
     if not paths:
-        raise InputError.one("identification needs a record at least")
+        raise InputError.one("identification needs at least 1 recording")
     mapping = load_columns(columns)
     records = [read_record(robot, path, mapping) for path in paths]
     check_distinct(records)
@@ -165,7 +174,8 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
     low, high = bounds(record.time)
     if not low <= chosen <= high:
         raise InputError.one(
-            f"its bandwidth must lie between {low:.3g} and {high:.4g} Hz, not {chosen:g}", record.path
+            f"the bandwidth must be between {low:.3g} and {high:.4g} Hz for {record.path} "
+            f"({1 / (record.time[1] - record.time[0]):.4g} Hz), not {chosen:g}"
         )
     return conditioned(record.time, record.q, record.theta, record.tau_motor, chosen)
 
@@ -225,19 +235,40 @@ def _used(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]
 
 
 def _notes(
-    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
+    robot: Robot,
+    joints: Sequence[int],
+    fit: Sequence[str],
+    signals: Sequence[Signals],
+    records: Sequence[Record],
 ) -> Iterator[str]:
     left = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
     damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
     if left := [name for name in left if name not in damped]:
-        yield f"nothing was recorded of {', '.join(left)}"
+        whose = "its" if len(left) == 1 else "their"
+        missing = f"no columns of {', '.join(left)}: {whose} parameters are not identified"
+        yield f"{missing}{_ignored(records)}"
     if damped:
         names = ", ".join(damped)
-        yield f"nothing is identified of {names}: the torque of the damper parallel to the springs is unknown"
+        yield (
+            f"the parameters of {names} are not identified: the torque of the damper parallel to the springs "
+            "is unknown"
+        )
     if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
         yield reason
     elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):
         yield "links are identified with the springs of the file, which are assumed to be exact"
+
+
+MOST_IGNORED = 5
+"""Largest number of ignored columns that a note names."""
+
+
+def _ignored(records: Sequence[Record]) -> str:
+    """Return a clause with the columns that were not used, which may be misnamed ones; "" without any."""
+    unused = list(dict.fromkeys(column for record in records for column in record.unused))
+    if not unused:
+        return ""
+    return f"; ignored columns: {', '.join(unused[:MOST_IGNORED])}{', ...' if unused[MOST_IGNORED:] else ''}"
 
 
 def _explanations(
@@ -301,7 +332,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     for number in to_write(robot, found.systems):
         _, joint, *rest = number.path.split(".")
         path = ".".join((JOINTS, str(robot.joint_names.index(joint)), *rest))  # as the text has it
-        value = float(significant(number.value, number.standard_error))
+        value = float(significant(number.value, number.standard_error, math.inf))
         errors[path] = f"{number.standard_error:.2g}"
         if number.value == number.before:
             continue

@@ -35,7 +35,8 @@ from vsacli.studies.identification.identification_text import (
 )
 from vsacli.studies.identification.identified_values import Number, RecordReport, Residual, SystemReport
 from vsacli.studies.identification.motor_equations import motor_names
-from vsacli.studies.identification.recordings import TORQUE, Record
+from vsacli.studies.identification.recorded_columns import TORQUE
+from vsacli.studies.identification.recordings import Record
 
 OK, UNIDENTIFIABLE, POOR_FIT, UNRELIABLE = "ok", "unidentifiable", "poor_fit", "unreliable"
 """Verdicts, the worst last: all parameters are identified; some are not; residuals exceed the noise; a

@@ -25,8 +25,9 @@ LARGEST_SHOWN = 1e3
 TENS = 10
 """Deviation in standard errors below which it is printed with a decimal."""
 
-MOST_DIGITS = 7
-"""Largest number of digits of a value, for errors near rounding, as of recordings without noise."""
+MOST_DIGITS = 6
+"""Largest number of digits of a value in the report, for errors near rounding, as of recordings without
+noise."""
 
 INDISTINCT, NO_EFFECT, NOT_PHYSICAL, AT_BOUND = (
     "not distinguished",
@@ -41,11 +42,22 @@ ACTUATOR = "actuator."
 """Part of a path that is omitted after the name of the joint: nothing else has springs and motors."""
 
 
-def significant(value: float, error: float) -> str:
-    """Return a value rounded to two digits of its standard error."""
+def significant(value: float, error: float, digits: float = MOST_DIGITS) -> str:
+    """Return a value rounded to two digits of its standard error, with at most so many digits in all."""
     if not (math.isfinite(error) and error > 0):
         return f"{value:.6g}"
-    return _with_decimals(value, 1 - math.floor(math.log10(error)))
+    most = math.inf if math.isinf(digits) else _most_decimals(int(digits), value, error)
+    return _with_decimals(value, int(min(_decimals(error), most)))
+
+
+def _decimals(error: float) -> int:
+    """Return the decimals of a value that its standard error supports."""
+    return 1 - math.floor(math.log10(error))
+
+
+def _most_decimals(digits: int, *values: float) -> int:
+    """Return the decimals with which the largest of some values has so many digits."""
+    return digits - 1 - math.floor(math.log10(max(map(abs, values))))
 
 
 def _with_decimals(value: float, decimals: int, sign: str = "") -> str:
@@ -117,9 +129,8 @@ def _values(number: Number) -> tuple[str, str, str]:
     before, value, error = number.before, number.value, number.standard_error
     if not number.identifiable or error <= 0:
         return f"{before:.4g}", "-" if value == before else f"{value:.4g}", "-"
-    exact = 1 - math.floor(math.log10(error))
-    most = MOST_DIGITS - 1 - math.floor(math.log10(max(abs(before), abs(value), error)))
-    decimals = min(exact, most)
+    exact = _decimals(error)
+    decimals = min(exact, _most_decimals(MOST_DIGITS, before, value, error))
     shown = _with_decimals(before, decimals)
     return (
         shown if float(shown) else f"{before:.2g}",

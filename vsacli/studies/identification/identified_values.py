@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
+from vsacli.base.texts import counted
 
 CHANGED = 3.0
 """Difference from the file, in standard errors, that is a change. Of a hundred unchanged parameters, five
@@ -58,6 +60,24 @@ class Number(Published):
     def changed(self) -> bool:
         """Whether the value differs from the file by more than `CHANGED` standard errors."""
         return self.identifiable and abs(self.value - self.before) > CHANGED * self.standard_error
+
+
+FAR = 3.0
+"""Factor between an identified value and the file beyond which it is far. Parameters from data sheets and CAD
+are better; those of another robot are not."""
+
+
+def far_from_file(numbers: Iterable[Number]) -> list[str]:
+    """Return a sentence if most identified parameters are far from the file, otherwise nothing."""
+    known = [each for each in numbers if each.identifiable and each.before and not each.sum]
+    far = [each for each in known if each.changed and not 1 / FAR < each.value / each.before < FAR]
+    if 2 * len(far) <= len(known):
+        return []
+    differ = "differs" if len(far) == 1 else "differ"
+    return [
+        f"{len(far)} of {counted(len(known), 'parameter')} {differ} from the file by more than a factor of "
+        f"{FAR:g}: is it the recording of another robot? If not, repeat with the robot file that -o writes"
+    ]
 
 
 @dataclass(frozen=True)

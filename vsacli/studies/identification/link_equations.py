@@ -187,11 +187,12 @@ def without_links(robot: Robot, joints: Sequence[int], fit: Sequence[str], recor
     positions = np.concatenate([each.q for each in records])
     unknown = [name for name, q in zip(robot.joint_names, positions.T, strict=True) if np.isnan(q).any()]
     if unknown:
-        return f"links move each other, and the positions of {', '.join(unknown)} were not recorded"
+        return f"links are not identified, since the positions of {', '.join(unknown)} were not recorded"
     if any(joint.damper for joint in robot.joints):
-        return "nothing is found of links while there are dampers, whose damping was not recorded"
+        return "links are not identified, since the damping of the dampers was not recorded"
     rows = len(joints) * sum(len(each.time) // each.filter.stride for each in records)
     count = len(link_system(robot, fit).names)
     if rows <= count:
-        return f"{rows} equations are too few for the {count} numbers of the links; record for longer"
+        few = f"{rows} equations are too few for {count} parameters"
+        return f"links are not identified: {few}; record for longer"
     return ""

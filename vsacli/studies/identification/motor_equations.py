@@ -15,8 +15,8 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
-from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.errors import InputError, Problem
 from vsacli.compute.duals import Dual, tangent_of, value_of
 from vsacli.dynamics.drive import motor_torques
 from vsacli.robot.model import Robot
@@ -108,13 +108,14 @@ def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
     problems = []
     for word in fit:
         if word not in words and not any(fnmatchcase(path, word) for path in paths):
-            listed = f"{', '.join(words[:-1])} or {words[-1]}"
-            hint = did_you_mean(word, [*words, *paths])
-            problems.append(
-                f"--fit {word}: expected {listed}, or the path of a number of motors or springs{hint}"
-            )
+            near = nearest(word, [*words, *paths])
+            known = word in {str(each) for each in parameters(robot)}
+            what = "cannot be identified" if known else "is unknown"
+            hint = f"; did you mean {near!r}?" if near else ""
+            expected = f"{', '.join(words)}, or the path of a parameter of motors or springs"
+            problems.append(Problem("", 0, f"{word!r} {what}; expected {expected}{hint}"))
     if problems:
-        raise InputError.one("; ".join(problems))
+        raise InputError(problems)
 
 
 def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:

@@ -1,256 +1,30 @@
-"""Recordings for identification: columns of CSV files, their faults, and all of them on one uniform grid.
-
-`recorded_columns` reads columns, each with its own time stamps. They are checked one by one for faults that
-prevent a fit and for faults that make it unreliable; then `read_record` resamples them. Faults that only the
-robot's equations reveal are found in `recording_checks`.
-"""
+"""Recordings for identification: all required columns of CSV files on one uniform grid."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.simulation_variables import measured
-from vsacli.base.units import time_text
-from vsacli.base.variables import MOTORS, VARIABLES, Variable
+from vsacli.base.variables import MOTORS
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
-from vsacli.documents.csv_file import split_heading
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, known_columns, preferred, read_recording
-from vsacli.trajectory.recorded.even_stamps import elapsed_times
-from vsacli.trajectory.recorded.faults import wraps
-from vsacli.trajectory.recorded.health import column_faults
-from vsacli.trajectory.recorded.quantization import Quantization
-from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
-from vsacli.trajectory.recorded.thresholds import (
-    GAP_STEPS,
-    LARGEST_ANGLE,
-    LARGEST_TRAVEL,
-    LONGEST_STEP,
-    SHORTEST_STEP,
+from vsacli.studies.identification.recorded_columns import (
+    MOTOR,
+    POSITION,
+    TORQUE,
+    Column,
+    Where,
+    recorded_columns,
 )
-
-POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
-
-READINGS = (POSITION, MOTOR, TORQUE)
-"""Required columns of a joint.
-
-Simulated sensor readings, `q_measured` and so on, take precedence.
-"""
-
-Where: TypeAlias = tuple[str, int, int | None]
-"""Variable, joint index, and number of the motor or None."""
-
-
-class Column(NamedTuple):
-    """A recorded column.
-
-    Attributes:
-        name: name in the file.
-        place: variable, joint and motor.
-        time: times of the samples, (samples,) in s since the first row of the file.
-        values: values, (samples,), SI units on the joint side of the gear.
-        has_unit: whether the file gives a unit after the name.
-    """
-
-    name: str
-    place: Where
-    time: FloatArray
-    values: FloatArray
-    has_unit: bool
-
-
-class _RobotColumns(NamedTuple):
-    """The possible columns of a robot, as a `Jointed`."""
-
-    robot: Robot
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        return self.robot.joint_names
-
-    @property
-    def joint_types(self) -> tuple[str, ...]:
-        return self.robot.joint_types
-
-    @property
-    def gear_ratio(self) -> FloatArray:
-        """Gear ratios of the motors, (joints, 2); NaN where the file gives none."""
-        sides = [side for actuator in self.robot.actuators for side in actuator.sides]
-        ratios = [side.gear_ratio if side and side.gear_ratio else math.nan for side in sides]
-        return np.array(ratios).reshape(-1, SIDES)
-
-    def existing(self, variable: Variable) -> BoolArray:
-        """Return the existing columns of a variable of joints."""
-        return np.array([joint.has(variable) for joint in self.robot.joints])
-
-
-def recorded_columns(
-    robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
-) -> tuple[list[Column], tuple[str, ...], Source]:
-    """Return the required columns, the names of the others, and the file as read.
-
-    Args:
-        robot: recorded robot.
-        path: path of the CSV file.
-        mapping: mapping of other column names.
-
-    Raises:
-        InputError: no column is required, a unit does not fit its variable, or times do not ascend.
-    """
-    wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
-    wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
-    recording = read_recording(path, known_columns(_RobotColumns(robot), wanted), "the robot", mapping)
-    united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
-    stamps, columns = elapsed_times(recording.time), []
-    for place, signal in _preferred(recording.signals).items():
-        there = np.isfinite(signal.values)
-        values = signal.values[there] * _torque_of_current(robot, signal)
-        columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
-    used = {column.name for column in columns}
-    others = [signal.column for signal in recording.signals if signal.column not in used]
-    return columns, (*others, *recording.others), recording.table.source
-
-
-def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
-    """Return the preferred column for each place: sensor readings first, torques before currents."""
-    best = preferred(signals)
-    currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
-    return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
-
-
-def _torque_of_current(robot: Robot, signal: Measured) -> float:
-    """Return the factor that converts a column to torques if it holds currents, otherwise 1."""
-    variable, joint, motor, *_ = signal.place
-    if variable != CURRENT or motor is None:
-        return 1.0
-    return robot.joints[joint].actuator.motors[motor - 1].torque_constant or 1.0
-
-
-FEWEST_SAMPLES = 200
-"""Smallest number of samples in a column for a fit: four seconds at 50 Hz."""
-
-NOISY = 1e-7
-"""Noise of a torque, relative to its range, above which equal readings are not a robot at rest."""
-
-CUT_SAMPLES = 10
-"""Number of readings at the extreme value above which they are not an accident."""
-
-CUT_SHARE = 5.0
-"""Ratio of readings at the extreme value to those at the next one for a cut-off; the crest of a quantized
-sine without noise has 2.4."""
-
-
-def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
-    """Yield sentences on faults that make columns unusable."""
-    yield from _together((column.name, clause) for column in columns for clause in _stamp_clauses(column))
-    yield from _together(
-        (column.name, clause)
-        for column in columns
-        if column.place[0] != TORQUE
-        for clause in _position_clauses(column, robot)
-    )
-    for index, joint in enumerate(robot.joints):
-        yield from _still([column for column in columns if column.place[1] == index], joint.name)
-
-
-def doubts(columns: Sequence[Column]) -> Iterator[str]:
-    """Yield sentences on reasons for an unreliable fit."""
-    yield from _together((column.name, clause) for column in columns for clause in _fault_clauses(column))
-
-
-def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Yield a sentence for each clause that columns share."""
-    shared: dict[str, list[str]] = {}
-    for name, clause in clauses:
-        shared.setdefault(clause, []).append(name)
-    for clause, (first, *others) in shared.items():
-        beside = f", as {len(others)} more," if others else ""
-        yield f"column {first!r}{beside} {clause}"
-
-
-def _stamp_clauses(column: Column) -> Iterator[str]:
-    if len(column.time) < FEWEST_SAMPLES:
-        yield f"has {len(column.time)} numbers; a fit needs {FEWEST_SAMPLES} at least"
-        return
-    steps = np.diff(column.time)
-    usual, longest = float(np.median(steps)), int(np.argmax(steps))
-    if not SHORTEST_STEP <= usual <= LONGEST_STEP:
-        yield from (f"has a time that {fault.message}" for fault in stamp_faults(column.time))
-    elif steps[longest] > GAP_STEPS * usual:
-        when = time_text(float(column.time[longest]))
-        yield (
-            f"has a gap of {step_text(float(steps[longest]))} from t = {when} on, where rows are "
-            f"{step_text(usual)} apart: cut the file there and give both parts as records"
-        )
-
-
-def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
-    _, index, motor = column.place
-    turns = robot.joints[index].is_revolute
-    follows = motor is None or robot.joints[index].actuator.has(VARIABLES["phi"])[motor - 1]
-    largest = float(np.max(np.abs(column.values), initial=0.0))
-    jumps = wraps(column.values) if turns else None
-    if jumps is not None:
-        when = time_text(float(column.time[jumps.at]))
-        yield f"jumps by 2 pi at t = {when}, a wrapped angle: unwrap it"
-    elif follows and not column.has_unit and largest > (LARGEST_ANGLE if turns else LARGEST_TRAVEL):
-        wrong, right = ("deg", "rad") if turns else ("mm", "m")
-        yield (
-            f"goes to {largest:.4g} {right}; is it in {wrong}? Write [{wrong}] after its name in the header, "
-            f"or [{right}] if it is right"
-        )
-
-
-def _still(columns: Sequence[Column], joint: str) -> Iterator[str]:
-    """Yield sentences on a joint that does not move, or on constant columns while others change."""
-    still = [column for column in columns if len(column.values) and np.ptp(column.values) == 0]
-    moving = [column for column in columns if column not in still]
-    if still and not moving:
-        yield f"joint {joint} does not move, and tells nothing: leave its columns out"
-        return
-    for column in still:
-        yield (
-            f"column {column.name!r} is {column.values[0]:.6g} throughout, while {moving[0].name!r} changes: "
-            "a sensor that is not connected, or a column that was not filled in"
-        )
-
-
-def _fault_clauses(column: Column) -> Iterator[str]:
-    is_torque = column.place[0] == TORQUE
-    inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps at both ends of a motion
-    time, values = column.time[inner], column.values[inner]
-    yield from (clause for _, clause in column_faults(time, time, values))
-    if is_torque:
-        yield from _cut(column)
-
-
-def _cut(column: Column) -> Iterator[str]:
-    """Yield sentences on noisy readings that saturate at the largest or smallest value."""
-    quantization = Quantization.of(column.time, column.values)
-    if not np.median(quantization.noise) > NOISY * np.ptp(column.values):
-        return
-    for end in (np.max, np.min):
-        last = end(column.values)
-        at = column.values == last
-        rest = column.values[~at]
-        beside = int(np.count_nonzero(rest == end(rest)))
-        if at.sum() >= max(CUT_SAMPLES, CUT_SHARE * beside):
-            when = time_text(float(column.time[np.argmax(at)]))
-            yield (
-                f"is cut off at {last:.4g}, {at.sum()} times, first at t = {when}: the drive or the sensor "
-                "goes no further; leave that part out, or move with less torque"
-            )
-
+from vsacli.studies.identification.recording_faults import doubts, stopping_faults
 
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""
@@ -272,7 +46,7 @@ class Record(NamedTuple):
         tau_motor: motor torques, (samples, joints, 2).
         columns: names in the file, by variable, joint and motor.
         unused: names of columns that were not required.
-        doubts: likely faults, as sentences.
+        doubts: likely faults, as sentences, the most serious first.
     """
 
     path: str
@@ -298,7 +72,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
             prevent a fit.
     """
-    columns, unused, source = recorded_columns(robot, path, mapping)
+    columns, unused, stranger, source = recorded_columns(robot, path, mapping)
     faults = list(stopping_faults(columns, robot))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)
@@ -322,8 +96,13 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         tau_motor=arrays[TORQUE],
         columns={column.place: column.name for column in columns},
         unused=unused,
-        doubts=tuple(doubts(columns)),
+        doubts=(*([stranger] if stranger else []), *doubts(columns)),
     )
+
+
+SAME = 1e-7
+"""Difference of the values of two recordings, relative to their range, below which they are the same one:
+written with fewer digits, but below the noise of any sensor."""
 
 
 def check_distinct(records: Sequence[Record]) -> None:
@@ -332,11 +111,28 @@ def check_distinct(records: Sequence[Record]) -> None:
     Raises:
         InputError: two recordings have the same values.
     """
+    problems = []
     for before, record in combinations(records, 2):
-        pairs = (before.q, record.q), (before.theta, record.theta), (before.tau_motor, record.tau_motor)
-        if all(np.array_equal(*pair, equal_nan=True) for pair in pairs):
-            message = f"has the same numbers as {before.path}, given before; a record counts once"
-            raise InputError.one(message, record.path)
+        if before.path == record.path:
+            problems.append(Problem(record.path, 0, "is given twice; give each recording once"))
+        elif all(map(_same, _values(before), _values(record))):
+            problems.append(Problem(record.path, 0, f"equals {before.path}; give each recording once"))
+    if problems:
+        raise InputError(problems)
+
+
+def _values(record: Record) -> tuple[FloatArray, ...]:
+    return record.q, record.theta, record.tau_motor
+
+
+def _same(before: FloatArray, after: FloatArray) -> bool:
+    """Return whether arrays, with NaN for missing columns, are equal up to rounding."""
+    if before.shape != after.shape or not np.array_equal(np.isnan(before), np.isnan(after)):
+        return False
+    known = np.isfinite(before)
+    return not known.any() or bool(
+        np.max(np.abs(before[known] - after[known])) <= SAME * np.ptp(before[known])
+    )
 
 
 def _grid(columns: Sequence[Column]) -> FloatArray:
@@ -360,32 +156,58 @@ def _on_grid(column: Column, time: FloatArray) -> FloatArray:
     return np.asarray(make_interp_spline(column.time, column.values, k=INTERPOLATION)(time))
 
 
+MOST_LISTED = 3
+"""Largest number of missing columns of a kind that a message names."""
+
+KINDS = {POSITION: "joint positions", MOTOR: "motor positions", TORQUE: "motor torques"}
+"""Required columns in words."""
+
+
 def complete_joints(robot: Robot, record: Record) -> tuple[int, ...]:
     """Return the indices of the joints with all required columns.
 
     Raises:
         InputError: a joint with motor columns lacks others, or no joint is complete.
     """
-    found, problems = [], []
-    for index, joint in enumerate(robot.joints):
-        needed = [(POSITION, None), *((MOTOR, motor) for motor in MOTORS), *((TORQUE, m) for m in MOTORS)]
-        count = len(joint.actuator.motors)
-        own = [(name, motor) for name, motor in needed if motor is None or motor <= count]
-        if not joint.actuator.sprung:
-            own = [(name, motor) for name, motor in own if name != MOTOR]
-        lacking = [each for each in own if (each[0], index, each[1]) not in record.columns]
-        if not lacking:
+    found: list[int] = []
+    lacking: list[Where] = []
+    for index in range(len(robot.joints)):
+        needed = _needed(robot, index)
+        missing = [place for place in needed if place not in record.columns]
+        if not missing:
             found.append(index)
-        elif any(name != POSITION for name, _ in set(own) - set(lacking)):
-            motors = ("" if motor is None else f"_{motor}" for _, motor in lacking)
-            listed = ", ".join(
-                f"{joint.name}.{name}{motor}" for (name, _), motor in zip(lacking, motors, strict=True)
-            )
-            problems.append(Problem(record.path, 0, f"joint {joint.name}: there is no column {listed}"))
-    if not found and not problems:
-        first = robot.joints[0].name
-        sentence = f"has no joint with position and motor torques, as {first}.q and {first}.tau_motor_1"
-        problems.append(Problem(record.path, 0, sentence))
-    if problems:
-        raise InputError(problems)
+        elif any(name != POSITION for name, _, _ in set(needed) - set(missing)):
+            lacking += missing
+    if not (found or lacking):  # positions alone, or columns of no joint
+        needed = [place for index in range(len(robot.joints)) for place in _needed(robot, index)]
+        lacking = [place for place in needed if place not in record.columns]
+    if lacking:
+        raise InputError.one(_lacking(robot, lacking), record.path)
     return tuple(found)
+
+
+def _needed(robot: Robot, index: int) -> list[Where]:
+    """Return the columns that identification requires for a joint."""
+    actuator = robot.joints[index].actuator
+    motors = MOTORS[: len(actuator.motors)]
+    positions = [(MOTOR, index, motor) for motor in motors] if actuator.sprung else []
+    return [(POSITION, index, None), *positions, *((TORQUE, index, motor) for motor in motors)]
+
+
+def _lacking(robot: Robot, places: Sequence[Where]) -> str:
+    """Return a sentence on missing columns, by kind."""
+    clauses = []
+    for variable, words in KINDS.items():
+        names = [
+            f"{robot.joint_names[index]}.{name}" + ("" if motor is None else f"_{motor}")
+            for name, index, motor in places
+            if name == variable
+        ]
+        if names:
+            listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")
+            clauses.append(f"{listed} ({words})")
+    one = len(places) == 1
+    missing = f"the {'column' if one else 'columns'} {' and '.join(clauses)} {'is' if one else 'are'} missing"
+    torque = any(name == TORQUE for name, *_ in places)
+    advice = "record torques or motor currents; " if torque else ""
+    return f"{missing}; {advice}if {'it has another name' if one else 'they have other names'}, use --columns"

@@ -12,12 +12,14 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import COMMANDS, measured
+from vsacli.base.texts import counted
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.csv_file import split_heading
 from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
+from vsacli.studies.measured.comparison_warnings import Overlap, comparison_warnings
 from vsacli.studies.measured.likely_causes import NOTABLE, WILD, exchanged_places, likely_causes
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
@@ -62,14 +64,13 @@ def compare(
         StorageError: a file cannot be read.
     """
     if time_offset is not None and not math.isfinite(time_offset):
-        raise InputError.one(
-            f"the time offset must be a finite number of seconds, not {time_offset:g}", recording
-        )
+        raise InputError.one(f"the time offset must be finite, not {time_offset:g} s")
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, time_offset, columns)
-    places = known_columns(result, stand_ins(_variables(result)))
-    recorded, behind = _most_direct(read_recording(recording, places, "the result", load_columns(columns)))
+    wanted = stand_ins(_variables(result))
+    read = read_recording(recording, result, wanted, result.robot_name, load_columns(columns))
+    recorded, behind = _most_direct(read)
     computed = _interpolated(result, recorded.signals)
     duration = float(result.time[-1] - result.time[0])
     pairings = [
@@ -77,12 +78,13 @@ def compare(
         for function, signal in zip(computed, recorded.signals, strict=True)
     ]
     alignment = _aligned(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
-    covered = _covered(recorded.time - alignment.time_offset, duration, recording)
+    overlap = _overlap(recorded.time, alignment.time_offset, duration, recording)
     signals = _agreements(result, recorded, pairings, alignment)
+    ratios = _gear_ratios(recorded, result)
     notes = (
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.time_offset),
-        *likely_causes(signals, _gear_ratios(recorded, result)),
+        *likely_causes(signals, ratios),
         *_left_out(result, recorded, behind),
     )
     return Comparison(
@@ -92,8 +94,9 @@ def compare(
         time_offset_error=alignment.error,
         found=time_offset is None,
         duration=duration,
-        compared=covered,
+        compared=overlap.duration,
         signals=signals,
+        warnings=tuple(comparison_warnings(result, read.stranger, signals, ratios, overlap)),
         notes=notes,
         sources=(recorded.table.source,),
     )
@@ -121,7 +124,8 @@ def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatAr
     """Return times and values of a signal, without rows in which it has none."""
     there = np.isfinite(signal.values)
     if np.count_nonzero(there) < FEWEST_SAMPLES and not there.all():
-        message = f"column {signal.column!r} has {np.count_nonzero(there)} numbers; leave it out"
+        found = counted(int(np.count_nonzero(there)), "number")
+        message = f"column {signal.column!r} has {found} of at least {FEWEST_SAMPLES}; leave it out"
         raise InputError.one(message, recorded.table.source.path)
     return recorded.time[there], signal.values[there]
 
@@ -148,9 +152,8 @@ def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path)
     alignment = positions or align(pairings, groups)
     if alignment is None:
         raise InputError.one(
-            "is like the computed signals at no shift in time; is it the recording of this motion, and does "
-            f"it move beyond its noise? {_other_unit(pairings[0])}--time-offset says when in the recording "
-            "the result begins",
+            "matches the result at no time offset; is it the recording of this motion, and does anything "
+            f"move? {_other_unit(pairings[0])}If the offset is known, give --time-offset",
             path,
         )
     return alignment
@@ -167,20 +170,25 @@ def _other_unit(pairing: Pairing) -> str:
     if 1 / OTHER_UNIT < lasts / pairing.duration < OTHER_UNIT:
         return ""
     lengths = f"It lasts {lasts:.4g} s and the result {pairing.duration:.4g} s"
-    return f"{lengths}: if times are in another unit, write it in the header, e.g. time[ms]; "
+    return f"{lengths}: if times are in another unit, write it in the header, e.g. time[ms]. "
 
 
-def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
-    """Return the duration of the part of the result that the recording covers, s."""
-    covered = min(float(time[-1]), duration) - max(float(time[0]), 0.0)
-    rows = np.count_nonzero((time >= 0) & (time <= duration))
+def _overlap(stamps: FloatArray, time_offset: float, duration: float, path: str | Path) -> Overlap:
+    """Return the part of the result that the recording covers.
+
+    Raises:
+        InputError: too few rows overlap.
+    """
+    time = stamps - time_offset
+    rows = int(np.count_nonzero((time >= 0) & (time <= duration)))
     if rows < FEWEST_SAMPLES:
+        few = f"{rows or 'no'} {'row overlaps' if rows < 2 else 'rows overlap'}"
         raise InputError.one(
-            f"lies from {time[0]:.4g} to {time[-1]:.4g} s of the result, which takes {duration:.4g} s: "
-            f"{rows} of its rows are within, {FEWEST_SAMPLES} are needed; change --time-offset",
+            f"with a time offset of {time_offset:.4g} s, {few} the result ({duration:.4g} s): the recording "
+            f"spans {time[0]:.4g} to {time[-1]:.4g} s of it; at least {FEWEST_SAMPLES} rows must overlap",
             path,
         )
-    return covered
+    return Overlap(min(float(time[-1]), duration) - max(float(time[0]), 0.0), rows, duration)
 
 
 def _agreements(
@@ -242,8 +250,9 @@ def _agreement(
 
 def _alignment_notes(alignment: Alignment) -> Iterator[str]:
     if alignment.others:
-        listed = ", ".join(f"{other:.3f} s" for other in alignment.others[:3])
-        yield f"beginning at {listed} it would agree as well, as periodic motions do; --time-offset chooses"
+        listed = " and ".join(f"{other:.4g} s" for other in alignment.others[:3])
+        fit = "fits" if len(alignment.others) == 1 else "fit"
+        yield f"a time offset of {listed} {fit} as well, as in periodic motions; choose with --time-offset"
 
 
 def _common_lag(signals: Sequence[Agreement], time_offset: float) -> Iterator[str]:

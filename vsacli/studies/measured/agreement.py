@@ -102,6 +102,7 @@ class Comparison(Published):
         compared: duration of the part that the recording covers, s.
         signals: agreement of each compared column.
         notes: likely mistakes, and columns that were not compared.
+        warnings: reasons why the figures may mean nothing, as sentences.
         sources: recording as read; not in JSON.
     """
 
@@ -114,6 +115,7 @@ class Comparison(Published):
     compared: float
     signals: tuple[Agreement, ...]
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     sources: tuple[Source, ...] = field(repr=False, default=())
 
     format: ClassVar[str] = "vsacli-comparison/2"
@@ -121,7 +123,7 @@ class Comparison(Published):
         "format": "format",
         **{name: name for name in ("result", "recording", "time_offset", "time_offset_error")},
         **{name: name for name in ("found", "duration", "compared")},
-        **{name: name for name in ("signals", "notes")},
+        **{name: name for name in ("signals", "warnings", "notes")},
     }
 
     def __str__(self) -> str:
@@ -136,7 +138,8 @@ class Comparison(Published):
         """Return the report in parts."""
         how = "found from the signals" if self.found else "as given"
         covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared; time offset {how}"
-        return ReportText(self.title, self.notes, [self._rows()], [covered])
+        found = [*(f"warning: {warning}" for warning in self.warnings), *self.notes]
+        return ReportText(self.title, found, [self._rows()], [covered])
 
     def _worst(self) -> str:
         known = [each for each in self.signals if math.isfinite(each.share)]

@@ -150,6 +150,26 @@ def _gains_of_causes(gear_ratio: float) -> Mapping[str, float]:
     return slips
 
 
+def _looks(size: float, gear_ratio: float) -> str | None:
+    """Return the clause of the likely cause of a gain of this size; None if it is like none."""
+    gains = _gains_of_causes(gear_ratio).items()
+    return next((cause for cause, gain in gains if abs(size / gain - 1) < NEAR), None)
+
+
+def mistaken(agreement: Agreement, gear_ratio: float) -> bool:
+    """Return whether a likely mistake explains an error: column, sign, unit, offset, or side of the gear.
+
+    Args:
+        agreement: agreement of a column.
+        gear_ratio: gear ratio of its motor; NaN without a motor, or if unknown.
+    """
+    if agreement.follows is not None:
+        return True
+    size = abs(agreement.gain)
+    likely = abs(size - 1) < NEAR or _looks(size, gear_ratio) is not None
+    return abs(agreement.correlation) >= ALIKE and likely
+
+
 def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
     """Yield sentences on the likely cause of a signal's disagreement."""
     if not agreement.samples:
@@ -167,10 +187,7 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
     if not abs(agreement.correlation) >= ALIKE:
         return
     gain, size = agreement.gain, abs(agreement.gain)
-    looks = next(
-        (cause for cause, gain in _gains_of_causes(gear_ratio).items() if abs(size / gain - 1) < NEAR),
-        None,
-    )
+    looks = _looks(size, gear_ratio)
     if gain < 0:
         yield f"{agreement.column} runs the other way (its gain is {gain:.4g})"
     if looks is not None:

@@ -10,16 +10,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.renamed import successor
-from vsacli.base.simulation_variables import measured
+from vsacli.base.simulation_variables import COMMANDS, measured
+from vsacli.base.texts import counted
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
+
+USUAL = ("q", "tau_motor")
+"""Variables that a message names as examples of columns."""
 
 
 class Jointed(Protocol):
@@ -94,35 +98,44 @@ class Recording(NamedTuple):
         signals: signals in the order of the variables, then of the joints.
         others: names of columns that are not among these variables, or are ignored by the mapping.
         table: table of the file.
+        stranger: sentence on joints that the subject of the recording does not have; otherwise empty.
     """
 
     time: FloatArray
     signals: tuple[Measured, ...]
     others: tuple[str, ...]
     table: Table
+    stranger: str
 
 
 def read_recording(
-    path: str | Path, places: Mapping[str, Place], owner: str, mapping: ColumnMapping
+    path: str | Path,
+    jointed: Jointed,
+    wanted: Iterable[tuple[str, int, Variable]],
+    robot: str,
+    mapping: ColumnMapping,
 ) -> Recording:
     """Return the columns of a CSV file that have a place, with NaN in empty cells.
 
     Args:
         path: file with a column `time`, and columns named as by `vsacli export`, or by the number of the
             joint, `q1` for the first; a unit in brackets may follow any name.
-        places: places by possible names of columns, see `known_columns`.
-        owner: owner of the variables, for messages.
+        jointed: subject of the recording.
+        wanted: names of variables in columns, see `known_columns`.
+        robot: name of the subject's robot.
         mapping: mapping of other column names.
 
     Raises:
         InputError: no column has a place, a unit does not fit its variable, or the times do not ascend.
     """
+    places = known_columns(jointed, wanted)
     table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
+    stranger = _stranger(names, table.others, places, jointed.joint_names, robot)
     problems = [
         Problem(table.source.path, table.header_line, text)
-        for text in _unusable(names, table.others, places, owner)
+        for text in _unusable(names, table.others, places, stranger)
     ]
     factors: dict[int, float] = {}
     for index, (name, unit) in enumerate(headings):
@@ -141,7 +154,7 @@ def read_recording(
     ]
     signals.sort(key=lambda signal: order[signal.column])
     others = (*table.others, *table.ignored)
-    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others, table)
+    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others, table, stranger)
 
 
 def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:
@@ -196,27 +209,87 @@ def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterat
                 yield f"{jointed.joint_names[joint]}.{name}_shaft{ending}", shaft
 
 
+COMMAND_ENDING = tuple(f".{name}" for name in COMMANDS.values())
+"""Endings of columns of commands, which are near the names of measured values, but not mistyped."""
+
+MOST_NAMED = 7
+"""Largest number of joints of a robot that a message lists."""
+
+
+def _stranger(
+    names: Sequence[str],
+    others: Sequence[str],
+    places: Mapping[str, Place],
+    joints: Sequence[str],
+    robot: str,
+) -> str:
+    """Return a sentence on joints in unknown columns that the robot does not have; empty without any."""
+    endings = {name.removeprefix(f"{joint}.") for joint in joints for name in places if "." in name}
+    found: dict[str, None] = {}
+    for name, _ in map(split_heading, others):
+        joint = next(
+            (name.removesuffix(f".{ending}") for ending in endings if name.endswith(f".{ending}")), ""
+        )
+        if joint and not name.startswith(tuple(f"{known}." for known in joints)):
+            found[joint] = None
+    if not found:
+        return ""
+    recorded = {joints[places[name].joint] for name in names if name in places}
+    missing = [joint for joint in joints if joint not in recorded]
+    near = [meant for word in found if (meant := nearest(word, missing))]
+    listed = ", ".join(joints[:MOST_NAMED]) + (", ..." if len(joints) > MOST_NAMED else "")
+    one = len(found) == 1
+    noun, verb, them = ("joint", "is", "its") if one else ("joints", "are", "their")
+    said = f"{noun} {', '.join(map(repr, found))} {verb} not in {robot} ({listed})"
+    if len(near) == len(found):
+        return f"{said}; did you mean {', '.join(map(repr, near))}?"
+    return (
+        f"{said}: is this the recording of another robot? If not, map or ignore {them} columns with --columns"
+    )
+
+
 def _unusable(
-    names: Sequence[str], strangers: Sequence[str], places: Mapping[str, Place], owner: str
+    names: Sequence[str], strangers: Sequence[str], places: Mapping[str, Place], stranger: str
 ) -> Iterator[str]:
-    if TIME not in names:
-        yield f"there is no column {TIME!r}{did_you_mean(TIME, strangers)}; --columns says which it is"
+    """Yield problems of the header of a recording.
+
+    Args:
+        names: names of its known columns.
+        strangers: names of the others.
+        places: places by possible names of columns.
+        stranger: sentence on unknown joints; otherwise empty.
+    """
     found = [name for name in names if name in places]
     renamed = {name: new for name in strangers if (new := successor(split_heading(name)[0], places))}
+    if TIME not in names and (found or renamed or stranger):
+        near = nearest(TIME, strangers)
+        hint = f"did you mean {near!r}? Name" if near else "add it, or name"
+        yield f"there is no column {TIME!r}; {hint} it with --columns"
     for name, new in renamed.items():
-        yield f"column {name!r} is now called {new!r}; rename it, or say in --columns what it stands for"
+        yield f"column {name!r} is now called {new!r}; rename it, or map it with --columns"
     if not found and not renamed:
-        hint = next((hint for name in strangers if (hint := did_you_mean(name, places))), "")
-        examples = ", ".join(list(places)[:3])
-        say = "; `vsacli info` shows what the file has, and --columns says what it stands for"
-        yield f"no column is a variable of {owner}, such as {examples}{hint or say}"
+        yield stranger or _no_column(strangers, places)
     for name in sorted({name for name in names if names.count(name) > 1 and name in places}):
-        yield f"column {name!r} appears {names.count(name)} times"
+        yield f"column {name!r} appears {names.count(name)} times; keep one"
     twice = {place: name for name in found if (place := places[name]._replace(unit="", gear=1.0))}
     for name in found:
         other = twice[places[name]._replace(unit="", gear=1.0)]
         if other != name:
-            yield f"columns {name!r} and {other!r} are the same; leave one"
+            yield f"columns {name!r} and {other!r} are the same signal; keep one"
+
+
+def _no_column(strangers: Sequence[str], places: Mapping[str, Place]) -> str:
+    """Return that no column of a recording is known, with the nearest or some possible names."""
+    plain = [name for name, _ in map(split_heading, strangers) if not name.endswith(COMMAND_ENDING)]
+    near = {name: new for name in plain if (new := nearest(name, places))}
+    first: dict[str, str] = {}
+    for name, place in places.items():
+        first.setdefault(place.variable, name)
+    usual = [first[name] for name in USUAL if name in first] or list(first.values())[:2]
+    hint = "".join(f"; {name!r} may be {new!r}" for name, new in list(near.items())[:1])
+    return (
+        f"expected columns such as {', '.join([TIME, *usual])}{hint}; if they have other names, use --columns"
+    )
 
 
 def _factor(unit: str | None, expected: str) -> float:
@@ -234,9 +307,11 @@ def _elapsed(table: Table, factor: float) -> FloatArray:
     names = [split_heading(column)[0] for column in table.columns]
     stamps = table.values[:, names.index(TIME)]
     if len(stamps) < 2:
-        raise InputError.one("a recording needs two rows at least", table.source.path)
+        rows = counted(len(stamps), "row")
+        raise InputError.one(f"has {rows}; a recording needs at least 2", table.source.path)
     back = np.flatnonzero(~(np.diff(stamps) > 0))
     if back.size:
-        line = table.line_of(int(back[0]) + 1)
-        raise InputError.one("the times must ascend from row to row", table.source.path, line)
+        row = int(back[0]) + 1
+        message = f"time must increase, but {stamps[row]} follows {stamps[row - 1]}; sort the rows by time"
+        raise InputError.one(message, table.source.path, table.line_of(row))
     return np.asarray((stamps - stamps[0]) * factor)

@@ -249,9 +249,18 @@ class Trouble(NamedTuple):
         if self.variable == "stiffness":
             needed = f"{'at least' if below else 'at most'} {stiffness_text(joint, self.bound)}"
             return f"{joint.name} needs {needed} {when}, but the command is {self.value:.6g}"
-        asked = f"{self.value:.6g} {self.unit} {when}"
-        side = "below" if below else "above"
-        return f"the {self.whose} of {joint.name}, {asked}, is {side} its limit {self.bound:g}"
+        value, bound = apart(self.value, self.bound)
+        side = f"{'below' if below else 'above'} its limit of {bound} {self.unit}"
+        return f"the {self.whose} of {joint.name} is {value} {self.unit} {when}, {side}"
+
+
+def apart(value: float, bound: float) -> tuple[str, str]:
+    """Return a value and its bound with four digits, or with as many more as they need to differ."""
+    for digits in (4, 6, 9):
+        texts = f"{value:.{digits}g}", f"{bound:.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def stiffness_text(joint: Joint, value: float) -> str:
@@ -374,7 +383,9 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     """
     variable_stiffness_actuator(joint)
     if reason := acceptance.path_reason(joint, load):
-        raise ImpossibleError(f"no stiffness changes that {reason}")
+        raise ImpossibleError(
+            f"{reason}; the stiffness has no effect on that: change the motion or the limit"
+        )
     admissible = admissible_stiffness(joint, load.command, acceptance.min_margin)
     if np.isnan(admissible.low).any():
         raise ImpossibleError(acceptance.reason(joint, load))

@@ -60,7 +60,7 @@ def varied_joints(robot: Robot, vary: str) -> list[int]:
         InputError: `vary` is unknown, or the stiffness is to vary and no joint has one to choose.
     """
     if vary not in (STIFFNESS.key, TIMING, BOTH):
-        raise InputError.one(f"what varies must be 'stiffness', {TIMING!r} or {BOTH!r}, not {vary!r}")
+        raise InputError.one(f"must be stiffness, {TIMING} or {BOTH}, not {vary!r}")
     return [] if vary == TIMING else chosen_joints(robot)
 
 
@@ -71,7 +71,7 @@ def check_timing_varies(vary: str) -> None:
         InputError: only the stiffness varies.
     """
     if vary == STIFFNESS.key:
-        raise InputError.one(f"time is what {TIMING!r} varies for, or {BOTH!r}, not {vary!r}")
+        raise InputError.one(f"time needs --vary {TIMING} or {BOTH}, not {vary}")
 
 
 def chosen_joints(robot: Robot) -> list[int]:
@@ -182,7 +182,7 @@ class CheapestStiffness:
 
         found, kept = self._acceptance.confirmed(attempt)
         if not kept:
-            raise ImpossibleError("what keeps every limit at the steps exceeds one between them")
+            raise ImpossibleError("a profile within all limits at the samples exceeds one between them")
         return found
 
     def best(self, acceptance: Acceptance) -> Found:

@@ -185,8 +185,8 @@ class CopperLoss(Criterion):
         """Check that the motors have a resistance."""
         if not all(joint.has(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
             raise InputError.one(
-                f"the motors of {joint.name} have no resistance, without which their heat is not known; give "
-                "torque_constant and resistance, or --minimize torque"
+                f"the motors of {joint.name} have no resistance, which copper loss requires; add "
+                "torque_constant and resistance to the robot file, or use --minimize torque"
             )
 
     def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -10,6 +11,20 @@ from vsacli.base.json_records import Published, named
 from vsacli.base.texts import joined
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
+
+DIGITS = 4
+"""Digits of a printed change."""
+
+
+def rounded(value: float, *, up: bool) -> str:
+    """Return a positive value with `DIGITS` digits, rounded up or down so that it still suffices."""
+    unit = 10.0 ** (math.floor(math.log10(value)) + 1 - DIGITS) if value > 0 else 1.0
+    whole = math.ceil(value / unit - ROUNDING) if up else math.floor(value / unit + ROUNDING)
+    return f"{whole * unit:.10g}"
+
+
+ROUNDING = 1e-6
+"""Share of the last digit that is rounding of a value that has no more digits."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +111,8 @@ class JointChange(Published):
     shape: ClassVar = named("largest", "time", "rms")
 
     def __str__(self) -> str:
-        return f"{self.joint} by up to {self.largest:+.4g} {self.unit} (at t = {self.time:.3f} s)"
+        size = f"{'-' if self.largest < 0 else '+'}{rounded(abs(self.largest), up=True)} {self.unit}"
+        return f"{self.joint} by up to {size} (at t = {self.time:.3f} s)"
 
 
 @dataclass(frozen=True)
@@ -245,13 +261,13 @@ class Fixes(Published):
         """Yield the causes, a heading, and a numbered sentence for each fix."""
         margin = f"a margin of at least {100 * self.min_margin:.6g} %"
         if self.slow_down is None:
-            yield f"nothing to change: every step has {margin} and keeps every limit"
+            yield f"nothing to change: every sample has {margin} and is within all limits"
             return
         yield from map(str, self.causes)
         left = [cause.joint for cause in self.causes if not cause.fixable]
-        rest = f"every step of all joints but {joined(left)}" if left and self.fixes else "every step"
+        but = f" of all joints but {joined(left)}" if left and self.fixes else ""
         if self.fixes:
-            yield f"fixes, with any one of which {rest} has {margin} and keeps every limit:"
+            yield f"fixes; with any of them every sample{but} has {margin} and is within all limits:"
         else:
-            yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
+            yield f"no fix that was tried gives every sample {margin} within all limits"
         yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))

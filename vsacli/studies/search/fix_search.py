@@ -22,9 +22,9 @@ from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmi
 from vsacli.dynamics.inverse import fitted
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, RecordedLimits, Trouble
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, RecordedLimits, Trouble, apart
 from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible
+from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible, rounded
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
@@ -100,7 +100,7 @@ class _Tried(NamedTuple):
         if not isinstance(found, list):
             return found
         if any(found[0] is each for each in self.failed):
-            return NotPossible(("what keeps every limit at the steps exceeds one between them",))
+            return NotPossible(("a change within all limits at the samples exceeds one between them",))
         return getattr(found[0], name)
 
     @staticmethod
@@ -246,7 +246,8 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
     for index in refused:
         joint = acceptance.robot.joints[index]
         if index in beyond:
-            text = f"{_what(beyond[index])}: no timing and no stiffness changes that, another path does"
+            advice = "timing and stiffness have no effect on that: change the path or the limit"
+            text = f"{_what(beyond[index])}; {advice}"
             yield index, Cause(joint.name, text, fixable=False)
         else:
             text, hopeful = _text(acceptance, joint, moving[index], resting[index])
@@ -272,7 +273,7 @@ def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> 
     at_rest = acceptance.trouble(joint, resting)
     if at_rest is None:
         worst = acceptance.trouble(joint, moving)
-        return ("falls short between the steps" if worst is None else _what(worst)), True
+        return ("falls short between the samples" if worst is None else _what(worst)), True
     if "stiffness" not in joint.actuator.commanded:
         why = "no slower motion helps, and it has no stiffness to choose"
         return f"{_what(at_rest, resting=True)}: {why}", False
@@ -308,15 +309,15 @@ def _what(trouble: Trouble, *, resting: bool = False) -> str:
     if math.isnan(trouble.bound):
         return f"its springs cannot carry the elastic torque {when}"
     side = "below" if trouble.value < trouble.bound else "above"
-    shown = f"{trouble.bound:.4g}"
+    value, shown = apart(trouble.value, trouble.bound)
     bound = f"the {shown} its load allows" if trouble.of_load else f"its limit of {shown}"
-    return f"{trouble.whose} is {trouble.value:.4g} {trouble.unit} {when}, {side} {bound}"
+    return f"{trouble.whose} is {value} {trouble.unit} {when}, {side} {bound}"
 
 
 def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
     if asked.min() == asked.max():
         relation = "at least" if offset > 0 else "at most"
-        return f"a stiffness of {relation} {asked[0] + offset:.6g} {unit} does"
-    relation = "higher" if offset > 0 else "lower"
-    return f"a stiffness {relation} by {abs(offset):.6g} {unit} does"
+        return f"a stiffness of {relation} {rounded(asked[0] + offset, up=offset > 0)} {unit} does"
+    relation = "an increase" if offset > 0 else "a decrease"
+    return f"{relation} of {rounded(abs(offset), up=True)} {unit} does"

@@ -92,7 +92,8 @@ def optimize(
     check_min_margin(min_margin)
     refuse_damped_transmissions(robot, trajectory, "optimizations")
     varied = varied_joints(robot, vary)
-    what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin)
+    warnings = (*robot.warnings, *trajectory.warnings)
+    what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
     if minimize == TIME:
         check_timing_varies(vary)
         return fastest(what, trajectory, varied, seed, progress)
@@ -276,7 +277,7 @@ def _confirmed(
 
     found, kept = Acceptance(what.robot, what.min_margin).confirmed(attempt)
     if not kept:
-        raise ImpossibleError("what keeps every limit at some instants exceeds one between them")
+        raise ImpossibleError("a motion within all limits at some instants exceeds one between them")
     return found
 
 

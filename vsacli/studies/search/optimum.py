@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted
@@ -127,6 +128,7 @@ class Optimum(Published):
         reasons: reasons why nothing was found, as clauses.
         trajectory: best trajectory; None if nothing was found.
         pace: pace dt/ds along the path, a spline whose argument is s; None if the timing is unchanged.
+        warnings: sentences about implausible values of robot and commanded trajectory.
     """
 
     robot: Robot = field(repr=False)
@@ -142,6 +144,7 @@ class Optimum(Published):
     reasons: tuple[str, ...] = ()
     trajectory: Trajectory | None = field(default=None, repr=False)
     pace: BSpline[np.float64] | None = field(default=None, repr=False)
+    warnings: tuple[str, ...] = ()
 
     format: ClassVar[str] = "vsacli-optimum/2"
     shape: ClassVar = {
@@ -154,6 +157,7 @@ class Optimum(Published):
         "slow_down?": "slowed_down",
         "timing?": "timing",
         "reasons?": "reasons",
+        "warnings": "warnings",
     }
 
     @property
@@ -203,10 +207,11 @@ class Optimum(Published):
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
+        warnings = list(warnings_and_notes(self.warnings, ()))
         if self.trajectory is None:
-            return ReportText(self.title, list(self.reasons))
+            return ReportText(self.title, [*self.reasons, *warnings])
         if self.timing is not None:
-            return ReportText(self.title, tables=[self.timing.rows()], lines=list(self.timing.lines()))
+            return ReportText(self.title, warnings, [self.timing.rows()], list(self.timing.lines()))
         slowed = (
             f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: no feasible "
             "timing of the commanded duration was found"
@@ -215,7 +220,8 @@ class Optimum(Published):
         lines = [
             f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
         ]
-        return ReportText(self.title, [slowed] if self.slow_down != 1 else [], [self._rows()], lines)
+        found = [*([slowed] if self.slow_down != 1 else []), *warnings]
+        return ReportText(self.title, found, [self._rows()], lines)
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the table of costs, the total last."""

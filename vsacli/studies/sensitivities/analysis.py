@@ -50,6 +50,7 @@ class Effects:
         smallest: smallest margins.
         spent: change of the positive motor work by each parameter's change, (parameters, joints), J.
         failed: number of infeasible or singular samples, counted for each joint.
+        left_out: number of samples at which any joint is infeasible or singular.
     """
 
     def __init__(self, steps: FloatArray, times: FloatArray, joints: int) -> None:
@@ -68,14 +69,16 @@ class Effects:
         self.largest, self.time, self.spent = np.zeros((3, *shape))
         self.motor = np.ones(shape, dtype=int)
         self.smallest = Smallest(np.full(joints, np.inf), np.zeros(joints), np.zeros(shape))
-        self.failed = 0
+        self.failed = self.left_out = 0
         self._flags = np.zeros(1, dtype=FLAG_TYPE)
 
     def add(self, part: Derivatives) -> None:
         """Include the next block."""
         block = part.block
         self._flags |= np.bitwise_or.reduce(block.flags, axis=None)
-        self.failed += int(np.count_nonzero(has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)))
+        failed = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+        self.failed += int(np.count_nonzero(failed))
+        self.left_out += int(np.count_nonzero(failed.any(axis=1)))
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
         weights = self._weights[self._done : self._done + len(part.time), None, None]
         spending = weights * (block.motor_power > 0)  # negative work is not subtracted
@@ -198,6 +201,9 @@ def analyzed(
         trajectory=run.trajectory.name,
         verdict=effects.verdict,
         failed=effects.failed,
+        samples=run.trajectory.samples,
+        left_out=effects.left_out,
+        warnings=(*robot.warnings, *run.trajectory.warnings),
         parameters=tuple(sorted(found, key=lambda each: -each.share)),
         band={} if band is None else dict(zip(robot.joint_names, band.joints(), strict=True)),
         monte_carlo=drawn,

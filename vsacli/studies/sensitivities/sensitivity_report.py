@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, headline
 from vsacli.base.texts import counted
 from vsacli.base.units import in_header
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
@@ -83,12 +84,15 @@ class Sensitivity(Published):
     Attributes:
         robot, trajectory: names of robot and trajectory.
         verdict: verdict on the unchanged run: ok, over_limit, singular or infeasible.
-        failed: number of its infeasible or singular samples, counted for each joint, which are ignored.
+        failed: number of its infeasible or singular samples, counted for each joint, which are left out.
+        samples: number of its samples.
+        left_out: number of samples at which at least one joint is infeasible or singular.
         parameters: effects of the parameters, the most important first.
         band: effect of tolerances on each joint, by name; empty without tolerances.
         curves: motor torques and their standard deviations; None without tolerances; not in JSON.
         monte_carlo: results of robots drawn from the tolerances; None without draws.
         units: unit of the torques of each joint, by name.
+        warnings: sentences about implausible values of robot and trajectory.
     """
 
     robot: str
@@ -100,11 +104,14 @@ class Sensitivity(Published):
     monte_carlo: MonteCarlo | None = None
     curves: TorqueCurves | None = field(default=None, repr=False)
     units: dict[str, str] = field(default_factory=dict)
+    samples: int = 0
+    left_out: int = 0
+    warnings: tuple[str, ...] = ()
 
     format: ClassVar[str] = "vsacli-sensitivity/2"
     shape: ClassVar = {
         "format": "format",
-        **named("robot", "trajectory", "verdict", "failed", "parameters"),
+        **named("robot", "trajectory", "verdict", "failed", "samples", "left_out", "warnings", "parameters"),
         "band?": "band",
         "monte_carlo?": "monte_carlo",
     }
@@ -132,14 +139,17 @@ class Sensitivity(Published):
     def as_text(self) -> ReportText:
         """Return the report in parts; the first table is that of tolerances, if there are any."""
         tables = [self._band_rows(), self._rows() if self.top else []]
-        return ReportText(self.title, list(self._findings()), tables, list(self._lines()))
+        first = headline(self.verdict, self.title) if self.left_out else self.title
+        return ReportText(first, list(self._findings()), tables, list(self._lines()))
 
     def _findings(self) -> Iterator[str]:
-        if self.failed:
+        if self.left_out:
+            verb = "is" if self.left_out == 1 else "are"
             yield (
-                f"{counted(self.failed, 'sample')} of joints {'is' if self.failed == 1 else 'are'} "
-                f"{self.verdict} and ignored; check-feasibility says why"
+                f"{self.left_out} of {counted(self.samples, 'sample')} {verb} {self.verdict} and left out; "
+                "check-feasibility says why"
             )
+        yield from warnings_and_notes(self.warnings, ())
         reversing = [joint for joint, band in self.band.items() if band.reverses]
         if reversing and self.monte_carlo is None:
             yield (
@@ -175,7 +185,7 @@ class Sensitivity(Published):
                     each.path,
                     each.words,
                     joint,
-                    f"{100 * effect.share:.2g}",
+                    _points(effect.share),
                     f"{effect.torque:.3g}",
                     f"{effect.time:.3f}",
                     _margins(each, joint),

@@ -53,6 +53,9 @@ def words_of(parameter: Parameter) -> str:
 
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
+CONTENT = (
+    "a tolerances file, which maps parameter paths to distributions, e.g. joints.*.link.mass: {normal: 2 %}"
+)
 _PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
 
@@ -104,12 +107,12 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     """
     written = text.strip()
     if share := PER_CENT.fullmatch(written):
-        size = _number(share["number"], text) / 100
+        size = _share(share["number"], written)
     elif _PLAIN.fullmatch(written):
-        size = _number(written, text)
+        size = _number(written, written)
         if size > 1:  # more likely percent than a multiple
             raise InputError.one(
-                f"a tolerance of all numbers is a share: write {written} % or {size / 100:g}"
+                f"{written!r} has no unit; write {written}% for all parameters, or name a YAML file"
             )
     else:
         return _from_file(text, chosen)
@@ -130,14 +133,18 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
     if not isinstance(root, tree.Mapping):
-        problems.fail(root.line, f"expected paths of numbers, each with a distribution, {FORM}, found {root}")
+        problems.fail(root.line, f"expected {CONTENT}, found {root}")
+    stated = root.entries.get("format")
+    if isinstance(stated, tree.Scalar):
+        kind = stated.text.removeprefix("vsacli-").partition("/")[0]
+        raise InputError.one(f"is a {kind}; expected {CONTENT}", source.path)
     found: list[Tolerance | None] = [None] * len(chosen)
     for pattern, node in root.entries.items():
         line = root.key_lines[pattern]
         fitting = [place for place, each in enumerate(chosen) if fnmatchcase(str(each), pattern)]
         if not fitting:
             hint = did_you_mean(pattern, [str(each) for each in chosen])
-            problems.add(line, f"no number of the robot fits {pattern!r}{hint}")
+            problems.add(line, f"no parameter of the robot matches {pattern!r}{hint}")
         for place in fitting:
             try:
                 found[place] = distribution(node, chosen[place].value, chosen[place].unit)
@@ -167,21 +174,26 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     share = PER_CENT.fullmatch(size.text)
     if share is None:
         return Tolerance(shape, _number(size.text, size.text, unit))
-    percent = _number(share["number"], size.text)
-    if percent > 100:
-        raise InputError.one(f"{shape}: must be at most 100 %, not {size.text}")
-    return Tolerance(shape, percent / 100 * abs(value))
+    return Tolerance(shape, _share(share["number"], size.text) * abs(value))
+
+
+def _share(percent: str, whole: str) -> float:
+    """Return a share given in percent."""
+    share = _number(percent, whole) / 100
+    if share > 1:
+        raise InputError.one(f"must be at most 100 %, not {whole}")
+    return share
 
 
 def _number(text: str, whole: str, unit: str = "") -> float:
     try:
         number: float = evaluate(text, unit)
     except ExpressionError as error:
-        raise InputError.one(f"{whole!r} is no tolerance: {error}") from None
+        raise InputError.one(f"{whole!r} is not a tolerance: {error}") from None
     if not number > 0:
-        raise InputError.one(f"a tolerance must be positive, not {whole!r}")
+        raise InputError.one(f"must be positive, not {whole}")
     if number > LARGEST:
-        raise InputError.one(f"a tolerance must be at most {LARGEST:g}, not {whole!r}")
+        raise InputError.one(f"must be at most {LARGEST:g}, not {whole}")
     return number
 
 
@@ -244,7 +256,7 @@ def monte_carlo(
             refused += 1
             if refused == runs:
                 raise InputError.one(
-                    f"none of {runs} drawn robots is one, choose smaller tolerances: {error}"
+                    f"none of {runs} drawn robots is valid; choose smaller tolerances: {error}"
                 ) from None
         progress(1)
     return MonteCarlo(

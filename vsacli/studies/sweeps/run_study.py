@@ -51,7 +51,8 @@ def run_study(
         overwrite: whether an existing table may be replaced.
         command_line: command line of the caller, for the provenance.
         progress: function that opens a progress bar over the missing runs.
-        tell: function to call with messages about kept and lost rows.
+        tell: function to call with messages about kept and lost rows, and with warnings about implausible
+            values of robot and trajectories.
 
     Returns:
         Open table, a context manager that closes it.
@@ -63,6 +64,8 @@ def run_study(
     """
     check_path(path, "run_study(path)")
     study = load_study(path, engine)
+    for warning in study.warnings:  # once, not for each run
+        tell(f"warning: {warning}")
     runs, suffix = _part(study, *shard)
     target = Path(f"{Path(path).stem}{suffix}.h5" if table is None else table)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in study.sources]) as outputs:

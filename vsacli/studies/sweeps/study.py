@@ -99,6 +99,7 @@ class Study:
         trajectory_sources: files that were read for each trajectory.
         dimensions: varied quantities.
         design: combination of values for each run.
+        warnings: sentences about implausible values of the robot and the trajectories, without changes.
         engine: engine, "numpy" or "c".
         compiler: C compiler of the engine; otherwise empty.
     """
@@ -111,6 +112,7 @@ class Study:
     trajectory_sources: tuple[tuple[Source, ...], ...]
     dimensions: tuple[Dimension, ...]
     design: Design
+    warnings: tuple[str, ...]
     engine: str
     compiler: str
 
@@ -271,7 +273,10 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     entries.try_values()
     sources = tuple(each.sources for each in loaded)
     settled = settled_engine(engine, robot, trajectories, dimensions, design)
-    return Study(file, source, read, robot, trajectories, sources, dimensions, design, *settled)
+    warnings = dict.fromkeys((*robot.warnings, *(text for each in loaded for text in each.warnings)))
+    return Study(
+        file, source, read, robot, trajectories, sources, dimensions, design, tuple(warnings), *settled
+    )
 
 
 def _check_named(source: Source, key: str, name: str) -> None:

@@ -57,7 +57,7 @@ def step_text(step: float) -> str:
 
 
 def _of_another_unit(usual: float, duration: float) -> str:
-    rows = f"rows are {usual:.4g} s apart, and the recording lasts {duration:.4g} s"
+    rows = f"rows are {usual:.4g} s apart, and the recording lasts {float(f'{duration:.4g}'):g} s"
     unit = unit_of_steps(usual)
     if unit is None:
         return f"is hardly in seconds: {rows}; write its unit in the header, e.g. time[ms]"

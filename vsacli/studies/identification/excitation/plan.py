@@ -158,7 +158,7 @@ def plan_excitation(
         ImpossibleError: no excitation is feasible.
     """
     if not SHORTEST <= duration < np.inf:
-        raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
+        raise InputError.one(f"the duration must be at least {SHORTEST:g} s, not {duration:g} s")
     for each in noise:
         if each is not None and not 0 <= each <= LARGEST:
             raise InputError.one(f"the sensor noise must be from 0 to {LARGEST:g}, not {each:g}")

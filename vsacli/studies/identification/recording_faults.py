@@ -1,0 +1,191 @@
+"""Faults of the columns of a recording that prevent a fit, and those that make it unreliable.
+
+They are found column by column; faults that only the robot's equations reveal are found in
+`recording_checks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from vsacli.base.texts import counted
+from vsacli.base.units import time_text
+from vsacli.base.variables import VARIABLES
+from vsacli.robot.model import Robot
+from vsacli.studies.identification.recorded_columns import (
+    TORQUE,
+    Column,
+)
+from vsacli.trajectory.recorded.faults import wraps
+from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.quantization import Quantization
+from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
+from vsacli.trajectory.recorded.thresholds import (
+    GAP_STEPS,
+    LARGEST_ANGLE,
+    LARGEST_TRAVEL,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+)
+
+FEWEST_SAMPLES = 200
+"""Smallest number of samples in a column for a fit: four seconds at 50 Hz."""
+
+NOISY = 1e-7
+"""Noise of a torque, relative to its range, above which equal readings are not a robot at rest."""
+
+CUT_SAMPLES = 10
+"""Number of readings at the extreme value above which they are not an accident."""
+
+CUT_SHARE = 5.0
+"""Ratio of readings at the extreme value to those at the next one for a cut-off; the crest of a quantized
+sine without noise has 2.4."""
+
+
+def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
+    """Yield sentences on faults that make columns unusable."""
+    few = [column for column in columns if len(column.time) < FEWEST_SAMPLES]
+    if few:
+        yield _too_few(few)
+        return
+    unit = next((clause for column in columns for clause in _unit_of_time(column)), None)
+    if unit is not None:  # the columns of a file share their times
+        yield unit
+        return
+    yield from _together((column.name, clause) for column in columns for clause in _gap_clauses(column))
+    if not any(_gap_clauses(column) for column in columns):
+        yield from _apart(columns)
+    yield from _together(
+        (column.name, clause)
+        for column in columns
+        if column.place[0] != TORQUE
+        for clause in _position_clauses(column, robot)
+    )
+    yield from _still(columns, robot.joint_names)
+
+
+def doubts(columns: Sequence[Column]) -> Iterator[str]:
+    """Yield sentences on reasons for an unreliable fit."""
+    yield from _together((column.name, clause) for column in columns for clause in _fault_clauses(column))
+
+
+def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield a sentence for each clause that columns share."""
+    shared: dict[str, list[str]] = {}
+    for name, clause in clauses:
+        shared.setdefault(clause, []).append(name)
+    for clause, (first, *others) in shared.items():
+        beside = f", as {len(others)} more," if others else ""
+        yield f"column {first!r}{beside} {clause}"
+
+
+def _too_few(few: Sequence[Column]) -> str:
+    """Return a sentence on columns with too few samples for a fit."""
+    fewest = min(few, key=lambda column: len(column.time))
+    rows = counted(len(fewest.time), "row")
+    name = f" with a value in column {fewest.name!r}"
+    return f"has {rows}{name}; identification needs at least {FEWEST_SAMPLES}"
+
+
+def _usual_step(column: Column) -> float:
+    return float(np.median(np.diff(column.time)))
+
+
+def _unit_of_time(column: Column) -> Iterator[str]:
+    """Yield a sentence if the times are probably not in seconds."""
+    if not SHORTEST_STEP <= _usual_step(column) <= LONGEST_STEP:
+        yield from (f"time {fault.message}" for fault in stamp_faults(column.time))
+
+
+def _gap_clauses(column: Column) -> list[str]:
+    steps, usual = np.diff(column.time), _usual_step(column)
+    longest = int(np.argmax(steps))
+    if steps[longest] <= GAP_STEPS * usual:
+        return []
+    when = time_text(float(column.time[longest]))
+    return [
+        f"has a gap of {step_text(float(steps[longest]))} from t = {when} on, where rows are "
+        f"{step_text(usual)} apart: cut the file there and give both parts as recordings"
+    ]
+
+
+def _apart(columns: Sequence[Column]) -> Iterator[str]:
+    """Yield a sentence if the columns have too little time in common for a fit."""
+    last = max(columns, key=lambda column: column.time[0])
+    first = min(columns, key=lambda column: column.time[-1])
+    common = float(first.time[-1] - last.time[0])
+    if common < (FEWEST_SAMPLES - 1) * min(map(_usual_step, columns)):
+        begins, ends = time_text(float(last.time[0])), time_text(float(first.time[-1]))
+        yield (
+            f"column {last.name!r} begins at t = {begins} and column {first.name!r} ends at t = {ends}: "
+            f"{max(common, 0.0):.3g} s in common are fewer than {FEWEST_SAMPLES} samples"
+        )
+
+
+def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
+    _, index, motor = column.place
+    turns = robot.joints[index].is_revolute
+    follows = motor is None or robot.joints[index].actuator.has(VARIABLES["phi"])[motor - 1]
+    largest = float(np.max(np.abs(column.values), initial=0.0))
+    jumps = wraps(column.values) if turns else None
+    if jumps is not None:
+        when = time_text(float(column.time[jumps.at]))
+        yield f"jumps by 2 pi at t = {when}, a wrapped angle: unwrap it"
+    elif follows and not column.has_unit and largest > (LARGEST_ANGLE if turns else LARGEST_TRAVEL):
+        wrong, right = ("deg", "rad") if turns else ("mm", "m")
+        yield (
+            f"goes to {largest:.4g} {right}; is it in {wrong}? Write [{wrong}] after its name in the header, "
+            f"or [{right}] if it is right"
+        )
+
+
+def _still(columns: Sequence[Column], joints: Sequence[str]) -> Iterator[str]:
+    """Yield sentences on joints that do not move, and on constant columns while others of a joint change."""
+    resting = []
+    for index, joint in enumerate(joints):
+        own = [column for column in columns if column.place[1] == index]
+        still = [column for column in own if len(column.values) and np.ptp(column.values) == 0]
+        moving = [column for column in own if column not in still]
+        if still and not moving:
+            resting.append(joint)
+            continue
+        for column in still:
+            yield (
+                f"column {column.name!r} is {column.values[0]:.6g} throughout, while {moving[0].name!r} "
+                "changes: a sensor that is not connected, or a column that was not filled in"
+            )
+    if resting:
+        verb, them = ("joint {} does", "its") if len(resting) == 1 else ("joints {} do", "their")
+        yield (
+            f"{verb.format(', '.join(resting))} not move, so nothing can be identified; remove {them} "
+            "columns, or record a motion (vsacli identify ROBOT --plan)"
+        )
+
+
+def _fault_clauses(column: Column) -> Iterator[str]:
+    is_torque = column.place[0] == TORQUE
+    inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps at both ends of a motion
+    time, values = column.time[inner], column.values[inner]
+    yield from (clause for _, clause in column_faults(time, time, values))
+    if is_torque:
+        yield from _cut(column)
+
+
+def _cut(column: Column) -> Iterator[str]:
+    """Yield sentences on noisy readings that saturate at the largest or smallest value."""
+    quantization = Quantization.of(column.time, column.values)
+    if not np.median(quantization.noise) > NOISY * np.ptp(column.values):
+        return
+    for end in (np.max, np.min):
+        last = end(column.values)
+        at = column.values == last
+        rest = column.values[~at]
+        beside = int(np.count_nonzero(rest == end(rest)))
+        if at.sum() >= max(CUT_SAMPLES, CUT_SHARE * beside):
+            when = time_text(float(column.time[np.argmax(at)]))
+            yield (
+                f"is cut off at {last:.4g}, {at.sum()} times, first at t = {when}: the drive or the sensor "
+                "goes no further; leave that part out, or move with less torque"
+            )
