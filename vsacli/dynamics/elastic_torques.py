@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.control_flow import Keyed, call
-from vsacli.compute.engine import KEPT_PROGRAMS, Engine, engine_of_call
+from vsacli.compute.engine import KEPT_PROGRAMS, NUMBERS, Engine, engine_of_call
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import (
     ZERO,
@@ -195,9 +195,9 @@ def link_torques(
     damped = DAMPING.key in kernel.arguments.shapes
     dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
     every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
-    rows = dict(zip(kernel.arguments.shapes, every, strict=True))
     chosen = engine_of_call(engine, kernel, motion[0].shape[1])
-    computed = kernel.results.arrays(chosen.run(kernel, kernel.arguments.pack(rows)))
+    rows: Any = np.concatenate(every) if chosen is NUMBERS else [row for each in every for row in each]
+    computed = kernel.results.arrays(chosen.run(kernel, rows))
     tau_e, dtau_e, ddtau_e = (computed[name].T.reshape(shape) for name in TORQUES)
     return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
 

@@ -2,11 +2,12 @@
 
 from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
 from vsacli.compute.engine.engines import KEPT_PROGRAMS, Engine, Kernel, samples_per_pass
-from vsacli.compute.engine.number_engine import engine_of_call
+from vsacli.compute.engine.number_engine import NUMBERS, engine_of_call
 
 __all__ = [
     "KEPT_PROGRAMS",
     "NAMES",
+    "NUMBERS",
     "NUMPY",
     "Choice",
     "Engine",

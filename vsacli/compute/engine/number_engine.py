@@ -44,8 +44,8 @@ class NumberEngine:
         outputs = np.empty((kernel.outputs, samples))
         try:
             with np.errstate(all="ignore"):
-                for sample in range(samples):
-                    outputs[:, sample] = function([row.item(sample) for row in rows])
+                for sample, column in enumerate(np.asarray(rows).T.tolist()):
+                    outputs[:, sample] = function(column)
         except (ArithmeticError, ValueError):
             return NUMPY.run(kernel, rows)
         return outputs
