@@ -200,3 +200,34 @@ def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None
         "check-feasibility", ROBOT, too_soft, "--set", "duration=3", "--write-fix", 1, "-o", "f.yaml"
     )
     assert (done.code, "change them instead" in done.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--rate", "-5"], "--rate: must be positive, not -5"),
+        (
+            ["--rate", "1e9"],
+            "--rate: duration 4 s times rate 1e+09 Hz gives 4e+09 samples; at most 1e+09 are possible; "
+            "lower rate or duration",
+        ),
+        (["--set", "rate=-5"], "--set: rate: must be positive, not -5"),
+        (["--rate", "5", "--set", "duration=-1"], "--set: duration: must be positive, not -1"),
+    ],
+)
+def test_an_impossible_rate_is_one_problem_of_its_option(
+    vsacli: Any, motion: Path, option: list[str], message: str
+) -> None:
+    done = vsacli("invdyn", ROBOT, motion, *option)
+    assert (done.code, done.err) == (2, f"{message}\n")
+
+
+def test_a_rate_that_a_recording_cannot_have_names_its_option(vsacli: Any) -> None:
+    columns = [f"{joint}.{name}" for joint in ("base", "shoulder", "elbow") for name in ("q", "stiffness")]
+    rows = [",".join(map(str, [0.1 * row, *[0, 900] * 3])) for row in range(10)]
+    Path("log.csv").write_text("\n".join([",".join(["time", *columns]), *rows, ""]))
+    signals = "".join(f"{key}: {{type: csv, file: log.csv}}\n" for key in ("position", "stiffness"))
+    Path("log.yaml").write_text(f"format: vsacli-trajectory/1\nname: log\n{signals}")
+    for trajectory in ("log.csv", "log.yaml"):
+        done = vsacli("invdyn", ROBOT, trajectory, "--rate", "1e12")
+        assert (done.code, done.err.startswith("--rate: duration 0.9 s times rate 1e+12 Hz")) == (2, True)

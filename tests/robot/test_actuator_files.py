@@ -222,7 +222,7 @@ def test_a_table_without_stiffness_serves_a_robot_without_antagonistic_joints() 
     assert found.warnings == (f"dq, ddq, d3q, d4q come from a C6 spline through q; {FEW}",)
     assert inverse_dynamics(of, found).report.verdict == "ok"
     [problem] = problems(load_trajectory, "move.csv", robot(RIGID, ANTAGONISTIC))
-    assert problem.startswith("move.csv:1: there is no column b.stiffness; a trajectory in YAML")
+    assert problem.startswith("move.csv:1: the column b.stiffness is missing; a YAML trajectory")
 
 
 # From Python

@@ -167,10 +167,10 @@ def test_duration_beside_a_recorded_wrench_is_refused(load) -> None:
 @pytest.mark.parametrize(
     ("columns", "problem"),
     [
-        (["fx", "fy", "mz"], "push.csv:1: there are no columns fz, mx, my"),
+        (["fx", "fy", "mz"], "push.csv:1: the columns fz, mx, my are missing; columns: time,"),
         (
             [*WRENCH_AXES, "dfx"],
-            "push.csv:1: there are no columns dfy, dfz, dmx, dmy, dmz; dwrench is given for all axes",
+            "push.csv:1: the columns dfy, dfz, dmx, dmy, dmz are missing; dwrench is given for all axes",
         ),
         ([*WRENCH_AXES[:5], "m_z"], "push.csv:1: unknown column 'm_z'; did you mean 'mz'?"),
     ],

@@ -58,6 +58,11 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or noun + 's'}"
 
 
+def listed(names: Sequence[str], most: int) -> str:
+    """Return names separated by commas; further ones than `most` are shown as three dots."""
+    return ", ".join([*names[:most], *(["..."] if len(names) > most else [])])
+
+
 def verdict_words(verdict: str) -> str:
     """Return a verdict as the first line of a report shows it."""
     return verdict.upper().replace("_", " ")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from vsacli.base.errors import InputError, InvalidRecordError, Problem, StorageError
@@ -30,6 +30,26 @@ def naming_option(option: str, kind: type[InputError] = InputError) -> Iterator[
         raise InputError(
             each if each.file else each._replace(message=f"{option}: {each.message}") for each in problems
         ) from error
+
+
+@contextmanager
+def naming_changes(others: Mapping[str, str]) -> Iterator[None]:
+    """Put `--set` before each error of a change, or the option from which the change was made.
+
+    Args:
+        others: other options, by the path that each of them changes, e.g. {"rate": "--rate"}.
+    """
+    from vsacli.documents.reading import ChangeError
+
+    try:
+        yield
+    except ChangeError as error:
+        named = []
+        for each in error.problems:
+            path, _, rest = each.message.partition(": ")
+            message = f"{others[path]}: {rest}" if path in others else f"--set: {each.message}"
+            named.append(each._replace(message=message))
+        raise InputError(named) from error
 
 
 _KINDS = {
