@@ -13,7 +13,6 @@ from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
-from vsacli.cli.input_errors import naming_option
 
 
 @click.command(
@@ -81,16 +80,7 @@ def info(
     else:
         from vsacli.files.info import describe_file
 
-        _show(describe_file(file, robot, talk.looking, _checked(rate)), as_json, field)
-
-
-def _checked(rate: float | None) -> float | None:
-    if rate is None:
-        return None
-    from vsacli.documents.columns_file import checked_rate
-
-    with naming_option("--rate"):
-        return checked_rate(rate)
+        _show(describe_file(file, robot, talk.looking, rate), as_json, field)
 
 
 def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:

@@ -100,9 +100,9 @@ def invdyn(
     singular or over a limit, and by how much.
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
-    options = {} if rate is None else {"rate": "--rate"}
-    changes = (*changes, *(f"{path}={rate!r}" for path in options))
-    inputs = load_inputs(robot, trajectory, talk, changes, options)
+    if rate is not None:
+        changes = (*changes, f"rate={rate!r}")
+    inputs = load_inputs(robot, trajectory, talk, changes, {} if rate is None else {"rate": "--rate"})
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs

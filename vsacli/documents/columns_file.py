@@ -190,5 +190,5 @@ def checked_rate(given: Any) -> float:
         rate = math.nan
     if not 0 < rate <= LARGEST:
         shown = f"{given:g}" if isinstance(given, float) else given
-        raise InputError.one(f"must be a positive number of samples per second, not {shown}")
+        raise InputError.one(f"rate: must be a positive number of samples per second, not {shown}")
     return rate

@@ -256,10 +256,8 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
         return None
     from vsacli.documents.columns_file import checked_rate
 
-    try:
+    with _blaming(changes, "rate"):
         return checked_rate(changes["rate"])
-    except InputError as error:
-        raise ChangeError.one(f"rate: {error}") from None
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import for_yaml
 from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
-from vsacli.documents.columns_file import FORMAT
+from vsacli.documents.columns_file import FORMAT, checked_rate
 from vsacli.documents.csv_file import read_header, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
@@ -72,6 +72,8 @@ def describe_recording(
     rows = read_first_rows(path)
     joint_names = robot.joint_names if robot else ()
     time = time_column(rows)
+    if rate is not None:
+        rate = checked_rate(rate)
     if time is not None and rate is not None:
         if not time.guessed:
             name = rows.columns[time.place] or time.place + 1
