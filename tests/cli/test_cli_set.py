@@ -143,7 +143,23 @@ def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("joint.0.damping=1", "neither robot nor trajectory has a 'joint'; did you mean 'joints'?"),
+        (
+            "joint.0.damping=1",
+            "neither robot nor trajectory has 'joint' at the top level; did you mean 'joints'?",
+        ),
+        (
+            "mass=2",
+            "neither robot nor trajectory has 'mass' at the top level; did you mean joints.*.link.mass?",
+        ),
+        (
+            "link.mass=2",
+            "neither robot nor trajectory has 'link' at the top level; did you mean joints.*.link.mass?",
+        ),
+        (
+            "elbow.link.mass=2",
+            "neither robot nor trajectory has 'elbow' at the top level; did you mean joints.*.link.mass?",
+        ),
+        ("foo=2", "neither robot nor trajectory has 'foo' at the top level; valid: placeholder, gravity, "),
         ("name=x", "name says what the file is and stays; change the file itself"),
         ("format=x", "format says what the file is and stays; change the file itself"),
         ("joints.elbow.link.mas=1", "joints.elbow.link has no 'mas'; did you mean 'mass'?"),

@@ -12,6 +12,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
+from vsacli.base.errors import InputError
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.parameters import parameters
 from vsacli.studies.sensitivities import SensitivityRun
@@ -139,7 +140,7 @@ def test_json_has_every_number(vsacli, tmp_path):
 
 
 BAD = {
-    "no number of the robot fits 'joints.*.max'": ["--parameters", "joints.*.max"],
+    "no parameter of the robot matches 'joints.*.max'": ["--parameters", "joints.*.max"],
     "t.yaml: no such file": ["--tolerances", "t.yaml"],
     "a tolerance must be positive": ["--tolerances", "-3%"],
     "a tolerance must be at most 1e+30": ["--tolerances", "1e300%"],
@@ -148,8 +149,28 @@ BAD = {
     "a tolerance of all numbers is a share: write 5 % or 0.05": ["--tolerances", "5"],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
-    "bad.yaml:2: no number of the robot fits": ["--tolerances", "bad.yaml"],
+    "bad.yaml:2: no parameter of the robot matches": ["--tolerances", "bad.yaml"],
 }
+
+
+@pytest.mark.parametrize(
+    ("pattern", "hint"),
+    [
+        ("joints.*.masss", "did you mean 'joints.*.link.mass'?"),
+        ("k", "did you mean 'joints.*.actuator.spring.k'?"),
+        ("joints.elbw.link.mass", "did you mean 'joints.elbow.link.mass'?"),
+        ("joints.*.inert", "did you mean 'joints.*.actuator.motor.inertia'?"),
+        (
+            "name",
+            "valid: gravity.*, base.*, tool.*, joints.*.dh.*, joints.*.link.*, joints.*.damping, "
+            "joints.*.actuator.*",
+        ),
+    ],
+)
+def test_a_pattern_that_matches_nothing(pattern, hint):
+    with pytest.raises(InputError) as caught:
+        parameters(load_robot(ROBOT), [pattern])
+    assert str(caught.value) == f"no parameter of the robot matches {pattern!r}; {hint}"
 
 
 @pytest.mark.parametrize("sentence", BAD)
