@@ -174,7 +174,7 @@ def test_overwriting(vsacli, tmp_path):
             ["--hold", "left_finger=1 deg"],
             "expected a number in m, found '1 deg': degrees are for angles only",
         ),
-        (["--tip", "flang"], "tip: there is no link 'flang'; did you mean 'flange'?"),
+        (["--tip", "flang"], "--tip: there is no link 'flang'; did you mean 'flange'?"),
     ],
 )
 def test_options_that_cannot_be(vsacli, tmp_path, options, message):

@@ -208,7 +208,7 @@ SPRING = "joints.*.actuator.spring.k"
         (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
-        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has 'foo' at the top level"),
+        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has 'foo'"),
         ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),
