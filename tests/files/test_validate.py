@@ -112,8 +112,8 @@ def test_as_json(vsacli: Any, tmp_path: Path) -> None:
     assert json.loads(done.out) == [
         {
             "file": "arm.yaml",
-            "line": None,
-            "message": "link of joint base: its mass is zero",
+            "line": 13,
+            "message": "joints.base.link.mass is zero; give the mass of the link, in kg",
             "severity": "warning",
         },
         {
