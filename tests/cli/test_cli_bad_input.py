@@ -35,8 +35,11 @@ ROBOT_EDITS = {
 }
 
 TRAJECTORY_EDITS = {
-    "degree 5 position": (("degree: 7", "degree: 5"), ["9: must be four times differentiable"]),
-    "degree 1 stiffness": (("degree: 3", "degree: 1"), ["14: must be twice differentiable"]),
+    "degree 5 position": (
+        ("degree: 7", "degree: 5"),
+        ["9: derivatives up to the third must vanish at both ends"],
+    ),
+    "degree 1 stiffness": (("degree: 3", "degree: 1"), ["14: its rate must vanish at both ends"]),
     "list length": (("[90 deg, 45 deg, -60 deg]", "[1, 2]"), ["11: end: expected 3 numbers"]),
     "infinity": (("duration: 4.0", "duration: .inf"), ["5: only finite numbers"]),
     "negative stiffness": (

@@ -165,7 +165,7 @@ def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
         ("joints.elbow.link.mas=1", "joints.elbow.link has no 'mas'; did you mean 'mass'?"),
         ("joints.elbow.link.mass=-1", "joints.elbow.link.mass: must be zero or positive, not -1"),
         ("joints.elbow.link.mass=heavy", "joints.elbow.link.mass: expected a number in kg, found 'heavy'"),
-        ("position.degree=4", "position.degree: must be odd, 7 to 15"),
+        ("position.degree=4", "position.degree: must be odd, from 7 to 15"),
         (
             "joints.elbow.link.mass",
             "expected PATH=VALUE, e.g. joints.*.link.mass=2.5, found 'joints.elbow.link.mass'",

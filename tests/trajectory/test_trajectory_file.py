@@ -219,14 +219,15 @@ def test_a_problem_is_named_with_its_line(load, old, new, problem):
 @pytest.mark.parametrize("degree", [3, 5, 6, 8, 17, -7])
 def test_a_position_of_this_degree_is_refused(load, degree):
     with pytest.raises(
-        InputError, match=rf"^move.yaml:7: degree: .* four times differentiable.*, not {degree}$"
+        InputError,
+        match=rf"^move.yaml:7: degree: .* up to the third must vanish at both ends.*, not {degree}$",
     ):
         load(TEXT.replace("degree: 7", f"degree: {degree}"))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 17])
 def test_a_stiffness_of_this_degree_is_refused(load, degree):
-    with pytest.raises(InputError, match=rf"^move.yaml:12: degree: .* twice differentiable.*, not {degree}$"):
+    with pytest.raises(InputError, match=rf"^move.yaml:12: degree: .*its rate must vanish at both ends.*, not {degree}$"):
         load(TEXT.replace("degree: 3", f"degree: {degree}"))
 
 

@@ -140,7 +140,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
         ),
         (
             "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [0, 0, 0, 0, 0, 0]}",
-            "move.yaml:7: degree: must be odd, 3 to 15 (the wrench must be twice differentiable, so its rate",
+            "move.yaml:7: degree: must be odd, from 3 to 15 (its rate must vanish at both ends",
         ),
         (
             "{frame: base, type: polynomial, degree: 3, start: [0, 0], end: [0, 0, 0, 0, 0, 0]}",

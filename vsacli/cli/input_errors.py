@@ -67,6 +67,7 @@ _ADVICE = {
     ),
     "trajectory": "are ROBOT and TRAJECTORY swapped?",
     "robot": "are ROBOT and TRAJECTORY swapped?",
+    "motor catalog": "vsacli size takes it as --catalog",
 }
 """What to do with a file of a kind that a command does not read as a robot or trajectory."""
 

@@ -162,6 +162,9 @@ def describe_file(
                 return describe_result(result)
         case FileKind.STUDY_TABLE:
             return describe_study(path)
+        case FileKind.CATALOG:
+            advice = f"vsacli size ROBOT TRAJECTORY --catalog {path} chooses from it"
+            raise InputError.one(f"is a motor catalog; {advice}", path)
         case kind:
             refuse_other_formats(path)
             expected = "a robot, a trajectory, a result, a simulation or the table of a study"

@@ -36,6 +36,7 @@ from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.problems import out_of_order
 from vsacli.trajectory.recorded.recording import NEEDED
 from vsacli.trajectory.recorded.stamps import stamp_faults
 
@@ -238,10 +239,8 @@ class _Survey:
                     self.rate = f"{self.time['rate']:.3g}"
             elif len(stamps) > 1:
                 row = int(np.argmin(np.diff(stamps) > 0)) + 1
-                self.warnings.append(
-                    f"{file}:{table.line_of(row)}: the time does not increase: {stamps[row]:.9g} s follows "
-                    f"{stamps[row - 1]:.9g} s; records must be in order, and no stamp twice"
-                )
+                message = out_of_order(float(f"{stamps[row - 1]:.9g}"), float(f"{stamps[row]:.9g}"), "rows")
+                self.warnings.append(f"{file}:{table.line_of(row)}: time {message}")
         return stamps if rising else None
 
     def _described(self, stamps: FloatArray, unit: str, first_stamp: int | str | None) -> dict[str, Any]:

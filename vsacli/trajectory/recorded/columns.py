@@ -105,7 +105,10 @@ def column_layout(
     known = _known(of_every_joint)
     if _is_foreign(names, known):
         examples = ", ".join(expected[:2])
-        message = f"is not a trajectory: expected columns such as {examples}; see vsacli info {file}"
+        advice = (
+            f"for a motor catalog use --catalog {file}" if "inertia" in names else f"see vsacli info {file}"
+        )
+        message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
     found = Header(names, known, expected, joints.names, file)
     problems = list(found.of_names())

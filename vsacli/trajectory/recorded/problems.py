@@ -39,17 +39,18 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
     elif not rising.all():
         sample = int(np.argmin(rising)) + 1
-        yield SampleProblem("time", _out_of_order(time[sample - 1], time[sample]), sample=sample)
+        yield SampleProblem("time", out_of_order(time[sample - 1], time[sample]), sample=sample)
     elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
         yield SampleProblem(
             "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
         )
 
 
-def _out_of_order(before: float, time: float) -> str:
+def out_of_order(before: float, time: float, items: str = "samples") -> str:
+    """Return the problem of two successive times, s; `items` is what to sort or to delete."""
     if time == before:
-        return f"must increase, but {time} s appears twice; delete one of the samples"
-    return f"must increase, but {time} s follows {before} s; sort the samples by time"
+        return f"must increase, but {time} s appears twice; delete one of the {items}"
+    return f"must increase, but {time} s follows {before} s; sort the {items} by time"
 
 
 def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
