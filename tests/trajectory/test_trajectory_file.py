@@ -227,7 +227,9 @@ def test_a_position_of_this_degree_is_refused(load, degree):
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 17])
 def test_a_stiffness_of_this_degree_is_refused(load, degree):
-    with pytest.raises(InputError, match=rf"^move.yaml:12: degree: .*its rate must vanish at both ends.*, not {degree}$"):
+    with pytest.raises(
+        InputError, match=rf"^move.yaml:12: degree: .*its rate must vanish at both ends.*, not {degree}$"
+    ):
         load(TEXT.replace("degree: 3", f"degree: {degree}"))
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from vsacli.base.did_you_mean import nearest
+from vsacli.base.renamed import successor
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH
 from vsacli.base.texts import listed, together
 from vsacli.documents.time_column import TIME
@@ -136,6 +137,8 @@ def probable(column: str, missing: Sequence[str]) -> str | None:
     Of a joint's columns only the part that is wrong is compared: `shoulder.theta` shares its joint with
     `shoulder.dq`, and nothing else.
     """
+    if (renamed := successor(column, missing)) is not None:
+        return renamed
     joint, dot, quantity = column.partition(".")
     others = [each.partition(".") for each in missing]
     if not dot or not any(separator for _, separator, _ in others):
@@ -155,7 +158,12 @@ def _misspellings(meant: Mapping[str, str]) -> Iterator[str]:
         mistake = [part for pair in parts if pair[0] != pair[1] for part in pair]
         groups.setdefault(tuple(mistake), []).append(column)
     for columns in groups.values():
-        yield f"{_unknown(columns)}; did you mean {_several([meant[each] for each in columns])}?"
+        right = [meant[each] for each in columns]
+        if successor(columns[0], right) is None:
+            yield f"{_unknown(columns)}; did you mean {_several(right)}?"
+        else:
+            verb = "it is" if len(columns) == 1 else "they are"
+            yield f"{_unknown(columns)}; {verb} now {_several(right)}"
 
 
 def _unknown(columns: Sequence[str]) -> str:
