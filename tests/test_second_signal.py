@@ -131,8 +131,8 @@ def test_what_is_said_of_it(outcomes: dict[str, tuple[int, str]], folder: Path) 
     assert key["description"] == "pretension of the springs"
     assert "stiffness N m/rad (N/m if prismatic); pretension rad (m if prismatic)" in said["info"]
     assert said["without"].startswith("without.yaml:1: missing key 'pretension' (pretension of the springs;")
-    twice = "the pretension must be twice differentiable, so its rate must vanish at the ends"
-    assert f"rough.yaml:7: degree: must be odd, 3 to 15 ({twice}), not 4" in said["rough"]
+    rest = "its rate must vanish at both ends"
+    assert f"rough.yaml:7: degree: must be odd, from 3 to 15 ({rest}), not 4" in said["rough"]
     assert "its actuator takes no pretension" in said["foreign"]
     header = (folder / "code" / "vsa_3r.h").read_text()
     assert all(f"double {name}[3];" in header for name in NAMES)

@@ -88,7 +88,7 @@ def test_a_start_that_cannot_be(vsacli, tmp_path, feasible_result):
     assert done.code == 2
     assert "is of another robot, with the joints base, shoulder, elbow, not" in done.err
     done = vsacli("export", ROBOT, "--format", "urdf", "--start", feasible_result)
-    assert done.err == "a URDF does not say where a motion starts; leave out --start\n"
+    assert done.err == "--start needs --format mjcf; a URDF has no initial state\n"
     done = vsacli("export", feasible_result, "--start", feasible_result)
     assert done.err == f"{feasible_result}: --start is for robots; leave it out\n"
     assert contents(tmp_path) == {}

@@ -121,7 +121,10 @@ def test_a_snapped_axis_is_reported(vsacli, tmp_path):
 def test_implausible_links_are_reported(vsacli, tmp_path):
     text = robot(link("a"), link("b", ""), link("c"), joint("turn", "a", "b"), joint("nod", "b", "c"))
     write(tmp_path / "arm.urdf", text)
-    assert "warning: link of joint turn: its mass is zero" in vsacli("import-urdf", "arm.urdf").out
+    assert (
+        "warning: joints.turn.link: mass and inertia are zero; give those of the link"
+        in vsacli("import-urdf", "arm.urdf").out
+    )
 
 
 def test_names_stay_in_their_place(tmp_path):
@@ -174,7 +177,7 @@ def test_overwriting(vsacli, tmp_path):
             ["--hold", "left_finger=1 deg"],
             "expected a number in m, found '1 deg': degrees are for angles only",
         ),
-        (["--tip", "flang"], "tip: there is no link 'flang'; did you mean 'flange'?"),
+        (["--tip", "flang"], "--tip: there is no link 'flang'; did you mean 'flange'?"),
     ],
 )
 def test_options_that_cannot_be(vsacli, tmp_path, options, message):

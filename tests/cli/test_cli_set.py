@@ -143,13 +143,29 @@ def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("joint.0.damping=1", "neither robot nor trajectory has a 'joint'; did you mean 'joints'?"),
+        (
+            "joint.0.damping=1",
+            "neither robot nor trajectory has 'joint' at the top level; did you mean 'joints'?",
+        ),
+        (
+            "mass=2",
+            "neither robot nor trajectory has 'mass' at the top level; did you mean joints.*.link.mass?",
+        ),
+        (
+            "link.mass=2",
+            "neither robot nor trajectory has 'link' at the top level; did you mean joints.*.link.mass?",
+        ),
+        (
+            "elbow.link.mass=2",
+            "neither robot nor trajectory has 'elbow' at the top level; did you mean joints.*.link.mass?",
+        ),
+        ("foo=2", "neither robot nor trajectory has 'foo' at the top level; valid: placeholder, gravity, "),
         ("name=x", "name says what the file is and stays; change the file itself"),
         ("format=x", "format says what the file is and stays; change the file itself"),
         ("joints.elbow.link.mas=1", "joints.elbow.link has no 'mas'; did you mean 'mass'?"),
         ("joints.elbow.link.mass=-1", "joints.elbow.link.mass: must be zero or positive, not -1"),
         ("joints.elbow.link.mass=heavy", "joints.elbow.link.mass: expected a number in kg, found 'heavy'"),
-        ("position.degree=4", "position.degree: must be odd, 7 to 15"),
+        ("position.degree=4", "position.degree: must be odd, from 7 to 15"),
         (
             "joints.elbow.link.mass",
             "expected PATH=VALUE, e.g. joints.*.link.mass=2.5, found 'joints.elbow.link.mass'",
@@ -200,3 +216,34 @@ def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None
         "check-feasibility", ROBOT, too_soft, "--set", "duration=3", "--write-fix", 1, "-o", "f.yaml"
     )
     assert (done.code, "change them instead" in done.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--rate", "-5"], "--rate: must be positive, not -5"),
+        (
+            ["--rate", "1e9"],
+            "--rate: duration 4 s times rate 1e+09 Hz gives 4e+09 samples; at most 1e+09 are possible; "
+            "lower rate or duration",
+        ),
+        (["--set", "rate=-5"], "--set: rate: must be positive, not -5"),
+        (["--rate", "5", "--set", "duration=-1"], "--set: duration: must be positive, not -1"),
+    ],
+)
+def test_an_impossible_rate_is_one_problem_of_its_option(
+    vsacli: Any, motion: Path, option: list[str], message: str
+) -> None:
+    done = vsacli("invdyn", ROBOT, motion, *option)
+    assert (done.code, done.err) == (2, f"{message}\n")
+
+
+def test_a_rate_that_a_recording_cannot_have_names_its_option(vsacli: Any) -> None:
+    columns = [f"{joint}.{name}" for joint in ("base", "shoulder", "elbow") for name in ("q", "stiffness")]
+    rows = [",".join(map(str, [0.1 * row, *[0, 900] * 3])) for row in range(10)]
+    Path("log.csv").write_text("\n".join([",".join(["time", *columns]), *rows, ""]))
+    signals = "".join(f"{key}: {{type: csv, file: log.csv}}\n" for key in ("position", "stiffness"))
+    Path("log.yaml").write_text(f"format: vsacli-trajectory/1\nname: log\n{signals}")
+    for trajectory in ("log.csv", "log.yaml"):
+        done = vsacli("invdyn", ROBOT, trajectory, "--rate", "1e12")
+        assert (done.code, done.err.startswith("--rate: duration 0.9 s times rate 1e+12 Hz")) == (2, True)

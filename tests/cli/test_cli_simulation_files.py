@@ -262,7 +262,7 @@ def test_info_of_measured_positions_shows_what_they_cost(vsacli: Callable[..., A
 
 def test_notes_are_no_warnings(vsacli: Callable[..., Any], tmp_path: Path) -> None:
     motion = edited(REST_TO_REST, tmp_path / "odd.yaml", ("rate: 1000 ", "rate: 25.1 "))
-    sentence = "the rate is 25 per second, not 25.1: whole steps in 4 s"
+    sentence = "the rate is 25 Hz, not 25.1 Hz, for a whole number of intervals in 4 s"
     for command in ("invdyn", "simulate"):
         done = vsacli(command, ROBOT, motion, "-o", f"{command}.h5")
         assert f"\nnote: {sentence}\n" in done.out

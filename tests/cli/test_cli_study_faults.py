@@ -210,7 +210,7 @@ SPRING = "joints.*.actuator.spring.k"
         (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", f"study.yaml:5: {SPRING}: has a distribution, which"),
-        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
+        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has 'foo'"),
         ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "missing key 'samples': the number of runs that the"),

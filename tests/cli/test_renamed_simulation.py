@@ -103,7 +103,8 @@ def test_a_recorded_motion_names_the_new_column(vsacli, files):
     (files / "m.csv").write_text((files / "m.csv").read_text().replace(".q,", ".q_actual,"))
     outcome = vsacli("invdyn", ROBOT, "m.csv")
     assert outcome.code == 2
-    assert "unknown column 'base.q_actual'; it is now 'base.q'" in outcome.err
+    columns = "base.q_actual, shoulder.q_actual, elbow.q_actual; they are now base.q, shoulder.q, elbow.q"
+    assert outcome.err == f"m.csv:1: 3 unknown columns: {columns}\n"
 
 
 def test_a_simulation_of_an_older_format_is_refused(vsacli, files):

@@ -22,8 +22,8 @@ def devices(name: str) -> list[str]:
 def test_joints_alike_stand_together() -> None:
     assert devices("lwr_7r_vsa")[-3:] == [
         "forearm_roll to flange: antagonistic",
-        "  motor, both equal: inertia 0.4 kg m^2, damping 0.0005 N m s/rad",
-        "  spring, both equal: cubic, k 100 N m/rad, k_c 800 N m/rad^3",
+        "  motors 1 and 2: inertia 0.4 kg m^2, damping 0.0005 N m s/rad",
+        "  springs 1 and 2: cubic, k 100 N m/rad, k_c 800 N m/rad^3",
     ]
 
 

@@ -125,6 +125,9 @@ def test_an_unknown_name_gets_the_nearest(vsacli: Callable[..., Any]):
     outcome = vsacli("examples", "puma_650", "rp_2", "--copy", "new")
     assert outcome.code == 2
     assert outcome.err == "no example is called 'puma_650'; did you mean 'puma_560'?\n"
+    assert vsacli("examples", "ur10").err == "no example is called 'ur10'; vsacli examples lists them\n"
+    by_path, by_name = (vsacli("examples", name) for name in ("robots/puma_560.yaml", "puma_560"))
+    assert (by_path.code, by_path.out) == (0, by_name.out)
     assert not Path("new").exists()
     with pytest.raises(InputError, match=r"'a'.*\n.*'b'"):
         examples(["a", "rp_2", "b"])

@@ -206,7 +206,7 @@ def test_trajectory_on_the_command_line(vsacli: Any) -> None:
     assert (alone.code, named.code) == (0, 0)
     assert "joint_1" in alone.out
     assert "shoulder" in named.out
-    assert "trajectory rest-to-rest: 4001 steps, 4 s from t = 0 s" in named.out
+    assert "trajectory rest-to-rest: 4001 samples, 4 s from t = 0 s" in named.out
 
 
 def test_lists_beside_names_need_the_robot(vsacli: Any) -> None:

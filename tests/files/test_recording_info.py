@@ -12,6 +12,7 @@ from samples.command_line import REPOSITORY, Outcome
 from samples.exports import EXPORTS, FIRST, motion, plain
 
 from vsacli import load_robot, load_trajectory
+from vsacli.files.info import render
 from vsacli.files.recordings import describe_recording
 
 Command = Callable[..., Outcome]
@@ -109,9 +110,9 @@ def test_stamps_that_go_back_are_told_with_their_line(tmp_path: Path) -> None:
     time, q = signal(100)
     time[60] = time[58]
     described = recording(tmp_path, table(time, a_pos=q))
-    assert described["warnings"][0].startswith(
-        "log.csv:62: the time does not increase: 0.116 s follows 0.118 s"
-    )
+    message = "log.csv:62: time must increase, but 0.116 s follows 0.118 s; sort the rows by time"
+    assert described["warnings"][0] == message
+    assert "100 rows, 0.198 s, 500 Hz\n" in render(described)
 
 
 def test_degrees_are_offered_and_never_taken(tmp_path: Path) -> None:

@@ -14,14 +14,17 @@ import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
 
 from vsacli.base.errors import InputError
+from vsacli.base.version import __version__
+from vsacli.files.examples import examples
 from vsacli.files.file_kinds import FileKind, recognize
+from vsacli.files.limits_of_motion import unattainable
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.trajectory.file import load_trajectory
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
 TRAJECTORIES = sorted((REPOSITORY / "trajectories").glob("*.yaml"))
 POLES = "format: vsacli-poles/1\njoints:\n  - {name: base, position: -20}\n"
-NO_ROBOT = "note: no usable robot is among the files, so joint names, units and limits are not checked"
+NO_ROBOT = "note: joint names, units and limits are not checked; give the robot file, too"
 
 
 def samples(path: Path, **changes: str) -> Path:
@@ -67,7 +70,7 @@ def test_each_kind_by_its_content(vsacli: Any, tmp_path: Path, feasible_result: 
     }
     done = vsacli("validate", *found)
     assert "arm: ok, robot vsa-3r, 3 joints\n" in done.out
-    assert "result: ok, result of vsa-3r, rest-to-rest, 401 steps, ok\n" in done.out
+    assert "result: ok, result of vsa-3r, rest-to-rest, 401 samples, ok\n" in done.out
     assert "tree: ok, URDF of r, 0 joints\n" in done.out
     assert "simulated: ok, simulation of vsa-3r, " in done.out
     assert "poles: no poles for shoulder, elbow; each joint needs them\n" in done.out
@@ -79,8 +82,8 @@ def test_tables(vsacli: Any, tmp_path: Path) -> None:
     spring = REPOSITORY / "robots" / "measured_spring.csv"
     done = vsacli("validate", "motion.csv", spring, ROBOT)
     assert done.code == 0
-    assert "motion.csv: ok, trajectory motion, 11 steps over 1 s\n" in done.out
-    assert "motion.csv: note: fits 1 of 1 robot: " in done.out
+    assert "motion.csv: ok, trajectory motion, 11 samples over 1 s\n" in done.out
+    assert f"motion.csv: note: fits {ROBOT}\n" in done.out
     assert f"{spring}: ok, spring of 41 rows\n" in done.out
 
 
@@ -98,10 +101,35 @@ def test_all_problems_of_all_files(vsacli: Any, tmp_path: Path) -> None:
     assert "unknown key 'mas'; did you mean 'mass'?" in lines[0]
     assert "duration: must be positive, not 0" in lines[2]
     assert lines[4] == (
-        "notes.txt:1: is no file of vsacli: a YAML file begins with `format:`, one of "
+        "notes.txt:1: expected a YAML file that begins with `format:`, one of "
         "vsacli-robot/1, vsacli-trajectory/1, vsacli-poles/1, vsacli-study/1, vsacli-columns/1"
     )
     assert lines[5] == "gone.csv: no such file"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name: a\njoints: []\n", "missing key 'format'; begin the file with `format: vsacli-robot/1`"),
+        (
+            "name: a\nposition: {}\n",
+            "missing key 'format'; begin the file with `format: vsacli-trajectory/1`",
+        ),
+        (
+            "name: a\n",
+            "missing key 'format'; begin the file with `format: vsacli-robot/1` (or vsacli-trajectory/1, "
+            "vsacli-poles/1, vsacli-study/1, vsacli-columns/1)",
+        ),
+        (
+            "format: vsacli-robot/2\n",
+            f"format: 'vsacli-robot/2' is newer than vsacli-robot/1, which vsacli {__version__} reads; "
+            "update vsacli",
+        ),
+    ],
+)
+def test_a_format_that_is_missing_or_newer(vsacli: Any, tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "a.yaml").write_text(text)
+    assert vsacli("validate", "a.yaml").out == f"a.yaml:1: {message}\n"
 
 
 def test_as_json(vsacli: Any, tmp_path: Path) -> None:
@@ -112,8 +140,8 @@ def test_as_json(vsacli: Any, tmp_path: Path) -> None:
     assert json.loads(done.out) == [
         {
             "file": "arm.yaml",
-            "line": None,
-            "message": "link of joint base: its mass is zero",
+            "line": 13,
+            "message": "joints.base.link.mass is zero; give the mass of the link, in kg",
             "severity": "warning",
         },
         {
@@ -239,3 +267,40 @@ def test_what_does_not_fit_any_robot_is_found_without_one(tmp_path: Path) -> Non
 
 def test_a_file_that_is_given_twice_is_checked_once(vsacli: Any) -> None:
     assert vsacli("validate", ROBOT, ROBOT).out.count("ok") == 1
+
+
+def test_a_catalog_is_recognized_by_its_columns(vsacli: Any, tmp_path: Path) -> None:
+    (tmp_path / "motors.csv").write_text("name,inertia,max_torque\na,1e-4,2\nb,2e-4,4\n")
+    assert recognize("motors.csv") is FileKind.CATALOG
+    assert vsacli("validate", "motors.csv").out == "motors.csv: ok, catalog of 2 motors\n"
+    (tmp_path / "bad.csv").write_text("name,inertia,max_torque\na,0,2\n")
+    assert vsacli("validate", "bad.csv").out == "bad.csv:2: inertia: must be positive, not 0\n"
+    refused = vsacli("invdyn", ROBOT, "motors.csv")
+    assert (refused.code, refused.err.startswith("motors.csv: is a motor catalog, but TRAJECTORY")) == (
+        2,
+        True,
+    )
+    assert "vsacli size ROBOT TRAJECTORY --catalog motors.csv" in vsacli("info", "motors.csv").err
+
+
+def test_a_motion_beyond_its_robot_is_noted(vsacli: Any, tmp_path: Path) -> None:
+    edited(REST_TO_REST, tmp_path / "move.yaml", ("start: 850", "start: 700"))
+    limits = "limits: {position: [0.5, 2]}\n    actuator:"
+    text = Path(ROBOT).read_text().replace("actuator:", limits, 1)
+    (tmp_path / "arm.yaml").write_text(text)
+    done = vsacli("validate", "arm.yaml", "move.yaml")
+    advice = "check it with vsacli check-feasibility"
+    assert done.code == 0
+    assert done.out.splitlines()[2:] == [
+        "move.yaml: note: position of base is 0 rad at t = 0.000 s, outside limits.position [0.5, 2] rad; "
+        f"{advice}",
+        "move.yaml: note: stiffness of base to elbow is 700 N m/rad at its lowest, below the minimum of "
+        f"800 N m/rad without load; {advice}",
+        "move.yaml: note: fits arm.yaml",
+    ]
+
+
+@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+def test_nothing_is_noted_of_bundled_motions(example: Any) -> None:
+    for each in example.trajectories:
+        assert list(unattainable(example.robot, load_trajectory(each.path, example.robot))) == []

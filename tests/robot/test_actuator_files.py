@@ -170,14 +170,15 @@ def test_low_degrees_suffice_if_all_joints_are_rigid(degree: int) -> None:
     for others in ([RIGID, ELASTIC], [ELASTIC, ELASTIC]):
         [problem] = problems(trajectory, robot(*others), "", position)
         assert re.match(
-            r"move\.yaml:5: degree: must be odd, 7 to 15 \(the motion must be four times", problem
+            r"move\.yaml:5: degree: must be odd, from 7 to 15 \(derivatives up to the third must vanish",
+            problem,
         )
 
 
 def test_a_rigid_robot_needs_a_velocity_that_vanishes_at_the_ends() -> None:
     position = "position: {type: polynomial, degree: 1, start: 0, end: 0.4}\n"
     [problem] = problems(trajectory, robot(RIGID), "", position)
-    assert problem.startswith("move.yaml:5: degree: must be odd, 3 to 15 (the motion must be twice differ")
+    assert problem.startswith("move.yaml:5: degree: must be odd, from 3 to 15 (velocity must vanish at both")
 
 
 # Recorded trajectories
@@ -222,7 +223,7 @@ def test_a_table_without_stiffness_serves_a_robot_without_antagonistic_joints() 
     assert found.warnings == (f"dq, ddq, d3q, d4q come from a C6 spline through q; {FEW}",)
     assert inverse_dynamics(of, found).report.verdict == "ok"
     [problem] = problems(load_trajectory, "move.csv", robot(RIGID, ANTAGONISTIC))
-    assert problem.startswith("move.csv:1: there is no column b.stiffness; a trajectory in YAML")
+    assert problem.startswith("move.csv:1: the column b.stiffness is missing; a YAML trajectory")
 
 
 # From Python

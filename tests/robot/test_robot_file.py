@@ -248,8 +248,9 @@ def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
 def test_implausible_physics_is_a_warning(load):
     robot = load(TEXT.replace("zz: 0.2", "zz: 0.5").replace("mass: 1,", "mass: 0,"))
     assert robot.warnings == (
-        "link of joint swing: its inertia breaks the triangle inequality: 0.5 > 0.1 + 0.2 by 0.2 kg m^2",
-        "link of joint slide: its mass is zero",
+        "rig.yaml:11: joints.swing.link.inertia: zz = 0.5 kg m^2 exceeds xx + yy = 0.3 kg m^2 by 0.2 kg m^2, "
+        "which no rigid body allows; check the entries",
+        "rig.yaml:21: joints.slide.link.mass is zero; give the mass of the link, in kg",
     )
 
 
@@ -271,20 +272,45 @@ def test_table_one_of_the_paper():
 def test_the_shipped_robots_give_no_warnings_but_those_that_were_published(path):
     published = {
         "puma_560": (
-            "link of joint waist: its mass is zero",
-            "link of joint waist: its inertia breaks the triangle inequality: 0.35 > 0 + 0 by 0.35 kg m^2",
-            "link of joint elbow: its inertia breaks the triangle inequality: 0.086 > 0.0125 + 0.066 by "
-            "0.0075 kg m^2",
+            "joints.waist.link.mass is zero; give the mass of the link, in kg",
+            "joints.waist.link.inertia: yy = 0.35 kg m^2 exceeds xx + zz = 0 kg m^2 by 0.35 kg m^2, which no "
+            "rigid body allows; check the entries",
+            "joints.elbow.link.inertia: yy = 0.086 kg m^2 exceeds xx + zz = 0.0785 kg m^2 by 0.0075 kg m^2, "
+            "which no rigid body allows; check the entries",
         ),
         "panda_7r_manufacturer": (
-            "link of joint joint4: its inertia breaks the triangle inequality: 0.01274 > 0.00368 + 0.007956 "
-            "by 0.001101 kg m^2",
+            "joints.joint4.link.inertia: the largest principal moment 0.01274 kg m^2 exceeds the sum of the "
+            "others 0.01164 kg m^2 by 0.001101 kg m^2, which no rigid body allows; check the entries",
         ),
     }
     robot = load_robot(path)
-    warnings = [
-        f"link of joint {joint.name}: {warning}"
-        for joint in robot.joints
-        for warning in joint.link.warnings()
-    ]
-    assert tuple(warnings) == published.get(path.stem, ())
+    warnings = [each for each in robot.located_warnings if each.message.startswith("joints.")]
+    assert tuple(each.message for each in warnings) == published.get(path.stem, ())
+    assert all((each.file, each.line > 0) == (str(path), True) for each in warnings)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "inertia: {xx: 0.1, yy: 0.2, zz: 0.2}",
+            "inertia: {xx: 0, yy: 0, zz: 0}",
+            "rig.yaml:11: joints.swing.link.inertia is zero; give the inertia of the link about its center "
+            "of mass, in kg m^2",
+        ),
+        (
+            "inertia: {xx: 0.1, yy: 0.2, zz: 0.2}",
+            "inertia: {xx: 0.1, yy: 0.1, zz: 0.3, xy: 0.05}",
+            "rig.yaml:11: joints.swing.link.inertia: the largest principal moment 0.3 kg m^2 exceeds",
+        ),
+    ],
+)
+def test_links_that_no_body_is_like_have_a_line(load, old, new, message):
+    assert old in TEXT
+    (found,) = load(TEXT.replace(old, new)).warnings
+    assert found.startswith(message)
+
+
+def test_a_mass_that_was_changed_to_zero_has_no_line(load):
+    robot = load(TEXT).replace("joints.swing.link.mass", 0)
+    assert robot.warnings == ("joints.swing.link.mass is zero; give the mass of the link, in kg",)

@@ -108,7 +108,12 @@ def test_branches_are_no_chain(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
-    [(URDF, "expected an SRDF"), ("<robot/>", "there is no <group>"), ("<srdf/>", "expected an SRDF")],
+    [
+        (URDF, "expected an SRDF"),
+        ("<robot/>", "there is no <group>"),
+        ("<srdf/>", "expected an SRDF"),
+        ("a: 1", "arm.srdf: is a YAML file, expected an SRDF"),
+    ],
 )
 def test_what_is_no_srdf(tmp_path, text, sentence):
     urdf, srdf = write(tmp_path / "arm.urdf", URDF), write(tmp_path / "arm.srdf", text)

@@ -113,11 +113,11 @@ def test_the_only_end_is_the_tip(urdf):
     [
         (None, None, "several links below 'world' could be the end effector; choose one with --tip: "
          "torso (1 joint), hand (3 joints), head (2 joints), left (4 joints), right (4 joints)"),
-        (None, "hnd", "tip: there is no link 'hnd'; did you mean 'hand'?"),
-        ("torzo", "hand", "base: there is no link 'torzo'; did you mean 'torso'?"),
+        (None, "hnd", "--tip: there is no link 'hnd'; did you mean 'hand'?"),
+        ("torzo", "hand", "--base: there is no link 'torzo'; did you mean 'torso'?"),
         ("head", "hand", "the link 'hand' does not hang below 'head'"),
         ("hand", "torso", "the link 'torso' does not hang below 'hand'"),
-        ("hand", "hand", "no joint moves between 'hand' and 'hand'"),
+        ("hand", "hand", "--base and --tip are the same link, 'hand'; choose a base nearer to the root"),
         ("head", None, "no joint moves below 'head'"),
         (None, "right", "13: joint 'open_right' follows 'open_left' (<mimic>)"),
         (None, "left", "13: joint 'open_right' outside the chain follows 'open_left' on it (<mimic>)"),

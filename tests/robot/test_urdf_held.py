@@ -117,18 +117,19 @@ def test_a_joint_whose_leader_is_missing_stands_as_if_that_stood_at_zero(urdf):
 @pytest.mark.parametrize(
     ("hold", "reason"),
     [
-        ({"lft": 0}, "there is no joint 'lft'; did you mean 'left'?"),
+        ({"lft": 0}, "there is no joint 'lft' outside the chain; did you mean 'left'?"),
         ({"wrist": 0}, "'wrist' belongs to the chain, where it moves"),
         ({"bend": 0}, "'bend' follows 'left' (<mimic>); hold that one"),
         ({"drawer": 0}, "'drawer' is neither outside the chain nor below its base, so that it has no effect"),
-        ({"left": "1 deg"}, "'left': expected a number in m, found '1 deg': degrees are for angles only"),
-        ({"left": "a"}, "'left': expected a number in m, found 'a': unknown word 'a'"),
-        ({"left": math.nan}, "'left': expected a number in m, found 'nan': only finite numbers can be used"),
-        ({"left": True}, "'left': expected a number in m, found 'True'"),
+        ({"left": "1 deg"}, "expected a number in m, found '1 deg': degrees are for angles only"),
+        ({"left": "a"}, "expected a number in m, found 'a': unknown word 'a'"),
+        ({"left": math.nan}, "expected a number in m, found 'nan': only finite numbers can be used"),
+        ({"left": True}, "expected a number in m, found 'True'"),
     ],
 )
 def test_what_cannot_be_held(urdf, hold, reason):
-    with pytest.raises(InputError, match=f"^arm.urdf: hold: {re.escape(reason)}"):
+    ((name, value),) = hold.items()
+    with pytest.raises(InputError, match=f"^arm.urdf: --hold {name}={value}: {re.escape(reason)}"):
         import_urdf(urdf(TREE), base="torso", tip="hand", hold=hold)
 
 

@@ -111,8 +111,8 @@ def test_a_robot_without_masses_is_told_in_one_line(tmp_path):
         write(tmp_path / "arm.urdf", text.replace('name="c">', f'name="c">{link("x")[15:-7]}'))
     )
     assert [warning for warning in some.robot.warnings if "link" in warning] == [
-        "link of joint one: its mass is zero",
-        "link of joint one: its inertia is zero",
+        "joints.one.link: mass and inertia are zero; give those of the link, the inertia about its center of "
+        "mass"
     ]
 
 

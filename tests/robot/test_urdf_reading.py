@@ -31,7 +31,7 @@ FILES = {
     "not closed": ("<robot>\n<link>", ["2: not valid XML at column 7: no element found"]),
     "binary": ("\0\1\2\3", ["1: not valid XML at column 1: not well-formed (invalid token)"]),
     "text": ("hello", ["1: not valid XML at column 1: syntax error"]),
-    "YAML": ("format: vsacli-robot/1", ["1: not valid XML"]),
+    "YAML": ("format: vsacli-robot/1", [": is a YAML file, expected a URDF (XML)"]),
     "other XML": ("<mujoco/>", ["1: expected a URDF, which begins with <robot>, found <mujoco>"]),
     "xacro": (
         '<robot>\n<xacro:arm name="x"/></robot>',

@@ -20,7 +20,7 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.plausibility import implausible
+from vsacli.robot.plausibility import strange_of_robot
 from vsacli.robot.urdf import Conversion, import_urdf
 from vsacli.robot.urdf.link_tree import MOVING, Urdf, below
 from vsacli.robot.urdf.reader import read_urdf
@@ -71,7 +71,7 @@ def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None =
     np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
     assert conversion.residual.position < BOUND
     # The rules on plausible numbers find nothing, even if the placeholders are taken for real.
-    assert implausible(dataclasses.replace(robot, placeholder=False).checked, ()) == ()
+    assert strange_of_robot(dataclasses.replace(robot, placeholder=False).checked, ()) == frozenset()
 
 
 def ends(urdf: Urdf) -> Iterator[str]:

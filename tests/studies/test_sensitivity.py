@@ -12,6 +12,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
+from vsacli.base.errors import InputError
 from vsacli.dynamics.inverse import compute_block
 from vsacli.results.charts.ranking import Ranking
 from vsacli.results.plots import ranking_figure
@@ -154,6 +155,26 @@ BAD = {
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
     "bad.yaml:2: no parameter of the robot matches": ["--tolerances", "bad.yaml"],
 }
+
+
+@pytest.mark.parametrize(
+    ("pattern", "hint"),
+    [
+        ("joints.*.masss", "did you mean 'joints.*.link.mass'?"),
+        ("k", "did you mean 'joints.*.actuator.spring.k'?"),
+        ("joints.elbw.link.mass", "did you mean 'joints.elbow.link.mass'?"),
+        ("joints.*.inert", "did you mean 'joints.*.actuator.motor.inertia'?"),
+        (
+            "name",
+            "valid: gravity.*, base.*, tool.*, joints.*.dh.*, joints.*.link.*, joints.*.damping, "
+            "joints.*.actuator.*",
+        ),
+    ],
+)
+def test_a_pattern_that_matches_nothing(pattern, hint):
+    with pytest.raises(InputError) as caught:
+        parameters(load_robot(ROBOT), [pattern])
+    assert str(caught.value) == f"no parameter of the robot matches {pattern!r}; {hint}"
 
 
 @pytest.mark.parametrize("sentence", BAD)

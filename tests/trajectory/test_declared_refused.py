@@ -57,7 +57,7 @@ CASES = {
     ),
     "too low a degree": (
         LASTING + VIA.replace("7", "5") + FIRM,
-        "7: degree: must be odd, 7 to 9 (the motion must be four times differentiable, so all derivatives",
+        "7: degree: must be odd, from 7 to 9 (derivatives up to the third must vanish at both ends), not ",
     ),
     "too few times": (
         HEAD + VIA + "  times: [0, 1]\n" + FIRM,
@@ -204,7 +204,7 @@ CASES = {
     ),
     "too low a degree of steps": (
         LASTING + STANDING + STEPS.replace("5\n", "3\n") + "  times: [1, 2]\n  transition: 1\n",
-        "8: degree: must be odd, 5 to 15 (it must be twice continuously differentiable, so two derivatives",
+        "8: degree: must be odd, from 5 to 15 (two derivatives must vanish where a change begins), not ",
     ),
     "a level that is not positive": (
         LASTING + STANDING + STEPS.replace("[900,", "[0,") + "  times: [1, 2]\n  transition: 1\n",

@@ -220,7 +220,9 @@ def test_a_table_without_any_known_column_is_one_problem(tmp_path):
     with pytest.raises(InputError) as caught:
         load_trajectory(tmp_path / "log.csv", ROBOT)
     (problem,) = caught.value.problems
-    assert problem.message.startswith("has no column of a trajectory (time, shoulder.q, ...); `vsacli info ")
+    assert problem.message.startswith(
+        "is not a trajectory: expected columns such as time, shoulder.q; see vsacli info "
+    )
 
 
 def test_an_editor_knows_what_may_be_said_of_columns():

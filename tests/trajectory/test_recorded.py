@@ -10,7 +10,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.trajectory.fits import FitChoice
-from vsacli.trajectory.recorded.columns import RATE_INSTEAD
+from vsacli.trajectory.recorded.header_problems import RATE_INSTEAD
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})
@@ -106,26 +106,82 @@ def test_all_problems_of_a_header_at_once(csv):
         (1, "unknown column 'elbow_q'; did you mean 'elbow.q'?"),
         (1, "unknown column 'bsae.dq'; did you mean 'base.dq'?"),
         (1, "unknown column 't'; did you mean 'time'?"),
-        (1, f"there is no column 'time'; {RATE_INSTEAD}"),
-        (1, "there is no column elbow.q"),
-        (1, "there is no column base.ddq; ddq is given for all joints or for none"),
+        (1, "the column elbow.dq is missing; dq is given for all joints or for none"),
+        (1, "the column base.ddq is missing; ddq is given for all joints or for none"),
     ]
+
+
+def test_missing_times_may_follow_from_a_rate(csv):
+    content = columns(*by_joint("q", "stiffness"))
+    del content["time"]
+    assert problems(csv(content)) == [(1, f"there is no column 'time'; {RATE_INSTEAD}")]
+
+
+def test_unknown_and_missing_columns_are_one_problem(csv):
+    (found,) = problems(csv(columns("base.q", "elbow.pos", *by_joint("stiffness"))))
+    assert found[1].startswith(
+        "the column elbow.q is missing (position of joint elbow); unknown column 'elbow.pos'; if it has "
+    )
+
+
+def test_a_missing_column_is_named_with_its_meaning(csv):
+    (found,) = problems(csv(columns("base.q", *by_joint("stiffness"))))
+    assert found[1].startswith(
+        "the column elbow.q is missing (position of joint elbow); columns: time, base.q, base.stiffness, "
+        "elbow.stiffness; if it has another name, use a trajectory file as printed by vsacli info "
+    )
+
+
+def test_columns_of_the_same_joint_are_not_proposed_for_each_other(csv):
+    further = [
+        f"{joint}.{name}_{motor}"
+        for joint in ("base", "elbow")
+        for name in ("theta", "tau")
+        for motor in (1, 2)
+    ]
+    (found,) = problems(csv(columns(*by_joint("q", "stiffness"), *further)))
+    assert found[1].startswith(
+        "8 unknown columns: base.theta_1, base.theta_2, base.tau_1, ...; to leave columns out"
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (
+            ["base.q", "elbwo.q", "base.stiffness", "elbwo.stiffness"],
+            "2 unknown columns: elbwo.q, elbwo.stiffness; did you mean elbow.q, elbow.stiffness?",
+        ),
+        (
+            ["base.q", "elbow.q", "base.stifness", "elbow.stifness"],
+            "2 unknown columns: base.stifness, elbow.stifness; did you mean base.stiffness, elbow.stiffness?",
+        ),
+        (
+            ["base.q", "elbow.q (deg)", "base.stiffness", "elbow.stiffness"],
+            "'elbow.q (deg)': units are written in square brackets, elbow.q [deg]",
+        ),
+    ],
+)
+def test_one_mistake_is_one_problem(csv, names, message):
+    assert problems(csv(columns(*names))) == [(1, message)]
 
 
 def test_numbers_of_joints_start_at_one(csv):
     found = problems(csv(columns("q0", "q1", "stiffness0", "stiffness1")))
     assert found[0][1] == "unknown column 'stiffness0'; did you mean 'stiffness2'?"
-    assert found[1][1].startswith("unknown column 'q0'; `vsacli info ")
-    assert (1, "there is no column q2") in found
-    assert (1, "there is no column stiffness2") in found
+    assert found[1][1].startswith(
+        "the column q2 is missing (position of joint elbow); unknown column 'q0'; if it has another name"
+    )
+    assert len(found) == 2
 
 
 def test_absent_signal_is_named_by_joint(csv):
-    assert problems(csv(columns(*by_joint("q")))) == [
+    path = csv(columns(*by_joint("q")))
+    assert problems(path) == [
         (
             1,
-            "there are no columns base.stiffness, elbow.stiffness;"
-            " a trajectory in YAML can take the motion from here and set the stiffness itself",
+            "the columns base.stiffness, elbow.stiffness are missing; a YAML trajectory can combine the "
+            f"motion of this file (position: {{type: csv, file: {path}}}) with a stiffness",
         )
     ]
 
@@ -142,11 +198,17 @@ def test_result_variables_that_are_no_input_are_refused(csv):
     assert found[0][1].startswith("unknown column 'base.tau_motor_1'")
 
 
-@pytest.mark.parametrize(("again", "text"), [(0.3, "0.3 s follows 0.3 s"), (0.1, "0.1 s follows 0.3 s")])
+@pytest.mark.parametrize(
+    ("again", "text"),
+    [
+        (0.3, "0.3 s appears twice; delete one of the samples"),
+        (0.1, "0.1 s follows 0.3 s; sort the samples by time"),
+    ],
+)
 def test_time_that_does_not_increase(csv, again, text):
     time = [0.0, 0.1, 0.2, 0.3, again, 0.4, 0.5, 0.6]
     found = problems(csv(columns(*by_joint("q", "stiffness"), time=time)))
-    assert found == [(6, f"time must increase strictly, but {text}")]
+    assert found == [(6, f"time must increase, but {text}")]
 
 
 def test_all_problems_of_the_rows_at_once(csv):
@@ -154,7 +216,7 @@ def test_all_problems_of_the_rows_at_once(csv):
     content["elbow.stiffness"][3:5] = -1.0
     content["base.stiffness"][0] = 0.0
     assert problems(csv(content)) == [
-        (6, "time must increase strictly, but 0.25 s follows 0.3 s"),
+        (6, "time must increase, but 0.25 s follows 0.3 s; sort the samples by time"),
         (2, "base.stiffness must be positive, not 0 (t = 0.000 s)"),
         (5, "elbow.stiffness must be positive, not -1 (t = 0.300 s; 2 such samples)"),
     ]
@@ -162,10 +224,7 @@ def test_all_problems_of_the_rows_at_once(csv):
 
 def test_too_few_rows(csv):
     found = problems(csv(columns(*by_joint("q", "stiffness"), time=TIME[:3])))
-    assert found == [
-        (0, "q needs at least 8 samples for a C6 spline, not 3"),
-        (0, "stiffness needs at least 6 samples for a C4 spline, not 3"),
-    ]
+    assert found == [(0, "q has 3 samples; a trajectory needs at least 8")]
 
 
 def recording(csv, time, name):

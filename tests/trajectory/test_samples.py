@@ -9,7 +9,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, FitChoice
 from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays
-from vsacli.trajectory.recorded.problems import time_problems, value_problems
+from vsacli.trajectory.recorded.problems import sample_problems, time_problems
 from vsacli.trajectory.recorded.samples import SampledProfile
 
 EPS = np.finfo(float).eps
@@ -124,27 +124,25 @@ def test_single_missing_derivative_is_named():
 def test_fewest_samples_give_one_polynomial(signal, count):
     time = np.linspace(0, 1, count)
     few = profile(signal, time, 2 + sine(time, 0))
-    assert list(value_problems(few.record)) == []
+    assert list(sample_problems([few.record])) == []
     np.testing.assert_array_equal(few.breakpoints, [0, 1])
     # rounding of a Taylor polynomial over the whole span, with the condition of interpolation at 8 samples
     np.testing.assert_allclose(few.at(time)[0, 0], 2 + sine(time, 0)[:, 0], rtol=0, atol=1000 * EPS)
 
     too_few = record(signal, time[1:], sine(time, 0)[1:] + 2)
-    problems = [str(problem) for problem in value_problems(too_few)]
-    degree = signal.spline_degree
-    assert problems == [
-        f"{signal.names[0]} needs at least {count} samples for a C{degree - 1} spline, not {count - 1}"
-    ]
+    problems = [str(problem) for problem in sample_problems([too_few])]
+    words = f"has {count - 1} samples; a trajectory needs at least {count}"
+    assert problems == [f"{signal.names[0]} {words}"]
 
 
-def test_value_problems_name_the_first_sample_of_each_column():
+def test_problems_of_values_name_the_first_sample_of_each_column():
     time = np.linspace(0, 0.7, 8)
     values = np.full((8, 2), 800.0)
     values[3:5, 1] = 0
     values[6, 0] = np.nan
     rates = np.zeros((8, 2))
     rates[2, 0] = np.inf
-    problems = [str(problem) for problem in value_problems(record(STIFFNESS, time, values, rates))]
+    problems = [str(problem) for problem in sample_problems([record(STIFFNESS, time, values, rates)])]
     assert problems == [
         "stiffness[6, 0] must be finite, not nan (t = 0.600 s)",
         "dstiffness[2, 0] must be finite, not inf (t = 0.200 s)",
@@ -154,14 +152,14 @@ def test_value_problems_name_the_first_sample_of_each_column():
 
 def test_positions_may_be_negative():
     time = np.linspace(0, 1, 8)
-    assert list(value_problems(record(POSITION, time, -np.ones((8, 1))))) == []
+    assert list(sample_problems([record(POSITION, time, -np.ones((8, 1)))])) == []
 
 
 @pytest.mark.parametrize(
     ("times", "message"),
     [
-        ([0, 1, 1, 0], "time[2] must increase strictly, but 1.0 s follows 1.0 s"),
-        ([0, 2, 1], "time[2] must increase strictly, but 1.0 s follows 2.0 s"),
+        ([0, 1, 1, 0], "time[2] must increase, but 1.0 s appears twice; delete one of the samples"),
+        ([0, 2, 1], "time[2] must increase, but 1.0 s follows 2.0 s; sort the samples by time"),
         ([0, 1, np.nan, 0], "time[2] must be finite, not nan"),
         ([-np.inf, 1], "time[0] must be finite, not -inf"),
     ],
@@ -221,7 +219,7 @@ def test_no_record_breaks_a_fit(seed, count, size, scale, spread, decimals, meth
     time = scale * np.cumsum(10.0 ** (spread * rng.uniform(-1, 0, count)))
     values = size * np.round(rng.normal(size=(count, 2)), decimals)
     samples = record(POSITION, time, values, size * rng.normal(size=(count, 2)))
-    if not [*time_problems(time), *value_problems(samples)]:
+    if not [*time_problems(time), *sample_problems([samples])]:
         found = SampledProfile.of(samples, FitChoice(method))
         with np.errstate(over="ignore", invalid="ignore"):  # 1e99 in 1e-29 s, to the fourth power
             assert found.samples(0, count, samples.time).shape == (5, 2, count)

@@ -111,7 +111,7 @@ def test_slow_down_of_a_file_stretches_all_of_it(tmp_path, source, rate):
 
 @pytest.mark.parametrize(
     ("factor", "problem"),
-    [("0", "slow_down: must be positive"), ("1e9", "duration times rate gives 1e\\+12 steps")],
+    [("0", "slow_down: must be positive"), ("1e9", "times rate 1000 Hz gives 1e\\+12 samples")],
 )
 def test_impossible_slow_downs_are_refused_with_their_line(tmp_path, factor, problem):
     (tmp_path / "slower.yaml").write_text(

@@ -45,7 +45,7 @@ def test_resampled_times_keep_their_rate_and_their_ends():
     # stamps since 1970 are multiples of 2.4e-7 s
     np.testing.assert_allclose(np.diff(whole), 0.002, rtol=0, atol=5e-7)
     assert ResampledTimes(2.0, 2.25, 10.0).notes == (
-        "the rate is 8 per second, not 10: whole steps in 0.25 s",
+        "the rate is 8 Hz, not 10 Hz, for a whole number of intervals in 0.25 s",
     )
     with pytest.raises(InputError, match="duration and rate must be positive"):
         ResampledTimes(0.0, 1.0, 0.0)
@@ -54,13 +54,15 @@ def test_resampled_times_keep_their_rate_and_their_ends():
 def test_rate_that_does_not_fit_is_noted():
     assert UniformTimes(4.0, 1000.0).notes == ()
     assert UniformTimes(0.3, 1000.0).notes == ()  # 0.3 * 1000 is a whole number but for rounding
-    assert UniformTimes(0.25, 10.0).notes == ("the rate is 8 per second, not 10: whole steps in 0.25 s",)
+    assert UniformTimes(0.25, 10.0).notes == (
+        "the rate is 8 Hz, not 10 Hz, for a whole number of intervals in 0.25 s",
+    )
 
 
 def test_there_is_at_least_one_step():
     times = UniformTimes(0.01, 10.0)
     np.testing.assert_array_equal(times.block(0, 2), [0.0, 0.01])
-    assert times.notes == ("the rate is 100 per second, not 10: whole steps in 0.01 s",)
+    assert times.notes == ("the rate is 100 Hz, not 10 Hz, for a whole number of intervals in 0.01 s",)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +74,7 @@ def test_duration_and_rate_are_positive(duration, rate):
 
 
 def test_number_of_steps_is_limited():
-    with pytest.raises(InputError, match=r"gives 1e\+300 steps; at most 1e\+09"):
+    with pytest.raises(InputError, match=r"gives 1e\+300 samples; at most 1e\+09"):
         UniformTimes(1e297, 1e3)
 
 

@@ -140,7 +140,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
         ),
         (
             "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [0, 0, 0, 0, 0, 0]}",
-            "move.yaml:7: degree: must be odd, 3 to 15 (the wrench must be twice differentiable, so its rate",
+            "move.yaml:7: degree: must be odd, from 3 to 15 (its rate must vanish at both ends",
         ),
         (
             "{frame: base, type: polynomial, degree: 3, start: [0, 0], end: [0, 0, 0, 0, 0, 0]}",
@@ -167,10 +167,10 @@ def test_duration_beside_a_recorded_wrench_is_refused(load) -> None:
 @pytest.mark.parametrize(
     ("columns", "problem"),
     [
-        (["fx", "fy", "mz"], "push.csv:1: there are no columns fz, mx, my"),
+        (["fx", "fy", "mz"], "push.csv:1: the columns fz, mx, my are missing; columns: time,"),
         (
             [*WRENCH_AXES, "dfx"],
-            "push.csv:1: there are no columns dfy, dfz, dmx, dmy, dmz; dwrench is given for all axes",
+            "push.csv:1: the columns dfy, dfz, dmx, dmy, dmz are missing; dwrench is given for all axes",
         ),
         ([*WRENCH_AXES[:5], "m_z"], "push.csv:1: unknown column 'm_z'; did you mean 'mz'?"),
     ],

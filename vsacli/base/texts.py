@@ -64,6 +64,11 @@ def joined(words: Iterable[str], conjunction: str = "and") -> str:
     return f"{', '.join(others)} {conjunction} {last}" if others else last
 
 
+def listed(names: Sequence[str], most: int) -> str:
+    """Return names separated by commas; further ones than `most` are shown as three dots."""
+    return ", ".join([*names[:most], *(["..."] if len(names) > most else [])])
+
+
 def verdict_words(verdict: str) -> str:
     """Return a verdict as the first line of a report shows it."""
     return verdict.upper().replace("_", " ")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import wraps
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -15,7 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.input_errors import naming_changes, naming_kind
 from vsacli.cli.option_types import SEED, Whole, Words
 
 if TYPE_CHECKING:
@@ -142,19 +143,30 @@ class Inputs(NamedTuple):
         return [source.path for source in (*self.robot.sources, *self.trajectory.sources)]
 
 
-def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tuple[str, ...] = ()) -> Inputs:
+def load_inputs(
+    robot_path: str,
+    trajectory_path: str,
+    talk: Talk,
+    changes: tuple[str, ...] = (),
+    other_options: Mapping[str, str] = MappingProxyType({}),
+) -> Inputs:
     """Read and check both files, with the changes of `--set`.
+
+    Args:
+        robot_path: argument ROBOT.
+        trajectory_path: argument TRAJECTORY.
+        talk: prints details and progress.
+        changes: changes, as `--set` gives them.
+        other_options: other options from which changes were made, by path; see `naming_changes`.
 
     Raises:
         InputError: with every problem of the robot, or else of the trajectory; or a change that cannot be
             made.
     """
-    from vsacli.documents.reading import ChangeError
-
     if robot_path == trajectory_path == STANDARD:
         twice = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
         raise InputError.one(f"{twice}; give a file name for one of them")
-    with naming_option("--set", ChangeError):
+    with naming_changes(other_options):
         of_robot, of_trajectory = _divided(changes)
         robot = read_robot(robot_path, of_robot)
         trajectory = read_trajectory(trajectory_path, robot, of_trajectory, talk)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from vsacli.base.errors import InputError, InvalidRecordError, Problem, StorageError
@@ -35,6 +35,26 @@ def _named(option: str, problem: Problem) -> Problem:
     """Return a problem that names the option, once."""
     named = problem.message.startswith(option)
     return problem if named else problem._replace(message=f"{option}: {problem.message}")
+
+
+@contextmanager
+def naming_changes(others: Mapping[str, str]) -> Iterator[None]:
+    """Put `--set` before each error of a change, or the option from which the change was made.
+
+    Args:
+        others: other options, by the path that each of them changes, e.g. {"rate": "--rate"}.
+    """
+    from vsacli.documents.reading import ChangeError
+
+    try:
+        yield
+    except ChangeError as error:
+        named = []
+        for each in error.problems:
+            path, _, rest = each.message.partition(": ")
+            message = f"{others[path]}: {rest}" if path in others else f"--set: {each.message}"
+            named.append(each._replace(message=message))
+        raise InputError(named) from error
 
 
 _KINDS = {
@@ -88,6 +108,8 @@ def _advice(kind: str, argument: str, path: str, expected: tuple[str, ...]) -> s
         return "; are ROBOT and TRAJECTORY swapped?"
     if kind == "trajectory" and "result" in expected:
         return f"; compute one first: vsacli invdyn ROBOT {path}"
+    if kind == "motor catalog":
+        return "; vsacli size takes it as --catalog"
     return ""
 
 

@@ -101,7 +101,7 @@ def invdyn(
     if rate is not None:
         _check_one_rate(rate, changes)
         changes = (*changes, f"rate={rate!r}")
-    inputs = load_inputs(robot, trajectory, talk, changes)
+    inputs = load_inputs(robot, trajectory, talk, changes, {} if rate is None else {"rate": "--rate"})
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs

@@ -354,7 +354,7 @@ def is_recording(path: str) -> bool:
     from vsacli.files.file_kinds import FileKind, recognize
 
     try:
-        return recognize(path) in (FileKind.TABLE, FileKind.TRAJECTORY)
+        return recognize(path) in (FileKind.TABLE, FileKind.CATALOG, FileKind.TRAJECTORY)
     except (InputError, StorageError):
         return False  # readers of results and simulations report its problems
 

@@ -7,14 +7,14 @@ The words of a path are keys of mappings. An entry of a list is given by its ind
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.documents import tree
 from vsacli.documents.field_kinds import Kind, declared, on_one_line
-from vsacli.documents.nested import Pair, scope_inside
+from vsacli.documents.nested import Items, Pair, scope_inside
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import Scope
@@ -77,6 +77,18 @@ def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputEr
 
 def _joined(place: Iterable[str]) -> str:
     return ".".join(place)
+
+
+def declared_paths(cls: type) -> Iterator[str]:
+    """Yield the paths to all fields of a record class; `*` stands for the entries of lists of records.
+
+    Pairs of sides have none, since a path without a side changes both.
+    """
+    for name, (field, _) in declared(cls).items():
+        yield name
+        place = f"{name}.{ALL}" if isinstance(field.kind, Items) else name
+        for inner in field.kind.records.values():
+            yield from (f"{place}.{path}" for path in declared_paths(inner))
 
 
 def replace(

@@ -128,7 +128,7 @@ def _guess(measured: Measured, other: OtherUnit) -> str:
     meant = f"did you mean {measured.value:.6g} {other.unit}"
     if measured.unit in ANGLES and other.unit == "deg":
         return f"{meant}?"
-    return f"{meant}, which is {measured.value * other.factor:.6g} {measured.unit}?"
+    return f"{meant}, which is {measured.value * other.factor:.4g} {measured.unit}?"
 
 
 def _of_unit(path: NumberPath, other: OtherUnit | None) -> NumberPath:

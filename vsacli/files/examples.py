@@ -10,7 +10,7 @@ from importlib.resources import files
 from itertools import takewhile
 from pathlib import Path
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.outputs import Outputs
 from vsacli.robot.file import load_robot
@@ -65,6 +65,9 @@ class Example:
 def examples(names: Iterable[str] = ()) -> list[Example]:
     """Return the robots with these names, by default all, in alphabetical order.
 
+    Args:
+        names: names of robots, or paths such as `robots/puma_560.yaml`.
+
     Raises:
         InputError: for each unknown name, with the nearest valid one.
     """
@@ -73,12 +76,16 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
         path.stem: Example(path, tuple(each for each in trajectories if path.stem in each.robots))
         for path in sorted((examples_root() / "robots").rglob("*.yaml"), key=lambda path: path.stem)
     }
-    wanted = set(names)
+    wanted = {name if name in found else Path(name).stem for name in names}
     if unknown := sorted(wanted - found.keys()):
-        raise InputError(
-            Problem("", 0, f"no example is called {name!r}{did_you_mean(name, found)}") for name in unknown
-        )
+        raise InputError(Problem("", 0, _unknown(name, found)) for name in unknown)
     return [example for name, example in found.items() if not wanted or name in wanted]
+
+
+def _unknown(name: str, found: Iterable[str]) -> str:
+    near = nearest(name, found)
+    hint = "vsacli examples lists them" if near is None else f"did you mean {near!r}?"
+    return f"no example is called {name!r}; {hint}"
 
 
 def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) -> list[Path]:

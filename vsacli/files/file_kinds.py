@@ -14,6 +14,7 @@ from typing import Any
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
 from vsacli.base.storage import place_of
+from vsacli.base.version import __version__
 from vsacli.control import poles
 from vsacli.documents import columns_file, tree
 from vsacli.documents.json_schema import json_schema
@@ -38,6 +39,7 @@ class FileKind(enum.StrEnum):
     TRAJECTORY = "trajectory"
     POLES = "poles"
     TABLE = "table"
+    CATALOG = "motor catalog"
     URDF = "urdf"
     RESULT = "result"
     SIMULATION = "simulation"
@@ -75,6 +77,9 @@ DOCUMENTS = {
 """Kinds of documents, by name."""
 
 
+CATALOG_COLUMNS = {"name", "inertia"}
+"""Required columns of a catalog of motors."""
+
 _DOCUMENT_KINDS = {document.format: FileKind(word) for word, document in DOCUMENTS.items()}
 _BEGINNING_BYTES = 64
 
@@ -92,7 +97,7 @@ def recognize(path: str | os.PathLike[str]) -> FileKind:
     if start.startswith(HDF5_SIGNATURE) or suffix == ".h5":
         return _stored_kind(path)
     if is_table(path):
-        return FileKind.TABLE
+        return FileKind.CATALOG if _is_catalog(path) else FileKind.TABLE
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
         return FileKind.URDF
     with recognizing_other_formats(path):
@@ -105,6 +110,17 @@ def _beginning(path: str | os.PathLike[str]) -> bytes:
             return file.read(_BEGINNING_BYTES)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror}", os.fspath(path)) from None
+
+
+def _is_catalog(path: str | os.PathLike[str]) -> bool:
+    """Return whether a table has the columns that a motor of a catalog must have."""
+    from vsacli.documents.csv_file import read_header, split_heading
+
+    try:
+        names = {split_heading(column)[0] for column in read_header(path).columns}
+    except InputError:  # reported by the reader of tables
+        return False
+    return names >= CATALOG_COLUMNS
 
 
 def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
@@ -129,17 +145,37 @@ def _document_kind(path: str | os.PathLike[str]) -> FileKind:
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    formats = ", ".join(_DOCUMENT_KINDS)
-    node = root.entries.get("format") if isinstance(root, tree.Mapping) else None
+    if not isinstance(root, tree.Mapping):
+        formats = ", ".join(_DOCUMENT_KINDS)
+        problems.fail(root.line, f"expected a YAML file that begins with `format:`, one of {formats}")
+    node = root.entries.get("format")
     if node is None:
-        problems.fail(root.line, f"is no file of vsacli: a YAML file begins with `format:`, one of {formats}")
+        problems.fail(root.line, f"missing key 'format'; {_beginning_of(root)}")
     word = node.text if isinstance(node, tree.Scalar) else ""
     if word not in _DOCUMENT_KINDS:
-        problems.fail(node.line, f"format: expected one of {formats}, found {node}{_hint(word)}")
+        problems.fail(node.line, f"format: {_unknown_format(word, node)}")
     return _DOCUMENT_KINDS[word]
 
 
-def _hint(word: str) -> str:
-    """Return a clause with the nearest format; empty if none is close."""
+_KEYS = {"joints": "robot", "position": "trajectory"}
+"""Keys by which a document without `format` is recognized, and its name."""
+
+
+def _beginning_of(root: tree.Mapping) -> str:
+    """Return what to write at the beginning of a document without `format`, guessed by its keys."""
+    guessed = next((DOCUMENTS[word].format for key, word in _KEYS.items() if key in root.entries), None)
+    if guessed is not None:
+        return f"begin the file with `format: {guessed}`"
+    first, *others = _DOCUMENT_KINDS
+    return f"begin the file with `format: {first}` (or {', '.join(others)})"
+
+
+def _unknown_format(word: str, node: tree.Node) -> str:
+    """Return the problem of a format: it is newer than this program, or mistyped."""
+    name, _, version = word.partition("/")
+    known = next((each for each in _DOCUMENT_KINDS if each.partition("/")[0] == name), None)
+    if known is not None and version.isdecimal() and int(version) > int(known.partition("/")[2]):
+        return f"{word!r} is newer than {known}, which vsacli {__version__} reads; update vsacli"
     near = nearest(word, _DOCUMENT_KINDS)
-    return f"; did you mean {near!r}?" if near else ""
+    hint = f"; did you mean {near!r}?" if near else ""
+    return f"expected one of {', '.join(_DOCUMENT_KINDS)}, found {node}{hint}"

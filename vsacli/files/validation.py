@@ -8,11 +8,13 @@ from typing import Any
 
 from vsacli.actuators.laws.table import MeasuredSpring
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.texts import counted, listed
 from vsacli.control.poles import FORMAT, PolesFile, load_gains
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognize
+from vsacli.files.limits_of_motion import unattainable
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import open_stored
 from vsacli.results.store.study_table import StoredStudy
@@ -25,7 +27,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 MOST_ROBOTS_SHOWN = 3
 SPRING_COLUMNS = {"deflection", "torque"}
-WITHOUT_ROBOT = "no usable robot is among the files, so joint names, units and limits are not checked"
+WITHOUT_ROBOT = "joint names, units and limits are not checked; give the robot file, too"
 
 Robots = Mapping[str, Robot]
 """Robots by the paths of their files."""
@@ -126,26 +128,31 @@ def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
 
 def _robot(path: str, robots: Robots) -> Checked:
     robot = robots[path]
-    return _usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.located_warnings)
+    return _usable(path, f"robot {robot.name}, {counted(len(robot.joints), 'joint')}", robot.located_warnings)
 
 
 def _trajectory(path: str, robots: Robots) -> Checked:
     if not robots:
-        return _described(path, load_trajectory(path, placeholder_robot(path).robot), WITHOUT_ROBOT)
-    fitting, note = _fitting(path, lambda robot: load_trajectory(path, robot), robots)
-    return _described(path, min(fitting, key=lambda trajectory: len(trajectory.warnings)), note)
+        return _described(path, load_trajectory(path, placeholder_robot(path).robot), [WITHOUT_ROBOT])
+
+    def read(robot: Robot) -> tuple[Trajectory, list[str]]:
+        trajectory = load_trajectory(path, robot)
+        return trajectory, list(unattainable(robot, trajectory))
+
+    fitting, note = _fitting(path, read, robots)
+    trajectory, found = min(fitting, key=lambda each: len(each[0].warnings) + len(each[1]))
+    return _described(path, trajectory, [*found, note])
 
 
-def _described(path: str, trajectory: Trajectory, note: str) -> Checked:
-    steps = f"{_count(trajectory.samples, 'step')} over {trajectory.duration:g} s"
-    return _usable(
-        path, f"trajectory {trajectory.name}, {steps}", trajectory.located_warnings, [*trajectory.notes, note]
-    )
+def _described(path: str, trajectory: Trajectory, notes: Iterable[str]) -> Checked:
+    extent = f"{counted(trajectory.samples, 'sample')} over {trajectory.duration:g} s"
+    summary = f"trajectory {trajectory.name}, {extent}"
+    return _usable(path, summary, trajectory.located_warnings, [*trajectory.notes, *notes])
 
 
 def _poles(path: str, robots: Robots) -> Checked:
     document, _ = read_document(path, PolesFile, FORMAT)
-    summary = f"poles of {_count(len(document.joints), 'joint')}"
+    summary = f"poles of {counted(len(document.joints), 'joint')}"
     if not robots:
         return _usable(path, summary, notes=[WITHOUT_ROBOT])
     _, note = _fitting(path, lambda robot: _gains(path, robot), robots)
@@ -176,8 +183,9 @@ def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[l
     if not fitting:
         best = min(errors, key=lambda robot_path: len(errors[robot_path].problems))
         raise InputError([*errors[best].problems, *_misfit(path, len(errors), best)])
-    shown = ", ".join([*fitting][:MOST_ROBOTS_SHOWN]) + (", ..." if len(fitting) > MOST_ROBOTS_SHOWN else "")
-    return list(fitting.values()), f"fits {len(fitting)} of {_count(len(robots), 'robot')}: {shown}"
+    shown = listed([*fitting], MOST_ROBOTS_SHOWN)
+    of_all = "" if len(robots) == 1 else f"{len(fitting)} of {len(robots)} robots: "
+    return list(fitting.values()), f"fits {of_all}{shown}"
 
 
 def _misfit(path: str, robots: int, best: str) -> Iterator[Problem]:
@@ -192,45 +200,49 @@ def _table(path: str, robots: Robots) -> Checked:
         return _trajectory(path, robots)
     spring = MeasuredSpring(file=table)
     warnings = [Problem(path, 0, warning) for warning in spring.warnings]
-    return _usable(path, f"spring of {_count(len(table.values), 'row')}", warnings)
+    return _usable(path, f"spring of {counted(len(table.values), 'row')}", warnings)
+
+
+def _catalog(path: str, _: Robots) -> Checked:
+    from vsacli.studies.sizing.catalog import read_catalog
+
+    return _usable(path, f"catalog of {counted(len(read_catalog(path).records), 'motor')}")
 
 
 def _urdf(path: str, _: Robots) -> Checked:
     urdf = read_urdf(path)
     flaws = [link.flaw for link in urdf.links.values() if link.flaw is not None]
     messages = tuple(Message(WARNING, path, *flaw) for flaw in flaws)
-    return Checked(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}", messages)
+    return Checked(path, f"URDF of {urdf.name}, {counted(len(urdf.joints), 'joint')}", messages)
 
 
 def _stored(path: str, _: Robots) -> Checked:
     with open_stored(path) as result:
         result.check()
         names = f"{result.robot_name}, {result.trajectory_name}"
-        return _usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
+        return _usable(
+            path, f"{result.kind} of {names}, {counted(result.samples, 'sample')}, {result.verdict}"
+        )
 
 
 def _study(path: str, _: Robots) -> Checked:
     """Check a study with the files that it names, whatever robots are among the files."""
     study = load_study(path)
-    return _usable(path, f"study {study.file.name}, {_count(study.runs, 'run')} of {study.robot.name}")
+    return _usable(path, f"study {study.file.name}, {counted(study.runs, 'run')} of {study.robot.name}")
 
 
 def _columns(path: str, _: Robots) -> Checked:
     """Check a columns file; whether its columns exist depends on the recording."""
     mapping = load_columns(path)
-    return _usable(path, f"columns of recordings, {_count(len(mapping.columns), 'name')}")
+    return _usable(path, f"columns of recordings, {counted(len(mapping.columns), 'name')}")
 
 
 def _table_of_study(path: str, _: Robots) -> Checked:
     with StoredStudy(path) as table:
         table.check()
         return _usable(
-            path, f"table of {table.study_name}, {_count(table.rows, 'run')} of {table.robot_name}"
+            path, f"table of {table.study_name}, {counted(table.rows, 'run')} of {table.robot_name}"
         )
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 _CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
@@ -238,6 +250,7 @@ _CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
     FileKind.TRAJECTORY: _trajectory,
     FileKind.POLES: _poles,
     FileKind.TABLE: _table,
+    FileKind.CATALOG: _catalog,
     FileKind.URDF: _urdf,
     FileKind.RESULT: _stored,
     FileKind.SIMULATION: _stored,

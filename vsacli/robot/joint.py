@@ -32,7 +32,6 @@ from vsacli.documents.fields import (
 )
 
 UNBOUNDED = (-math.inf, math.inf)
-NO_MASS, NO_INERTIA = "its mass is zero", "its inertia is zero"
 INERTIA_ROUNDING = 1e-12
 """Relative size below which a negative eigenvalue of an inertia tensor counts as rounding of its entries."""
 
@@ -102,16 +101,6 @@ class Inertia:
         """Eigenvalues of the tensor, ascending, kg m^2."""
         return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
 
-    def warnings(self) -> Iterator[str]:
-        """Yield warnings about implausible values."""
-        low, middle, high = self.principal_moments
-        if high == 0:
-            yield NO_INERTIA
-        elif high - low - middle > INERTIA_ROUNDING * high:
-            excess = high - low - middle
-            sides = f"{high:.4g} > {low:.4g} + {middle:.4g} by {excess:.4g} kg m^2"
-            yield f"its inertia breaks the triangle inequality: {sides}"
-
 
 @dataclass(frozen=True)
 class Link:
@@ -123,12 +112,6 @@ class Link:
 
     def __post_init__(self) -> None:
         check_fields(self)
-
-    def warnings(self) -> Iterator[str]:
-        """Yield warnings about implausible values."""
-        if self.mass == 0:
-            yield NO_MASS
-        yield from self.inertia.warnings()
 
 
 @dataclass(frozen=True)
@@ -252,11 +235,8 @@ class Joint:
             )
             yield FieldProblem(("friction", "coulomb"), reason)
 
-    def warnings(self, *, massless: bool = False) -> Iterator[str]:
-        """Yield warnings about link and springs; without those on zero mass and inertia if `massless`."""
-        said = (NO_MASS, NO_INERTIA) if massless else ()
-        of_link = (warning for warning in self.link.warnings() if warning not in said)
-        yield from (f"link of joint {self.name}: {warning}" for warning in of_link)
+    def warnings(self) -> Iterator[str]:
+        """Yield warnings about springs."""
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 
 

@@ -148,7 +148,7 @@ class Robot:
 
         massless = not any(joint.link.mass for joint in self.joints)
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
-        of_joints = (warning for joint in self.joints for warning in joint.warnings(massless=massless))
+        of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
         return (*(Problem("", 0, warning) for warning in whole), *implausible(self.checked, self.sources))
 

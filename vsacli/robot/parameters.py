@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple, TypeVar
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import MOST_NEAR, nearest
 from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
@@ -53,9 +53,21 @@ class Parameter(NamedTuple):
         return tuple(str(step.number) if isinstance(step, Entry) else step for step in self.path)
 
     @property
+    def of_every_joint(self) -> str:
+        """Pattern of this parameter of all joints, e.g. `joints.*.link.mass`."""
+        return str(self) if self.joint is None else ".".join((JOINTS, "*", *map(str, self.path[2:])))
+
+    @property
     def part(self) -> str:
         """Part of its joint, e.g. `dh`, or of the robot: `gravity`, `base` or `tool`."""
         return str(self.path[0] if self.joint is None else self.path[2])
+
+    @property
+    def of_its_part(self) -> str:
+        """Pattern of all parameters of the same part, e.g. `joints.*.link.*`."""
+        words = self.of_every_joint.split(".")
+        part = words[: 1 if self.joint is None else 3]
+        return ".".join(words if words == part else [*part, "*"])
 
     @property
     def unit(self) -> str:
@@ -78,9 +90,33 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
     for pattern in patterns:
         if not any(_fits(each, pattern) for each in found):
-            hint = did_you_mean(pattern, [str(each) for each in found])
-            raise InputError.one(f"no parameter of the robot matches {pattern!r}{hint}")
+            raise InputError.one(no_match(pattern, found))
     return tuple(chosen)
+
+
+def no_match(pattern: str, found: Sequence[Parameter]) -> str:
+    """Return the problem of a pattern that no parameter matches, with patterns that do.
+
+    A path is compared word by word. Of a pattern with `*` only the last word counts, since `*` also stands
+    for several words.
+    """
+    near = [] if "*" in pattern else [path for path in map(str, found) if _similar(pattern, path)][:1]
+    patterns = list(dict.fromkeys(each.of_every_joint for each in found))
+    word = nearest(_last(pattern), dict.fromkeys(map(_last, patterns)))
+    near = near or [each for each in patterns if _last(each) == word]
+    problem = f"no parameter of the robot matches {pattern!r}"
+    if 0 < len(near) <= MOST_NEAR:
+        return f"{problem}; did you mean {' or '.join(map(repr, near))}?"
+    return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in found))}"
+
+
+def _last(path: str) -> str:
+    return path.rpartition(".")[2]
+
+
+def _similar(one: str, other: str) -> bool:
+    words, others = one.split("."), other.split(".")
+    return len(words) == len(others) and all(map(nearest, words, ([each] for each in others)))
 
 
 def _matters(path: NumberPath) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import MOST_NEAR, did_you_mean, nearest
+from vsacli.base.texts import listed
 from vsacli.documents.fields import declared
+from vsacli.documents.paths import declared_paths
 from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change
 from vsacli.robot.file import RobotFile
 from vsacli.trajectory.file import OF_ANY_ROBOT
@@ -32,8 +35,18 @@ def divided(changes: Changes) -> Divided:
         check_path_of_change(path)
         first = path.partition(".")[0]
         if first not in robot and first not in trajectory:
-            hint = did_you_mean(first, [key for key in (*robot, *trajectory) if key not in KEPT])
-            raise ChangeError.one(f"neither robot nor trajectory has a {first!r}{hint}")
+            hint = _hint(path, [key for key in (*robot, *trajectory) if key not in KEPT])
+            raise ChangeError.one(f"neither robot nor trajectory has {first!r} at the top level{hint}")
         of = found.robot if first in robot else found.trajectory
         of[path] = value  # type: ignore[index]
     return found
+
+
+def _hint(path: str, keys: Sequence[str]) -> str:
+    """Return a clause with the paths that end with this one, or else the nearest of the keys at the top."""
+    word = path.rpartition(".")[2]
+    valid = dict.fromkeys((*declared_paths(RobotFile), *declared_paths(OF_ANY_ROBOT)))
+    for ending in (path, word if nearest(path.partition(".")[0], keys) is None else path):
+        if longer := [each for each in valid if each.endswith(f".{ending}")]:
+            return f"; did you mean {listed(longer, MOST_NEAR)}?"
+    return did_you_mean(path.partition(".")[0], keys)

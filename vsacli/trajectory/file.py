@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, make_dataclass
 from functools import cache
 from pathlib import Path
@@ -113,13 +114,20 @@ class TrajectoryFile:
                 yield FieldProblem(("duration",), "the times come from the CSV file; leave this key out")
         elif self.lasts is None:
             yield FieldProblem((), "missing key 'duration' (s)")
-        else:
+        elif all(given is None or POSITIVE.holds(given) for given in (self.lasts, self.rate, self.slow_down)):
             try:
                 _uniform_times(self.lasts * self.slow_down, self.rate)
             except InputError as error:
-                yield FieldProblem(("duration" if self.slow_down == 1 else "slow_down",), str(error))
+                yield FieldProblem((self._longest,), str(error))
             else:
                 yield from self.problems_over(self.lasts)
+
+    @property
+    def _longest(self) -> str:
+        """Key that is the likely reason for too many samples: of duration and rate the larger one."""
+        if self.slow_down != 1:
+            return "slow_down"
+        return "rate" if self.rate is not None and self.rate > (self.lasts or 0) else "duration"
 
 
 @cache
@@ -208,7 +216,8 @@ def declared_trajectory(
         return recorded_trajectory(path, joints, progress, _rate_of_table(path, changes))
     document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
-    declared = _times(document, recordings, source.path)
+    with _blaming(changes, "rate"):
+        declared = _times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, declared, source.path, joints.names)
     times, profiles = _slowed(document.slow_down, declared, _profiles(document, declared, recordings))
@@ -247,10 +256,19 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
         return None
     from vsacli.documents.columns_file import checked_rate
 
-    try:
+    with _blaming(changes, "rate"):
         return checked_rate(changes["rate"])
+
+
+@contextmanager
+def _blaming(changes: Changes, path: str) -> Iterator[None]:
+    """Raise errors of a value as errors of its change, if it was changed."""
+    try:
+        yield
     except InputError as error:
-        raise ChangeError(error.problems) from None
+        if path not in changes:
+            raise
+        raise ChangeError(each._replace(file="", line=0) for each in error.problems) from None
 
 
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:

@@ -57,12 +57,13 @@ class UniformTimes:
     def __post_init__(self) -> None:
         if not (0 < self.duration < math.inf and 0 < self.rate < math.inf):
             raise InputError.one(
-                f"duration and rate must be positive, not {self.duration:g} s and {self.rate:g} per second"
+                f"duration and rate must be positive, not {self.duration:.4g} s and {self.rate:.4g} Hz"
             )
         if self.duration * self.rate > MAX_STEPS:
-            steps = self.duration * self.rate
+            samples, most = f"{self.duration * self.rate:.4g}", f"{MAX_STEPS:.4g}"
             raise InputError.one(
-                f"duration times rate gives {steps:.4g} steps; at most {MAX_STEPS:.0e} are possible"
+                f"duration {self.duration:.4g} s times rate {self.rate:.4g} Hz gives {samples} samples; "
+                f"at most {most} are possible; lower rate or duration"
             )
 
     @property
@@ -77,7 +78,8 @@ class UniformTimes:
         if math.isclose(rate, self.rate, rel_tol=1e-9):
             return ()
         return (
-            f"the rate is {rate:.9g} per second, not {self.rate:.9g}: whole steps in {self.duration:g} s",
+            f"the rate is {rate:.9g} Hz, not {self.rate:.9g} Hz, for a whole number of intervals in "
+            f"{self.duration:g} s",
         )
 
     @property

@@ -26,9 +26,9 @@ TYPICAL: list[Slip] = [
     Slip("ms as duration", "vsa_3r", "rest_to_rest",
         {"duration: 4.0": "duration: 4000"}, "slow motions", "duration", "4000 ms"),
     Slip("kHz as rate", "vsa_3r", "rest_to_rest",
-        {"rate: 1000": "rate: 1"}, "numbers of steps", "rate", "1 kHz"),
+        {"rate: 1000": "rate: 1"}, "numbers of samples", "rate", "1 kHz"),
     Slip("a period as rate", "vsa_3r", "rest_to_rest",
-        {"rate: 1000": "rate: 0.001"}, "numbers of steps", "rate", ""),
+        {"rate: 1000": "rate: 0.001"}, "numbers of samples", "rate", ""),
 ]  # fmt: skip
 
 FURTHER: list[Slip] = [

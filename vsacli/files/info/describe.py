@@ -149,7 +149,7 @@ def describe_file(
     """
     kind = recognize(path)
     if rate is not None and kind is not FileKind.TABLE:
-        raise InputError.one(f"is a {kind}; --rate is only for recordings without a time column", path)
+        raise InputError.one(f"is a {kind}; --rate is only for recordings without a column of times", path)
     match kind:
         case FileKind.ROBOT:
             return describe_robot(load_robot(path))
@@ -162,6 +162,9 @@ def describe_file(
                 return describe_result(result)
         case FileKind.STUDY_TABLE:
             return describe_study(path)
+        case FileKind.CATALOG:
+            advice = f"vsacli size ROBOT TRAJECTORY --catalog {path} chooses from it"
+            raise InputError.one(f"is a motor catalog; {advice}", path)
         case kind:
             refuse_other_formats(path)
             expected = "a robot, a trajectory, a result, a simulation or the table of a study"
@@ -186,7 +189,7 @@ def _described_table(
     robot = None if robot_path is None else load_robot(robot_path)
     if is_trajectory(path, robot or placeholder_robot(path).robot):
         if rate is not None:
-            raise InputError.one("has times of its own in column 'time'; leave the rate out", path)
+            raise InputError.one("has times in column 'time'; leave --rate out", path)
         return _described_trajectory(path, robot_path)
     return describe_recording(path, robot, progress, rate)
 

@@ -10,7 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis import report_text
 from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
-from vsacli.base.texts import together
+from vsacli.base.texts import counted, together
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.documents.field_kinds import Field, variant_inside
 from vsacli.documents.fields import declared
@@ -25,13 +25,13 @@ Values = Mapping[str, Any]
 
 def device_lines(joints: Sequence[Values]) -> Iterator[str]:
     """Yield a line for all joints with equal actuators, and below it a line for each part of the actuator."""
-    alike: dict[tuple[str, ...], list[int]] = {}
+    equal: dict[tuple[str, ...], list[int]] = {}
     for number, joint in enumerate(joints):
         kind = ACTUATORS[joint["actuator"]["type"]]
         parts = tuple(_parts(kind, joint["actuator"], joint["type"]))
-        alike.setdefault((joint["actuator"]["type"], *parts), []).append(number)
+        equal.setdefault((joint["actuator"]["type"], *parts), []).append(number)
     names = [joint["name"] for joint in joints]
-    for (kind_name, *lines), numbers in alike.items():
+    for (kind_name, *lines), numbers in equal.items():
         yield f"{together(numbers, names)}: {kind_name}"
         yield from (f"  {line}" for line in lines)
 
@@ -43,7 +43,8 @@ def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
         if not field.kind.records:
             own.append(_words(name, field.quantity, value, joint_type))
         elif isinstance(value, list) and len(value) > 1 and value.count(value[0]) == len(value):
-            yield f"{name}, both equal: {_record(field, value[0], joint_type)}"
+            numbers = " and ".join(str(number) for number in range(1, len(value) + 1))
+            yield f"{name}s {numbers}: {_record(field, value[0], joint_type)}"
         elif isinstance(value, list):
             for number, each in enumerate(value, start=1):
                 yield f"{name} {number}: {_record(field, each, joint_type)}"
@@ -105,7 +106,7 @@ def render(description: Description) -> str:
 
 def _robot(robot: Description) -> Iterator[str]:
     reach, joints = robot["reach"], robot["joints"]
-    yield f"robot {robot['name']}: {len(joints)} joints, {_short(robot['mass'])} kg"
+    yield f"robot {robot['name']}: {counted(len(joints), 'joint')}, {_short(robot['mass'])} kg"
     if robot["description"]:
         yield robot["description"]
     yield f"gravity {_row(robot['gravity'])} m/s^2 in the base frame"
@@ -147,9 +148,9 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
     for joint in joints:
         kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
         unit = STIFFNESS.unit(kind)
-        reachable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
+        attainable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
         load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
-        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *reachable
+        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *attainable
 
 
 def _dampers(joints: Sequence[Description]) -> Iterator[str]:
@@ -176,9 +177,10 @@ def _springs(actuator: Description) -> str:
 
 
 def _trajectory(trajectory: Description) -> Iterator[str]:
+    samples = counted(trajectory["samples"], "sample")
     yield (
-        f"trajectory {trajectory['name']}: {trajectory['samples']} steps, {_short(trajectory['duration'])} s"
-        f" from t = {_short(trajectory['start'])} s"
+        f"trajectory {trajectory['name']}: {samples}, {_short(trajectory['duration'])} s from t = "
+        f"{_short(trajectory['start'])} s"
     )
     commanded = [key for key in COMMANDED if key in trajectory["joints"][0]]
     rows = [("joint", "q", *(f"peak {name}" for name in MOTION), *commanded)]
@@ -206,8 +208,8 @@ def _wrench(wrench: Description) -> Iterator[str]:
 
 
 def _result(result: Description) -> Iterator[str]:
-    whole = "" if result["complete"] else ", ended early"
-    yield f"{result['kind']} of {result['robot']}, {result['trajectory']}: {result['samples']} steps{whole}"
+    whole, samples = "" if result["complete"] else ", ended early", counted(result["samples"], "sample")
+    yield f"{result['kind']} of {result['robot']}, {result['trajectory']}: {samples}{whole}"
     yield f"verdict {result['verdict']}"
     source = result["provenance"]
     versions = ", ".join(f"{name} {version}" for name, version in source["versions"].items())
@@ -234,7 +236,7 @@ def _result(result: Description) -> Iterator[str]:
 
 
 def _cache(cache: Description) -> Iterator[str]:
-    libraries = "1 library" if cache["entries"] == 1 else f"{cache['entries']} libraries"
+    libraries = counted(cache["entries"], "library", "libraries")
     size, limit = _megabytes(cache["size"]), _megabytes(cache["limit"])
     yield f"compiled code: {libraries}, {size} of at most {limit}, in {cache['folder']}"
     for each in cache["unfinished"]:

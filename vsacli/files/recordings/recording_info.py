@@ -36,6 +36,7 @@ from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.problems import out_of_order
 from vsacli.trajectory.recorded.recording import NEEDED
 from vsacli.trajectory.recorded.stamps import stamp_faults
 
@@ -77,7 +78,7 @@ def describe_recording(
     if time is not None and rate is not None:
         if not time.guessed:
             name = rows.columns[time.place] or time.place + 1
-            raise InputError.one(f"has times of its own in column {name!r}; leave the rate out", rows.path)
+            raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
     found = guesses(rows, time, joint_names)
     surveyed = _Survey(rows, time, found, progress, rate)
@@ -238,10 +239,8 @@ class _Survey:
                     self.rate = f"{self.time['rate']:.3g}"
             elif len(stamps) > 1:
                 row = int(np.argmin(np.diff(stamps) > 0)) + 1
-                self.warnings.append(
-                    f"{file}:{table.line_of(row)}: the time does not increase: {stamps[row]:.9g} s follows "
-                    f"{stamps[row - 1]:.9g} s; records must be in order, and no stamp twice"
-                )
+                message = out_of_order(float(f"{stamps[row - 1]:.9g}"), float(f"{stamps[row]:.9g}"), "rows")
+                self.warnings.append(f"{file}:{table.line_of(row)}: time {message}")
         return stamps if rising else None
 
     def _described(self, stamps: FloatArray, unit: str, first_stamp: int | str | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.base.tables import aligned
-from vsacli.base.texts import for_yaml
+from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.column_mapping import REST, MappedColumn
 from vsacli.documents.expression import BOOLEANS
 from vsacli.documents.time_column import TIME
@@ -30,11 +30,11 @@ _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
     """Yield lines with rows and rate, the columns, their faults, and a proposed trajectory file."""
     time = recording["time"]
-    yield f"recording {recording['name']}: {recording['rows']} rows{_timing(time)}"
+    yield f"recording {recording['name']}: {counted(recording['rows'], 'row')}{_timing(time)}"
     yield from aligned([("column", "number", "holds", "smallest", "largest"), *_columns(recording)])
     yield from (f"warning: {warning}" for warning in recording["warnings"])
     yield ""
-    yield "as a trajectory file; check what it says of the columns, and what it guesses:"
+    yield "trajectory file for this recording; check the columns, which are partly guessed:"
     yield ""
     yield from recording["trajectory"].splitlines()
 
@@ -43,8 +43,8 @@ def _timing(time: Mapping[str, Any] | None) -> str:
     if time is None:
         return ", no column of which holds times; give their rate with --rate HZ"
     step = time["step"]
-    steps = f"steps of {step_text(step['min'])} to {step_text(step['max'])}"
-    rate = "" if math.isnan(time["rate"]) else f", {time['rate']:.4g} Hz ({steps})"
+    steps = f" (steps of {step_text(step['min'])} to {step_text(step['max'])})" if step["min"] > 0 else ""
+    rate = "" if math.isnan(time["rate"]) else f", {time['rate']:.4g} Hz{steps}"
     return f", {time['duration']:.6g} s{rate}"
 
 

@@ -38,7 +38,7 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
         InputError: a start is given, which URDF cannot express.
     """
     if start is not None:
-        raise InputError.one("a URDF does not say where a motion starts; leave out --start")
+        raise InputError.one("--start needs --format mjcf; a URDF has no initial state")
     root = ElementTree.Element("robot", name=robot.name)
     element(root, "link", name=ROOT)
     parent, end = ROOT, pose_matrix(robot.base.xyz, robot.base.rpy)

@@ -12,14 +12,19 @@ from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES
+from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
 def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
-    """Return the findings of the rules, with lines of the robot file, which is the first of the sources."""
-    return findings(ROBOT_RULES, checked, _written(sources))
+    """Return impossible links and the findings of the rules, with lines of the robot file.
+
+    The robot file is the first of the sources.
+    """
+    written = _written(sources)
+    return (*impossible_links(checked.joints, written), *findings(ROBOT_RULES, checked, written))
 
 
 def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:

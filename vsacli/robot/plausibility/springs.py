@@ -205,7 +205,7 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
         size="over the lowest that the springs give at rest", low=1, high=500, usual=2,
         reason="below 1 nothing is within the limits, and springs do not become so much stiffer",
-        finding="is {size} times the lowest that the springs give, {lower} {unit}",
+        finding="is {size} times the minimum of {lower} {unit} without load",
         units=(*TOO_SOFT, *TOO_STIFF), advice="check the units of limits and springs"),
     Rule("ranges of dampers", "`damper.range`", _largest_dampings,
         size="over 2 sqrt(I sigma), with the inertia of the stretched arm and the least stiffness",

@@ -247,18 +247,22 @@ def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
     Raises:
         InputError: a link or path does not exist, or no joint moves on it.
     """
-    start = urdf.root if base is None else _known(urdf, base, "base")
-    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "tip")
+    start = urdf.root if base is None else _known(urdf, base, "--base")
+    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "--tip")
     path = _path(urdf, start, end)
+    if start == end:
+        same = f"--base and --tip are the same link, {quoted(start)}"
+        raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
     if not path.moving:
-        raise InputError.one(f"no joint moves between {quoted(start)} and {quoted(end)}", urdf.file)
+        message = f"no joint moves between {quoted(start)} and {quoted(end)}; choose another base or tip"
+        raise InputError.one(message, urdf.file)
     return path
 
 
-def _known(urdf: Urdf, name: str, end: str) -> str:
+def _known(urdf: Urdf, name: str, option: str) -> str:
     if name not in urdf.links:
         near = did_you_mean(name, urdf.links)
-        raise InputError.one(f"{end}: there is no link {quoted(name)}{near}", urdf.file)
+        raise InputError.one(f"{option}: there is no link {quoted(name)}{near}", urdf.file)
     return name
 
 

@@ -126,7 +126,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
-    root = parse_xml(text, problems)
+    root = parse_xml(text, problems, "a URDF")
     if root.tag != "robot":
         problems.fail(root.line, f"expected a URDF, which begins with <robot>, found <{root.tag}>")
     _refuse_macros(root, problems)

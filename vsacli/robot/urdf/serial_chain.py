@@ -118,16 +118,17 @@ def _given(
     problems: Problems,
 ) -> float:
     """Return the given position of a held joint; 0 after adding a problem."""
+    option = f"--hold {name}={value}"
     reason = _reason_against(urdf, name, leaders, moving)
     if reason:
-        problems.add(0, f"hold: {reason}")
+        problems.add(0, f"{option}: {reason}")
         return 0.0
     unit = urdf.joints[name].unit()
     try:
         return evaluate(str(value), unit)
     except ExpressionError as error:
         found = quoted(str(value))
-        problems.add(0, f"hold: {quoted(name)}: expected a number in {unit}, found {found}: {error}")
+        problems.add(0, f"{option}: expected a number in {unit}, found {found}: {error}")
         return 0.0
 
 
@@ -135,7 +136,7 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
     """Return the reason why a joint cannot be held; empty if it can."""
     joint, shown = urdf.joints.get(name), quoted(name)
     if joint is None:
-        return f"there is no joint {shown}{did_you_mean(name, leaders)}"
+        return f"there is no joint {shown} outside the chain{did_you_mean(name, leaders)}"
     if joint.type not in MOVING:
         return f"{shown} is {joint.type}, so it has no position to choose"
     if name in moving:

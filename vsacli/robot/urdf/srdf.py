@@ -40,7 +40,7 @@ def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
-    root = parse_xml(text, problems)
+    root = parse_xml(text, problems, "an SRDF")
     if root.tag != "robot" or any(root.all("link")):
         problems.fail(root.line, "expected an SRDF, in whose <robot> there are groups and no links")
     groups = {element.attributes.get("name", ""): element for element in root.all("group")}

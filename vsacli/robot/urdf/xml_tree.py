@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from vsacli.documents.source import Problems
+from vsacli.documents.source import Problems, is_table
 from vsacli.documents.tree import quoted
 
 MAX_LEVELS = 100
@@ -39,12 +40,21 @@ class Element:
         return (child for child in self.children if child.tag == tag)
 
 
-def parse_xml(text: str, problems: Problems) -> Element:
-    """Parse a document.
+_YAML = re.compile(r"(\s*(#.*)?\n)*[\w.-]+\s*:(\s|$)")
+"""Beginning of a YAML file: comments, then a key."""
+
+
+def parse_xml(text: str, problems: Problems, expected: str) -> Element:
+    """Parse a document; `expected` is its format in words, for messages.
 
     Raises:
-        InputError: the syntax is broken, there is a document type declaration, or a limit is exceeded.
+        InputError: the text is a table or YAML, the syntax is broken, there is a document type declaration,
+            or a limit is exceeded.
     """
+    if not text.lstrip().startswith("<"):
+        found = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
+        if found:
+            problems.fail(0, f"is {found}, expected {expected} (XML)")
     builder = _Builder(problems)
     try:
         builder.parser.Parse(text, True)

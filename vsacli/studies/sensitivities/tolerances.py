@@ -14,7 +14,6 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Published, named
@@ -27,7 +26,7 @@ from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import parse_yaml
 from vsacli.dynamics.inverse import compute_block, fitted, usual_block
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter
+from vsacli.robot.parameters import Parameter, no_match
 from vsacli.trajectory.trajectory import Trajectory
 
 RELATIVE = 0.01
@@ -143,8 +142,7 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
         line = root.key_lines[pattern]
         fitting = [place for place, each in enumerate(chosen) if fnmatchcase(str(each), pattern)]
         if not fitting:
-            hint = did_you_mean(pattern, [str(each) for each in chosen])
-            problems.add(line, f"no parameter of the robot matches {pattern!r}{hint}")
+            problems.add(line, no_match(pattern, chosen))
         for place in fitting:
             try:
                 found[place] = distribution(node, chosen[place].value, chosen[place].unit)

@@ -46,8 +46,6 @@ SAME_TIME = 1e-9
 Values: TypeAlias = tuple[float | None, ...]
 """A number for each joint or axis; None for joints that the signal does not command."""
 
-_TIMES = ("not", "once", "twice", "three times", "four times")
-
 
 @dataclass(frozen=True)
 class Use:
@@ -88,13 +86,10 @@ class Use:
 
     def degree(self, degrees: range) -> Check:
         """Return the check of a degree: smooth enough for a motion that begins and ends at rest."""
-        signal = self.signal
-        subject, vanishing = signal.key, "its rate"
-        if signal is POSITION:
-            subject = "motion"
-            vanishing = "its velocity" if self.rigid else "all derivatives up to the third"
-        smooth = f"the {subject} must be {_TIMES[self.smoothness]} differentiable"
-        return odd(degrees, 2 * self.smoothness - 1, f"{smooth}, so {vanishing} must vanish at the ends")
+        vanishing = "its rate"
+        if self.signal is POSITION:
+            vanishing = "velocity" if self.rigid else "derivatives up to the third"
+        return odd(degrees, 2 * self.smoothness - 1, f"{vanishing} must vanish at both ends")
 
     @property
     def _kind(self) -> PerJoint | Vector:
@@ -110,7 +105,7 @@ class Use:
 def odd(degrees: range, lowest: int, reason: str) -> Check:
     """Return the check of a degree: odd, and at least the lowest that is smooth enough."""
     allowed = range(max(lowest, degrees.start), degrees.stop, degrees.step)
-    words = f"odd, {allowed[0]} to {allowed[-1]} ({reason})"
+    words = f"odd, from {allowed[0]} to {allowed[-1]} ({reason})"
     return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
 
 

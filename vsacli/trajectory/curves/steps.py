@@ -146,9 +146,7 @@ def stepwise(
     return Chain(signal=signal, span=span, parts=tuple(parts))
 
 
-_SMOOTH = (
-    "it must be twice continuously differentiable, so two derivatives must vanish where it begins to change"
-)
+_SMOOTH = "two derivatives must vanish where a change begins"
 
 
 class Steps(Formula):

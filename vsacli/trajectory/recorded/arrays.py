@@ -13,7 +13,7 @@ from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import METHODS, FitChoice
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health
-from vsacli.trajectory.recorded.problems import time_problems, value_problems
+from vsacli.trajectory.recorded.problems import sample_problems, time_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 
@@ -35,7 +35,7 @@ def profiles_of_arrays(
         raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
     times = checked_array("time", time, None)
     records = [record for signal, arrays in given.items() for record in _recorded(signal, times, *arrays)]
-    problems = [*time_problems(times), *(found for record in records for found in value_problems(record))]
+    problems = [*time_problems(times), *sample_problems(records)]
     if problems:
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
     warnings = tuple(map(str, health(times, records)))

@@ -5,22 +5,19 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.documents.column_mapping import REST
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.trajectory.recorded.header_problems import Header, probable
 
 Naming = dict[str, dict[int, str]]
 """Names of the columns of each quantity, by index of the joint or wrench axis."""
@@ -28,13 +25,6 @@ Naming = dict[str, dict[int, str]]
 _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
-
-RATE_INSTEAD = "rows at equal steps need their rate instead: rate in a trajectory or columns file"
-
-MOST_NAMED = 3
-"""Most unknown columns of which all are named."""
-
-_PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
 
 @dataclass(frozen=True)
@@ -114,19 +104,23 @@ def column_layout(
 
     known = _known(of_every_joint)
     if _is_foreign(names, known):
-        examples = f"{', '.join(expected[:2])}, ..."
-        message = f"has no column of a trajectory ({examples}); {_advice(file)}"
+        examples = ", ".join(expected[:2])
+        advice = (
+            f"for a motor catalog use --catalog {file}" if "inertia" in names else f"see vsacli info {file}"
+        )
+        message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
-    problems = list(_strangers(names, expected, known, file))
-    problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
+    found = Header(names, known, expected, joints.names, file)
+    problems = list(found.of_names())
     naming = naming | _WRENCH_NAMING
     if len(used) == len(namings):
         examples = " and ".join(
             repr(next(column for column in names if column in _all(naming))) for naming in namings
         )
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
+        problems += found.of_strangers()
     else:
-        problems += _gaps(names, naming, {signal.names[0] for signal in wanted})
+        problems += found.of_gaps(naming, {signal.names[0] for signal in wanted})
     units = [unit for _, unit in headings]
     columns = dict(_measured(names, units, naming, joints, problems))
     if problems:
@@ -174,58 +168,12 @@ def _all(naming: Naming) -> list[str]:
     return [column for columns in naming.values() for column in columns.values()]
 
 
-def _strangers(
-    header: Sequence[str], expected: Sequence[str], known: Collection[str], file: str
-) -> Iterator[str]:
-    """Yield problems of unknown columns: one for each probable misspelling, and one for all others."""
-    missing, others = [column for column in expected if column not in header], []
-    for column in header:
-        unit = _PARENTHESISED.fullmatch(column)
-        if column in known:
-            continue
-        if unit is not None and unit["name"] in known:
-            yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
-        elif nearest(column, missing) is not None:
-            yield f"unknown column {column!r}{did_you_mean(column, missing)}"
-        else:
-            others.append(column)
-    if others:
-        named = ", ".join(map(repr, others[:MOST_NAMED]))
-        words = "unknown column" if len(others) == 1 else f"{len(others)} unknown columns,"
-        such = "" if len(others) <= MOST_NAMED else " such as"
-        yield f"{words}{such} {named}; {_advice(file)}"
-
-
 def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
     """Return whether at most the time is known, and some other name is not a misspelling of a known one."""
     columns = [name for name in names if name != TIME]
     signals = [name for name in known if name != TIME]
     none_known = not any(name in known for name in columns)
-    return none_known and any(nearest(name, signals) is None for name in columns)
-
-
-def _advice(file: str) -> str:
-    return (
-        f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
-        f" ignore: {REST} there leaves out those without use"
-    )
-
-
-def _gaps(header: Sequence[str], naming: Naming, needed: Collection[str]) -> Iterator[str]:
-    if TIME not in header:
-        yield f"there is no column {TIME!r}; {RATE_INSTEAD}"
-    for name, columns in naming.items():
-        absent = [column for column in columns.values() if column not in header]
-        if not absent:
-            continue
-        missing = f"there {'is no column' if len(absent) == 1 else 'are no columns'} {', '.join(absent)}"
-        if name in needed:
-            alone = name in COMMANDED and len(absent) == len(columns)
-            elsewhere = f"; a trajectory in YAML can take the motion from here and set the {name} itself"
-            yield missing + (elsewhere if alone else "")
-        elif len(absent) < len(columns):
-            every = "axes" if name in WRENCH.names else "joints"
-            yield f"{missing}; {name} is given for all {every} or for none"
+    return none_known and any(probable(name, signals) is None for name in columns)
 
 
 def _measured(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.recorded.samples import Samples
@@ -38,22 +39,34 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
     elif not rising.all():
         sample = int(np.argmin(rising)) + 1
-        message = f"must increase strictly, but {time[sample]} s follows {time[sample - 1]} s"
-        yield SampleProblem("time", message, sample=sample)
+        yield SampleProblem("time", out_of_order(time[sample - 1], time[sample]), sample=sample)
     elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
         yield SampleProblem(
             "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
         )
 
 
-def value_problems(samples: Samples) -> Iterator[SampleProblem]:
-    """Yield the problems of values: too few, not finite, too large, or not positive where required."""
-    signal, degree = samples.signal, samples.signal.spline_degree
-    name, count = signal.names[0], len(samples.time)
-    if count <= degree:
-        yield SampleProblem(
-            name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
-        )
+def out_of_order(before: float, time: float, items: str = "samples") -> str:
+    """Return the problem of two successive times, s; `items` is what to sort or to delete."""
+    if time == before:
+        return f"must increase, but {time} s appears twice; delete one of the {items}"
+    return f"must increase, but {time} s follows {before} s; sort the {items} by time"
+
+
+def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
+    """Yield the problems of recorded signals: too few samples, once for all signals, and of their values."""
+    most = max(records, key=lambda each: each.signal.spline_degree, default=None)
+    if most is not None and len(most.time) <= (degree := most.signal.spline_degree):
+        count = counted(len(most.time), "sample")
+        yield SampleProblem(most.signal.names[0], f"has {count}; a trajectory needs at least {degree + 1}")
+    for record in records:
+        yield from _value_problems(record)
+
+
+def _value_problems(samples: Samples) -> Iterator[SampleProblem]:
+    """Yield the problems of values: not finite, too large, or not positive where required."""
+    signal = samples.signal
+    name = signal.names[0]
     given, stamps = np.flatnonzero(samples.given).tolist(), samples.start + samples.time
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
         for joint, row in () if rows is None else zip(given, rows[given], strict=True):

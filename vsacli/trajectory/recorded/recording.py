@@ -18,6 +18,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.texts import as_name
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
+from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
@@ -25,7 +26,7 @@ from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
-from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
+from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
@@ -137,7 +138,7 @@ def read_recording(
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     turns = list(_unwrapped(records, joints)) if unwrap else []
 
-    problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
+    problems = [*time_problems(time), *sample_problems(records)]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
     found = [
@@ -265,14 +266,19 @@ def recorded_trajectory(
         rate: sample rate, 1/s, of the file if it has no times, else of the trajectory.
 
     Raises:
-        InputError: see `read_recording`; or the rate is not possible.
+        InputError: see `read_recording`.
+        ChangeError: the rate is not possible.
     """
     mapping, resampled = ColumnMapping(rate=rate), rate is not None
     recording = read_recording(path, joints, mapping=mapping, resampled=resampled, progress=progress)
     profiles = {profile.signal.key: profile for profile in recording.profiles}
     source = recording.source
+    try:
+        times = recording.times_at(rate, "")
+    except InputError as error:
+        raise ChangeError(error.problems) from None
     return Trajectory(
-        recording.times_at(rate, source.path),
+        times,
         profiles[POSITION.key],
         profiles,
         name=as_name(Path(path).stem),

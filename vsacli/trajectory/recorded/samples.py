@@ -22,7 +22,7 @@ from vsacli.trajectory.times import stretch
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
-    """A signal at recorded times; `time_problems` and `value_problems` check whether it can be used.
+    """A signal at recorded times; `time_problems` and `sample_problems` check whether it can be used.
 
     Attributes:
         signal: described signal.

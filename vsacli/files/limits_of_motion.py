@@ -1,0 +1,61 @@
+"""Notes on a trajectory that its robot cannot execute, found without computing torques."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
+from vsacli.base.texts import together
+from vsacli.base.units import time_text
+from vsacli.robot.model import Robot
+from vsacli.robot.plausibility.springs import corridor
+from vsacli.trajectory.trajectory import Trajectory
+
+BLOCK_SAMPLES = 8192
+
+ADVICE = "check it with vsacli check-feasibility"
+
+
+def unattainable(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
+    """Yield notes on positions outside the limits, and on stiffness below the minimum without load.
+
+    Joints with the same fault share a note. Nothing is said of a stiffness about which there is a warning.
+    """
+    first, low = _extremes(robot, trajectory)
+    groups: dict[str, list[int]] = {}
+    for index, time, value in first:
+        limits = robot.joints[index].limits.position
+        unit = units.POSITION.unit(robot.joint_types[index])
+        ends = f"limits.position [{limits[0]:.4g}, {limits[1]:.4g}] {unit}"
+        fault = f"is {value:.4g} {unit} at t = {time_text(time)}, outside {ends}; {ADVICE}"
+        groups.setdefault(f"position of {{}} {fault}", []).append(index)
+    if not any(warning.message.startswith(STIFFNESS.key) for warning in trajectory.located_warnings):
+        for index, joint in enumerate(robot.joints):
+            found = corridor(joint)
+            if found is not None and low[index] < found.lower:
+                unit = units.STIFFNESS.unit(joint.type)
+                minimum = f"below the minimum of {found.lower:.4g} {unit} without load"
+                fault = f"is {low[index]:.4g} {unit} at its lowest, {minimum}; {ADVICE}"
+                groups.setdefault(f"stiffness of {{}} {fault}", []).append(index)
+    yield from (fault.format(together(joints, robot.joint_names)) for fault, joints in groups.items())
+
+
+def _extremes(robot: Robot, trajectory: Trajectory) -> tuple[list[tuple[int, float, float]], FloatArray]:
+    """Return the first position outside the limits, with joint and time, and the lowest stiffness."""
+    limits = np.array([joint.limits.position for joint in robot.joints])
+    found: dict[int, tuple[int, float, float]] = {}
+    low = np.full(len(robot.joints), np.inf)
+    for start in range(0, trajectory.samples, BLOCK_SAMPLES):
+        block = trajectory.block(start, start + BLOCK_SAMPLES)
+        outside = (block.q < limits[:, 0]) | (block.q > limits[:, 1])
+        for index in np.flatnonzero(outside.any(axis=0)).tolist():
+            sample = int(np.argmax(outside[:, index]))
+            place = (index, float(block.time[sample]), float(block.q[sample, index]))
+            found.setdefault(index, place)
+        if STIFFNESS.key in block.commanded:
+            low = np.fmin(low, block.commanded[STIFFNESS.key].min(axis=0))
+    return [found[index] for index in sorted(found)], low

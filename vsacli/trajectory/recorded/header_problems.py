@@ -1,0 +1,180 @@
+"""Problems of the header of a table: misspelled, unknown and missing columns, one message for each fault."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.renamed import successor
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH
+from vsacli.base.texts import listed, together
+from vsacli.documents.time_column import TIME
+
+RATE_INSTEAD = (
+    "if the rows are equally spaced, give their rate: --set rate=HZ, or rate in a trajectory or columns file"
+)
+
+MOST_NAMED = 3
+"""Most unknown columns of which all are named."""
+
+MOST_PRESENT = 8
+"""Most columns of a file that a message on a missing column lists."""
+
+_PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
+
+
+@dataclass(frozen=True)
+class Header:
+    """The names of the columns of a table, compared with those that are expected.
+
+    Attributes:
+        names: names of all columns, without units.
+        known: all possible names.
+        expected: names in the naming that the header uses.
+        joint_names: names of the joints.
+        file: path of the file.
+    """
+
+    names: Sequence[str]
+    known: Collection[str]
+    expected: Sequence[str]
+    joint_names: Sequence[str]
+    file: str
+
+    @cached_property
+    def parenthesised(self) -> dict[str, re.Match[str]]:
+        """Name and unit of the known columns whose unit is in parentheses, by the whole name."""
+        found = {name: _PARENTHESISED.fullmatch(name) for name in self.names if name not in self.known}
+        return {name: each for name, each in found.items() if each is not None and each["name"] in self.known}
+
+    @cached_property
+    def meant(self) -> dict[str, str]:
+        """The missing column that each misspelled one probably stands for."""
+        missing = [column for column in self.expected if column not in self.names]
+        unknown = [name for name in self.names if name not in {*self.known, *self.parenthesised}]
+        found = {column: probable(column, missing) for column in unknown}
+        return {column: near for column, near in found.items() if near is not None}
+
+    @cached_property
+    def strangers(self) -> list[str]:
+        """Names that are unknown, one of which may be a missing column under another name."""
+        return [name for name in self.names if name not in {*self.known, *self.parenthesised, *self.meant}]
+
+    def of_names(self) -> Iterator[str]:
+        """Yield problems of names: misspellings, units in parentheses, names that occur twice."""
+        yield from _misspellings(self.meant)
+        for name, found in self.parenthesised.items():
+            yield f"{name!r}: units are written in square brackets, {found['name']} [{found['unit']}]"
+        yield from (f"column {name!r} appears {n} times" for name, n in Counter(self.names).items() if n > 1)
+
+    def of_strangers(self) -> Iterator[str]:
+        """Yield one problem for all unknown columns, if there are any."""
+        if self.strangers:
+            yield f"{_unknown(self.strangers)}; to leave columns out or to rename them, {self._printed}"
+
+    def of_gaps(self, naming: Mapping[str, Mapping[int, str]], needed: Collection[str]) -> Iterator[str]:
+        """Yield problems of missing and unknown columns: one for both, if a name may be the reason.
+
+        Args:
+            naming: expected columns of each quantity, by index of the joint or wrench axis.
+            needed: quantities that are required.
+        """
+        explained = {
+            *self.names,
+            *self.meant.values(),
+            *(each["name"] for each in self.parenthesised.values()),
+        }
+        renamed = False
+        if TIME not in explained:
+            renamed = bool(self.strangers)
+            yield f"there is no column {TIME!r}; {self._other_name(1) if renamed else RATE_INSTEAD}"
+        for name, columns in naming.items():
+            absent = {index: column for index, column in columns.items() if column not in explained}
+            if not absent:
+                continue
+            whole = len(absent) == len(columns)
+            if name in needed and not (name in COMMANDED and whole):
+                renamed = True
+                meaning = self._of_joints(name, absent)
+                yield f"{_missing(absent)}{meaning}; {self._other_name(len(absent))}"
+            elif name in needed:
+                yield f"{_missing(absent)}; {self._combined(name)}"
+            elif not whole:
+                every = "axes" if name in WRENCH.names else "joints"
+                yield f"{_missing(absent)}; {name} is given for all {every} or for none"
+        if not renamed:
+            yield from self.of_strangers()
+
+    @property
+    def _printed(self) -> str:
+        return f"use a trajectory file as printed by vsacli info {self.file}"
+
+    def _other_name(self, missing: int) -> str:
+        """Return the columns one of which may be missing, and what to do then, as two clauses."""
+        present = f"columns: {listed(self.names, MOST_PRESENT)}"
+        condition = "if it has another name" if missing == 1 else "if they have other names"
+        return f"{_unknown(self.strangers) if self.strangers else present}; {condition}, {self._printed}"
+
+    def _combined(self, signal: str) -> str:
+        motion = f"position: {{type: csv, file: {self.file}}}"
+        return f"a YAML trajectory can combine the motion of this file ({motion}) with a {signal}"
+
+    def _of_joints(self, name: str, absent: Mapping[int, str]) -> str:
+        """Return the meaning of missing columns in parentheses; empty for those of a wrench."""
+        if name in WRENCH.names:
+            return ""
+        key = POSITION.key if name in POSITION.names else name
+        return f" ({key} of joint{'s'[: len(absent) > 1]} {together(list(absent), self.joint_names)})"
+
+
+def probable(column: str, missing: Sequence[str]) -> str | None:
+    """Return the missing column that an unknown one probably stands for, or None.
+
+    Of a joint's columns only the part that is wrong is compared: `shoulder.theta` shares its joint with
+    `shoulder.dq`, and nothing else.
+    """
+    if (renamed := successor(column, missing)) is not None:
+        return renamed
+    joint, dot, quantity = column.partition(".")
+    others = [each.partition(".") for each in missing]
+    if not dot or not any(separator for _, separator, _ in others):
+        return nearest(column, missing)
+    near = nearest(quantity, [each for name, _, each in others if name == joint])
+    if near is not None:
+        return f"{joint}.{near}"
+    near = nearest(joint, [name for name, _, each in others if each == quantity])
+    return None if near is None else f"{near}.{quantity}"
+
+
+def _misspellings(meant: Mapping[str, str]) -> Iterator[str]:
+    """Yield one problem for all columns with the same mistake, in the joint or in the quantity."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for column, near in meant.items():
+        parts = zip(column.split("."), near.split("."), strict=False)
+        mistake = [part for pair in parts if pair[0] != pair[1] for part in pair]
+        groups.setdefault(tuple(mistake), []).append(column)
+    for columns in groups.values():
+        right = [meant[each] for each in columns]
+        if successor(columns[0], right) is None:
+            yield f"{_unknown(columns)}; did you mean {_several(right)}?"
+        else:
+            verb = "it is" if len(columns) == 1 else "they are"
+            yield f"{_unknown(columns)}; {verb} now {_several(right)}"
+
+
+def _unknown(columns: Sequence[str]) -> str:
+    words = "unknown column" if len(columns) == 1 else f"{len(columns)} unknown columns:"
+    return f"{words} {_several(columns)}"
+
+
+def _several(columns: Sequence[str]) -> str:
+    return repr(columns[0]) if len(columns) == 1 else listed(columns, MOST_NAMED)
+
+
+def _missing(absent: Mapping[int, str]) -> str:
+    words = "the column {} is missing" if len(absent) == 1 else "the columns {} are missing"
+    return words.format(", ".join(absent.values()))
