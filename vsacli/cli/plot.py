@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.plot_robot import draw_robot, is_robot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -77,7 +78,7 @@ def plot(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw the figures of a result, a simulation, a recording or a study, or compare several results.
+    """Draw the figures of a result, a simulation, a recording, a study or a robot, or compare results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
@@ -89,6 +90,10 @@ def plot(
     A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
     signal, the fitted spline, the residual and the spectra of both. A result computed from a recording gives
     it as well. Joints have the names of the columns, or of --robot.
+
+    A robot gives <stem>-arm (links, joints and motors at q = 0, or in the middle of position limits),
+    <stem>-actuators (torque of the springs over deflection) and <stem>-stiffness (attainable stiffness over
+    torque, with singularities and limits).
 
     With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
 
@@ -106,7 +111,10 @@ def plot(
     shown = _Shown(joints or (), _span(start, end), variables)
     with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
         target = _Target(Path(folder), file_format, outputs)
-        if any(map(is_recording, files)):
+        if any(map(is_robot, files)):
+            _check_robot(files, shown, robot, file_format)
+            draw_robot(files[0], target.figures, talk)
+        elif any(map(is_recording, files)):
             _check_recording(files, shown, file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
@@ -128,6 +136,24 @@ class _Target(NamedTuple):
         from vsacli.results.plots import FigureFiles
 
         return FigureFiles(names, self.folder, stem, self.file_format, self.outputs)
+
+
+def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None, file_format: str) -> None:
+    """Refuse options that do not apply to figures of robots.
+
+    Raises:
+        click.UsageError: with the option, or for several files.
+    """
+    if len(files) > 1:
+        raise click.UsageError("robots are drawn one at a time; give one robot file and nothing else")
+    if shown != _EVERYTHING:
+        raise click.UsageError("times, joints and variables can be chosen of results, not of robots")
+    if robot is not None:
+        raise click.UsageError("--robot is the robot of a recording; a robot file is drawn by itself")
+    if file_format == "html":
+        raise click.UsageError(
+            "--format html needs a result, which `vsacli invdyn` computes; take png, pdf or svg"
+        )
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:

@@ -13,10 +13,10 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import Geometry, frames_in_base
 from vsacli.robot.model import Robot
 
-JOINT_SHARE = 0.09
+JOINT_SHARE = 0.11
 """Length of a drawn joint along its axis, relative to the size of the arm."""
 
-ROOM = 1.3
+ROOM = 1.5
 """Width of a view relative to the size of the arm."""
 
 FLAT_SHARE = 0.05

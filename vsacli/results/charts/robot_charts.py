@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.reach import OfJoint
@@ -258,7 +257,9 @@ class ActuatorChart:
     def torques(self) -> list[TorqueCurve]:
         """Torques of the springs over the deflections that occur in the map within all limits."""
         phi = np.where(self.stiffness.within, self.stiffness.deflections, np.nan)
-        return list(self._of_mechanism(phi) if self.actuator.spring_elements is None else self._of_springs(phi))
+        return list(
+            self._of_mechanism(phi) if self.actuator.spring_elements is None else self._of_springs(phi)
+        )
 
     def _of_springs(self, phi: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of each spring, of equal springs only once."""

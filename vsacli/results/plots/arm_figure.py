@@ -53,14 +53,14 @@ _OTHER_FILL, _MOTOR_FILL, _BASE_FILL = "white", "0.35", "0.6"
 _LINK: dict[str, Any] = {"color": "0.55", "linewidth": 4.5, "solid_capstyle": "round"}
 _AXIS: dict[str, Any] = {"color": "#d8261c", "linewidth": 0.9, "linestyle": (0, (8, 2, 1.5, 2))}
 _LEADER: dict[str, Any] = {"color": "0.5", "linewidth": 0.6}
-_ARROW: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
+_ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
 
 
 def arm_figure(chart: ArmChart) -> Figure:
     """Draw the views of an arm at one scale; the first one names the joints."""
     with house_style():
         widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
-        figure = Figure((PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.2), layout="constrained")
+        figure = Figure((PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4), layout="constrained")
         panels = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
         for axes, view in zip(panels, chart.views, strict=True):
             _frame_panel(axes, chart, view, named=view is chart.views[0])
@@ -131,7 +131,7 @@ def _solids(chart: ArmChart) -> Iterator[_Solid]:
 
 
 def _base(chart: ArmChart) -> tuple[FloatArray, FloatArray]:
-    """Return the place of the base and its normal: the base frame, or below the first joint if that is near."""
+    """Return place and normal of the base: the base frame, or below the first joint if that is near."""
     origin, up = chart.chain.origins[0, 0], chart.chain.base[0, :, 2]
     if np.linalg.norm(origin) > chart.joint_length:
         return np.zeros(3), np.array([0.0, 0.0, 1.0])
@@ -221,7 +221,7 @@ def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatAr
     """Return heights at least a gap apart, in the same order and between two ends, near the given ones."""
     order = np.argsort(heights, kind="stable")
     offsets = gap * np.arange(len(heights))
-    # Without the offsets the condition is an ascending order; the mean of both bounds keeps clusters centered.
+    # Without the offsets any ascending order will do; the mean of both bounds keeps clusters centered.
     free = heights[order] - offsets
     rising, falling = np.maximum.accumulate(free), np.minimum.accumulate(free[::-1])[::-1]
     spread = np.empty_like(heights)
