@@ -42,7 +42,7 @@ SEARCHED = np.geomspace(1e-5, 1e7, 121)
 RATIOS, SHARES = np.geomspace(1 + 1e-6, 1e3, 25)[:, None], np.linspace(0.02, 1 - 1e-6, 13)[:, None]
 """Stiffness values tried at each of these torques: relative to the minimum, and as shares of the range."""
 
-FREE_GROWTH = 2.0
+FREE_GROWTH = 1.5
 """Growth of the minimum stiffness up to the end of the torque axis, where no limit ends it."""
 
 FREE_HEIGHT = 2.5
@@ -250,7 +250,7 @@ class ActuatorChart:
         if usable.any() and not within[-1][seen.upper > top].any():
             top = ROOM * max([*self.limits, float(seen.levels[within].max())])
             if not np.ptp(seen.levels[within]):  # a linear spring, whose line is in the middle
-                top *= FREE_GROWTH
+                top *= 2
         return end, top
 
     @property

@@ -43,6 +43,9 @@ AXIS_LENGTH, FRAME_LENGTH = 1.5, 1.7
 SHORTEST_ARROW = 0.3
 """Share of its length below which an arrow of a frame, seen from its tip, is left out."""
 
+EDGE = 0.7
+"""Width of edges, points."""
+
 ROUND = 24
 """Number of sides of a cylinder."""
 
@@ -155,43 +158,28 @@ def _prism(low: FloatArray, high: FloatArray, radius: float, sides: int, color: 
 
 
 def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
-    """Draw the faces of a convex solid that point toward the viewer; smooth walls have no edges."""
-    faces = [view.project(face) for face in solid.faces]
-    shown = [face for face in faces if _area(face) > 0]
-    walls = [face for face in shown if len(face) == 4]
+    """Draw the faces of a convex solid that point toward the viewer; smooth walls have no edges.
+
+    Black edges of all faces lie below, so that only their outer half is seen, which is the outline.
+    """
+    projected = [view.project(face) for face in solid.faces]
+    shown = [face for face in projected if _area(face) > 0]
     smooth = len(solid.faces) > ROUND
-    edges = solid.color if smooth else "black"
-    axes.add_collection(
-        PolyCollection(walls, facecolor=solid.color, edgecolor=edges, linewidth=0.6, zorder=order)
+    walls, ends = ([face for face in shown if (len(face) == 4) == flat] for flat in (True, False))
+    layers = (
+        (shown, "black", 2 * EDGE),
+        (walls, solid.color if smooth else "black", EDGE),
+        (ends, "black", EDGE),
     )
-    if smooth and len(shown):
-        hull = _outline(np.concatenate(shown))
-        axes.fill(*hull.T, facecolor="none", edgecolor="black", linewidth=0.7, zorder=order + 1e-4)
-    ends = [face for face in shown if len(face) != 4]
-    axes.add_collection(
-        PolyCollection(ends, facecolor=solid.color, edgecolor="black", linewidth=0.7, zorder=order + 2e-4)
-    )
+    for rank, (faces, edges, width) in enumerate(layers):
+        look = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
+        axes.add_collection(PolyCollection(faces, **look, zorder=order + 1e-4 * rank))
 
 
 def _area(face: FloatArray) -> float:
     """Return the signed area of a polygon, (corners, 2): positive if it turns counterclockwise."""
     x, y = face.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-
-
-def _outline(points: FloatArray) -> FloatArray:
-    """Return the convex hull of points, (points, 2), counterclockwise."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-
-    def half(along: FloatArray) -> list[FloatArray]:
-        kept: list[FloatArray] = []
-        for point in along:
-            while len(kept) > 1 and _area(np.stack((kept[-2], kept[-1], point))) <= 0:
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(half(ordered) + half(ordered[::-1]))
 
 
 def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, name: str) -> None:
@@ -233,13 +221,15 @@ def _handles(chart: ArmChart) -> list[Artist]:
     """Return the legend: kinds of joints in the robot, motors, axes and base."""
     kinds = dict.fromkeys(joint.actuator_type for joint in chart.joints)
     handles: list[Artist] = [
-        Patch(facecolor=FILLS.get(kind, _OTHER_FILL), edgecolor="black", linewidth=0.7, label=f"{kind} joint")
+        Patch(
+            facecolor=FILLS.get(kind, _OTHER_FILL), edgecolor="black", linewidth=EDGE, label=f"{kind} joint"
+        )
         for kind in kinds
     ]
     return [
         *handles,
-        Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=0.7, label="motor"),
+        Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE, label="motor"),
         Line2D([], [], **_AXIS, label="joint axis"),
         Line2D([], [], **_LINK, label="link"),
-        Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=0.7, label="base"),
+        Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
     ]
