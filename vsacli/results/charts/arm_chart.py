@@ -13,8 +13,8 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import Geometry, frames_in_base
 from vsacli.robot.model import Robot
 
-JOINT_SHARE = 0.11
-"""Length of a drawn joint along its axis, relative to the size of the arm."""
+JOINT_SHARE, SUM_OF_JOINTS = 0.11, 0.9
+"""Length of a drawn joint along its axis, relative to the size of the arm; of all joints together at most."""
 
 ROOM = 1.5
 """Width of a view relative to the size of the arm."""
@@ -101,6 +101,7 @@ class ArmChart(NamedTuple):
             intersect.
         down: direction of gravity, (3,); zero without gravity.
         size: size of the arm.
+        joint_length: length of a drawn joint along its axis.
         middle: middle of the arm, (3,).
         views: views that show it.
     """
@@ -113,13 +114,9 @@ class ArmChart(NamedTuple):
     centers: FloatArray
     down: FloatArray
     size: float
+    joint_length: float
     middle: FloatArray
     views: tuple[View, ...]
-
-    @property
-    def joint_length(self) -> float:
-        """Length of a drawn joint along its axis, m."""
-        return JOINT_SHARE * self.size
 
 
 def arm_chart(robot: Robot) -> ArmChart:
@@ -129,7 +126,8 @@ def arm_chart(robot: Robot) -> ArmChart:
     line = _corners(chain)
     extents = np.ptp(line, axis=0)
     size = max(float(extents.max()), SMALLEST_SIZE)
-    centers = _centers(chain, JOINT_SHARE * size)
+    length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
+    centers = _centers(chain, length)
     gravity = np.array(robot.gravity)
     strength = float(np.linalg.norm(gravity))
     down = gravity / strength if strength else np.zeros(3)
@@ -138,7 +136,7 @@ def arm_chart(robot: Robot) -> ArmChart:
     title = f"{robot.name}: arm at {_configuration(robot, q)}"
     views = _views(down, extents, size)
     size = max(size, float(np.ptp(drawn, axis=0).max()))
-    return ArmChart(title, robot.joints, q, chain, line, centers, down, size, middle, views)
+    return ArmChart(title, robot.joints, q, chain, line, centers, down, size, length, middle, views)
 
 
 def _configuration(robot: Robot, q: FloatArray) -> str:

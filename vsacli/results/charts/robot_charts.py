@@ -16,6 +16,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
@@ -264,23 +265,19 @@ class ActuatorChart:
     def _of_springs(self, phi: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of each spring, of equal springs only once."""
         theta = self.actuator.motor_positions(phi[: self.actuator.motor_count], np.asarray(self.q))
-        seen: list[tuple[SpringLaw, float]] = []
         elements = self.actuator.spring_elements or ()
-        for number, element in enumerate(elements, 1):
-            law = element.law
-            if (law, law.max_deflection) in seen:
+        kinds = [(element.law, _as_declared(element.law).max_deflection) for element in elements]
+        for index, (element, (law, limit)) in enumerate(zip(elements, kinds, strict=True)):
+            if (law, limit) in kinds[:index]:
                 continue
-            seen.append((law, law.max_deflection))
-            same = [each for each, other in enumerate(elements, 1) if other.law == law]
             weights = zip(element.motors, theta, strict=True)
             deflection = element.joint * self.q + sum(weight * moved for weight, moved in weights)
-            reached = law.max_deflection
-            if math.isinf(reached):
-                reached = ROOM * float(np.nanmax(np.abs(deflection)))
+            reached = limit if math.isfinite(limit) else ROOM * float(np.nanmax(np.abs(deflection)))
             low, high = (min(max(end, -reached), reached) for end in law.domain)
             points = np.linspace(low, high, POINTS)
-            name = "spring between the motors" if element.joint == 0 else _numbered(same or [number])
-            yield TorqueCurve(name, points, law.torque(points), law.max_deflection)
+            same = [number for number, kind in enumerate(kinds, 1) if kind == (law, limit)]
+            name = "spring between the motors" if element.joint == 0 else _numbered(same)
+            yield TorqueCurve(name, points, law.torque(points), limit)
 
     def _of_mechanism(self, phi: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of a mechanism at several settings of motor 2."""
@@ -347,12 +344,16 @@ def _within(levels: FloatArray, clearance: dict[str, FloatArray]) -> BoolArray:
     return within
 
 
+def _as_declared(law: SpringLaw) -> SpringLaw:
+    """Return the law of a robot file from one that acts on side 2, where tendons are mirrored."""
+    return law.law if isinstance(law, Mirrored) else law
+
+
 def _law_name(law: SpringLaw) -> str:
-    """Return the name of a law in robot files; that of the wrapped law where it acts on side 2."""
+    """Return the name of a law in robot files."""
     if law.is_linear:
         return "linear"
-    law = getattr(law, "law", law)
-    return LAWS.name_of(type(law)).replace("_", " ")
+    return LAWS.name_of(type(_as_declared(law))).replace("_", " ")
 
 
 def _numbered(numbers: Sequence[int]) -> str:

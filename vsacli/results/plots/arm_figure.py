@@ -37,8 +37,11 @@ RADIUS, MOTOR_RADIUS, MOTOR_LENGTH = 0.36, 0.26, 0.3
 PLATE, PLATE_HEIGHT = 1.6, 0.16
 """Half-width and height of the base, relative to the length of a joint."""
 
-AXIS_LENGTH, FRAME_LENGTH = 1.5, 1.7
-"""Half-length of the line of an axis, and length of the arrows of a frame, relative to that length."""
+AXIS_LENGTH = 1.5
+"""Half-length of the line of an axis, relative to that length."""
+
+ARROW_SHARE = 0.19
+"""Length of the arrows of gravity and the tool frame, relative to the size of the arm."""
 
 SHORTEST_ARROW = 0.3
 """Share of its length below which an arrow of a frame, seen from its tip, is left out."""
@@ -95,7 +98,7 @@ def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> Non
 
 def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
-    length, chain = chart.joint_length, chart.chain
+    length, arrow, chain = chart.joint_length, ARROW_SHARE * chart.size, chart.chain
     axes.plot(*view.project(chart.line).T, **_LINK, zorder=2)
     for origin, center in zip(chain.origins[0], chart.centers, strict=False):  # joints moved along their axes
         axes.plot(*view.project(np.stack((origin, center))).T, **{**_LINK, "linewidth": 2.5}, zorder=2)
@@ -106,9 +109,9 @@ def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
         ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
         axes.plot(*view.project(ends).T, **_AXIS, zorder=4.2)
     for direction, name in zip(chain.tool[0].T, "xyz", strict=True):
-        _draw_arrow(axes, view, chain.origins[0, -1], FRAME_LENGTH * length * direction, name)
+        _draw_arrow(axes, view, chain.origins[0, -1], arrow * direction, name)
     start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
-    _draw_arrow(axes, view, start, 2 * length * chart.down, "g")
+    _draw_arrow(axes, view, start, arrow * chart.down, "g")
 
 
 class _Solid(NamedTuple):
