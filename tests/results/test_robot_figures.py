@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,11 @@ bundled = pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 
 def charts(robot: Robot) -> list[ActuatorChart]:
     return actuator_charts(robot, load_sizes(static_load(robot)).tolist())
+
+
+@cache
+def bundled_charts(file: Path) -> list[ActuatorChart]:
+    return charts(load_robot(file))
 
 
 def chart(name: str) -> ActuatorChart:
@@ -79,7 +85,7 @@ def device(name: str) -> Path:
 
 @bundled
 def test_the_decoupling_matrix_is_singular_at_ends_of_the_attainable_range_alone(file: Path) -> None:
-    for each in charts(load_robot(file)):
+    for each in bundled_charts(file):
         if not each.commanded:
             continue
         seen = each.stiffness
@@ -217,7 +223,8 @@ def test_every_bundled_robot_is_drawn(file: Path) -> None:
     solids = sum(isinstance(each, PolyCollection) for each in arm.axes[0].collections)
     motors = sum(joint.actuator.motor_count for joint in robot.joints)
     assert solids == 3 * (1 + len(robot.joints) + motors)
-    for figure in (actuators_figure(charts(robot), "r"), stiffness_figure(charts(robot), "r")):
-        assert len(figure.axes) == len(charts(robot))
+    actuators = bundled_charts(file)
+    for figure in (actuators_figure(actuators, "r"), stiffness_figure(actuators, "r")):
+        assert len(figure.axes) == len(actuators)
         figure.draw_without_rendering()
     arm.draw_without_rendering()

@@ -32,7 +32,7 @@ RECORDING = "recording"
 
 @click.command(
     "plot",
-    short_help="Plot results, simulations and recordings.",
+    short_help="Plot robots, results, simulations and recordings.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
