@@ -33,7 +33,7 @@ def test_of_rigid_joints_only_the_arm_is_drawn_and_a_note_says_so(vsacli, tmp_pa
     [
         (["--from", "1"], "can be chosen of results, not of robots"),
         (["--joints", "elbow"], "can be chosen of results, not of robots"),
-        (["--robot", ROBOT], "a robot file is drawn by itself"),
+        (["--robot", ROBOT], "a robot file needs no other"),
         (["--format", "html"], "--format html needs a result"),
         ([ROBOT], "robots are drawn one at a time"),
     ],

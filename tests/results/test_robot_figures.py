@@ -121,6 +121,14 @@ def test_joints_with_other_limits_of_the_same_springs_are_drawn_apart() -> None:
     assert len(charts(robot.replace("joints.elbow.actuator.spring.*.max_deflection", 0.3))) == 2
 
 
+@pytest.mark.parametrize("name", ["maccepa_1r", "vsa_3r", "tendon_1r"])
+def test_motors_that_hold_no_spring_leave_a_figure_beyond_limits(name: str) -> None:
+    weak = charts(shipped_robot(name).replace("joints.*.actuator.motor.*.max_torque", 1e-9))
+    assert not weak[0].stiffness.within.any()
+    for figure in (actuators_figure(weak, "weak"), stiffness_figure(weak, "weak")):
+        figure.draw_without_rendering()
+
+
 def test_torque_of_springs_ends_at_the_limit_of_deflection() -> None:
     (curve,) = charts(load_robot(device("vsa_cubebot")))[0].torques
     assert curve.label == "springs 1 and 2"

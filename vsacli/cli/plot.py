@@ -149,7 +149,7 @@ def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None, file_
     if shown != _EVERYTHING:
         raise click.UsageError("times, joints and variables can be chosen of results, not of robots")
     if robot is not None:
-        raise click.UsageError("--robot is the robot of a recording; a robot file is drawn by itself")
+        raise click.UsageError("--robot is the robot of a recording; a robot file needs no other")
     if file_format == "html":
         raise click.UsageError(
             "--format html needs a result, which `vsacli invdyn` computes; take png, pdf or svg"

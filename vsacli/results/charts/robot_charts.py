@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from vsacli.base.variables import VARIABLES
 from vsacli.results.charts.arm_chart import home_position
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 POINTS, LEVELS = 201, 37
 """Number of torques of a map, and of stiffness values at each torque for the curves of limits."""
@@ -215,10 +218,11 @@ class ActuatorChart:
     def _map(self, end: float, top: float) -> StiffnessMap:
         """Return the map up to these ends of its axes."""
         tau_e = np.linspace(-end, end, POINTS)
-        lower, upper, *singular = self.ends(tau_e)
+        lower, upper, at_lower, at_upper = self.ends(tau_e)
         shares = np.linspace(INSIDE ** (1 / 3), 1 - INSIDE, LEVELS)[:, None] ** 3  # dense at the minimum
         levels = lower + shares * np.maximum(np.minimum(upper, top) - lower, 0.0)
-        return StiffnessMap(tau_e, lower, upper, *singular, levels, *self.clearance(tau_e, levels), top)
+        clearance, phi = self.clearance(tau_e, levels)
+        return StiffnessMap(tau_e, lower, upper, at_lower, at_upper, levels, clearance, phi, top)
 
     def _sight(self) -> tuple[float, float]:
         """Return ends of both axes beyond which nothing keeps the limits, to within a factor of 1.5.
@@ -230,7 +234,7 @@ class ActuatorChart:
         most = np.where(np.isinf(upper), lower * RATIOS[-1], upper)
         levels = np.concatenate((np.minimum(lower * RATIOS, most), lower + SHARES * (most - lower)))
         within = _within(levels, self.clearance(tau_e, levels)[0])
-        usable, sizes = within.any(axis=0), np.abs(tau_e)
+        usable, sizes = np.any(within, axis=0), np.abs(tau_e)
         if usable[[0, -1]].any() or not usable.any():
             usable = lower <= FREE_GROWTH * np.nanmin(lower)
         end = BEYOND_TORQUE * float(np.max(sizes, where=usable, initial=0.0))
@@ -238,13 +242,14 @@ class ActuatorChart:
         seen = within & (sizes <= end)
         highest = float(np.max(levels, where=seen, initial=0.0))
         if not highest or np.any(seen & (levels >= lower * RATIOS[-1] * (1 - INSIDE)) & np.isinf(upper)):
-            return end, FREE_HEIGHT * float(np.max(lower, where=sizes <= end, initial=0.0))
-        return end, BEYOND * highest
+            carried = (sizes <= end) & np.isfinite(lower)
+            highest = FREE_HEIGHT / BEYOND * float(np.max(lower, where=carried, initial=0.0))
+        return end, max([BEYOND * highest or 1.0, *(ROOM * limit for limit in self.limits)])
 
     def _extent(self, seen: StiffnessMap) -> tuple[float, float]:
         """Return the ends of both axes just beyond the values that keep all limits."""
         within, sizes = seen.within, np.abs(seen.tau_e)
-        usable = within.any(axis=0)
+        usable = np.any(within, axis=0)
         end, top = float(sizes[-1]), seen.top
         if usable.any() and not usable[[0, -1]].any():
             end = max(ROOM * float(sizes[usable].max()), LOAD_SHARE * self.load)
@@ -257,7 +262,8 @@ class ActuatorChart:
     @property
     def torques(self) -> list[TorqueCurve]:
         """Torques of the springs over the deflections that occur in the map within all limits."""
-        phi = np.where(self.stiffness.within, self.stiffness.deflections, np.nan)
+        within = self.stiffness.within
+        phi = np.where(within | ~within.any(), self.stiffness.deflections, np.nan)
         return list(
             self._of_mechanism(phi) if self.actuator.spring_elements is None else self._of_springs(phi)
         )
@@ -331,7 +337,11 @@ def _interchangeable(one: Joint, other: Joint) -> bool:
 
 def _drawn(actuator: Actuator) -> tuple[object, ...]:
     """Return the parts of an actuator that its charts show."""
-    parts = [getattr(actuator, each.name) for each in fields(actuator) if each.name not in ROTORS]
+    parts = [
+        getattr(actuator, each.name)
+        for each in fields(cast("DataclassInstance", actuator))
+        if each.name not in ROTORS
+    ]
     limits = [check for check in actuator.limits() if check.variable in LIMITS]
     return type(actuator), parts, limits
 

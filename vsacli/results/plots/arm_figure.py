@@ -175,7 +175,7 @@ def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
         (ends, "black", EDGE),
     )
     for rank, (faces, edges, width) in enumerate(layers):
-        look = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
+        look: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
         axes.add_collection(PolyCollection(faces, **look, zorder=order + 1e-4 * rank))
 
 
@@ -190,8 +190,9 @@ def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, na
     tail, tip = view.project(start), view.project(start + arrow)
     if np.linalg.norm(tip - tail) <= SHORTEST_ARROW * np.linalg.norm(arrow):
         return
-    axes.annotate("", tip, tail, arrowprops=_ARROW, zorder=5)
-    axes.text(*(tail + 1.25 * (tip - tail)), name, fontsize=8, ha="center", va="center", zorder=5)
+    axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
+    x, y = tail + 1.25 * (tip - tail)
+    axes.text(x, y, name, fontsize=8, ha="center", va="center", zorder=5)
 
 
 def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:

@@ -34,8 +34,8 @@ stiffness on such an axis, relative to the largest."""
 
 _AREA: dict[str, Any] = {"facecolor": "#c9dff4", "linewidth": 0, "zorder": 0.6}
 _BEYOND: dict[str, Any] = {"facecolor": "0.88", "edgecolor": "0.6", "hatch": "////", "linewidth": 0}
-_SINGULAR: dict[str, Any] = {"color": line_style(1).color, "linewidth": 2.2, "linestyle": "-"}
-_END: dict[str, Any] = {"color": line_style(2).color, "linewidth": 1.4, "linestyle": "-"}
+_SINGULAR: dict[str, Any] = {"color": line_style(1).color, "linewidth": 2.8, "linestyle": "-"}
+_END: dict[str, Any] = {"color": line_style(2).color, "linewidth": 1.0, "linestyle": "-"}
 _LOAD: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 _ALLOWED: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 2))}
 _ONLY: dict[str, Any] = {"color": "black", "linewidth": 1.8}
