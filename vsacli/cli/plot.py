@@ -22,6 +22,7 @@ from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import TIME
+from vsacli.cli.plot_robot import draw_robot, is_robot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -43,7 +44,7 @@ DRAWN = ("result", "simulation", "table of a study", "table")
 
 @click.command(
     "plot",
-    short_help="Plot results, simulations and recordings.",
+    short_help="Plot robots, results, simulations and recordings.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
@@ -91,7 +92,7 @@ def plot(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw results, simulations, recordings, studies and sensitivities, or compare several results.
+    """Draw a robot, results, simulations, recordings, studies and sensitivities, or compare several results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
@@ -103,6 +104,10 @@ def plot(
     A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
     signal, the fitted spline, the residual and the spectra of both. A result computed from a recording gives
     it as well. Joints have the names of the columns, or of --robot.
+
+    A robot gives <stem>-arm (links, joints and motors at q = 0, or in the middle of position limits),
+    <stem>-actuators (torque of the springs over deflection) and <stem>-stiffness (attainable stiffness over
+    torque, with singularities and limits).
 
     With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
 
@@ -125,7 +130,10 @@ def plot(
         raise click.UsageError(f"{twice} is given twice; give each result once")
     with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
         target = _Target(figures, outputs)
-        if any(map(is_recording, files)):
+        if any(map(is_robot, files)):
+            _check_robot(files, shown, robot, figures.file_format)
+            draw_robot(files[0], target.figures, talk)
+        elif any(map(is_recording, files)):
             _check_recording(files, shown, figures.file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
@@ -149,6 +157,24 @@ class _Target(NamedTuple):
     def figures(self, names: Iterable[str], stem: str) -> FigureFiles:
         """Stage the files of figures."""
         return self.place.files(names, stem, self.outputs)
+
+
+def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None, file_format: str) -> None:
+    """Refuse options that do not apply to figures of robots.
+
+    Raises:
+        click.UsageError: with the option, or for several files.
+    """
+    if len(files) > 1:
+        raise click.UsageError("robots are drawn one at a time; give one robot file and nothing else")
+    if shown != _EVERYTHING:
+        raise click.UsageError(f"{shown.option} cannot be used with a robot; leave it out")
+    if robot is not None:
+        raise click.UsageError("--robot is only for recordings; leave it out")
+    if file_format == PAGE:
+        raise click.UsageError(
+            "--format html needs a result, which `vsacli invdyn` computes; choose png, pdf or svg"
+        )
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:

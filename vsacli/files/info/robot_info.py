@@ -165,8 +165,6 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     loads = static_load(robot)
-    least = LOAD_ROUNDING * np.max(loads.values, initial=0.0)
-    values = np.where(loads.values <= least, 0.0, loads.values)
     return [
         {
             **json_fields(joint),
@@ -174,7 +172,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
             "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
         }
         for index, (joint, value, configuration) in enumerate(
-            zip(robot.joints, values, loads.configurations, strict=True)
+            zip(robot.joints, load_sizes(loads), loads.configurations, strict=True)
         )
     ]
 
@@ -246,6 +244,12 @@ def _length(joint: Joint) -> float:
 def static_load(robot: Robot) -> Extremes:
     """Return the largest |torque| of each joint found for gravity alone, N m (N)."""
     return largest_sizes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
+
+
+def load_sizes(loads: Extremes) -> FloatArray:
+    """Return the static loads of all joints, (joints,), N m (N), with zero in place of rounding errors."""
+    least = LOAD_ROUNDING * np.max(loads.values, initial=0.0)
+    return np.where(loads.values <= least, 0.0, loads.values)
 
 
 def held_at_zero(robot: Robot) -> list[str]:

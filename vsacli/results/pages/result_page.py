@@ -20,6 +20,7 @@ from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
 from vsacli.base.variables import deviation
+from vsacli.results.charts.arm_chart import Chain
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.charts.reduction import marked_spans
@@ -36,7 +37,6 @@ from vsacli.results.pages.document import (
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.damage import reporting_damage
 from vsacli.results.store.reader import StoredResult
-from vsacli.robot.kinematics import frames_in_base
 
 MOST_FRAMES = 1000
 """Maximum number of instants of the animated robot; the page interpolates between them at 60 frames a
@@ -219,13 +219,8 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
         packed: store of the arrays.
 
     Returns:
-        Numbers of arrays in the base frame, m:
-        `time`, (instants,), s after the start of the page;
-        `origins` of DH frames 0 to N and of the end effector, (instants, joints + 2, 3);
-        `elbows`, intersections of the common normal of two axes with the first, (instants, joints, 3): the
-            offset d leads there along the z axis of the previous frame, the length a from there to the next
-            frame;
-        `axes`, unit vectors along the axes of the joints, (instants, joints, 3).
+        Numbers of the arrays `time`, (instants,), s after the start of the page, and `origins`, `elbows` and
+        `axes` of the `Chain` at these instants.
     """
     if "q" not in result.variables:
         return None
@@ -233,16 +228,12 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
     geometry = result.geometry()
     positions = np.asarray(result.read("q"), dtype=np.float64)[steps]
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        frames = list(frames_in_base(geometry, positions))
-    origins = np.stack([frame.origin for frame in frames], axis=1)
-    lengths = np.array([joint.dh.a for joint in geometry.joints])
-    normals = np.stack([frame.axes[..., 0] for frame in frames[1:-1]], axis=1)
-    axes = np.stack([frame.axes[..., 2] for frame in frames[:-2]], axis=1)
+        chain = Chain.of(geometry, positions)
     return {
         "time": packed.add(result.time[steps] - start),
-        "origins": packed.add(origins),
-        "elbows": packed.add(origins[:, 1:-1] - lengths[:, None] * normals),
-        "axes": packed.add(axes),
+        "origins": packed.add(chain.origins),
+        "elbows": packed.add(chain.elbows),
+        "axes": packed.add(chain.axes),
     }
 
 

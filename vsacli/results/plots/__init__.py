@@ -8,6 +8,7 @@ except OSError as error:
     reason = "Matplotlib has no folder for its files; name one by the environment variable MPLCONFIGDIR"
     raise StorageError("figures", f"cannot be drawn: {reason}") from error
 
+from vsacli.results.plots.arm_figure import arm_figure
 from vsacli.results.plots.figures import (
     FORMATS,
     FigureFiles,
@@ -18,6 +19,7 @@ from vsacli.results.plots.figures import (
     save_figures,
 )
 from vsacli.results.plots.recorded_figure import recorded_figure
+from vsacli.results.plots.robot_figures import actuators_figure, stiffness_figure
 from vsacli.results.plots.sheets import drawn
 from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
 from vsacli.results.plots.study_figures import compared_studies, ranking_figure, study_figures
@@ -28,6 +30,8 @@ __all__ = [
     "FigureFiles",
     "Figures",
     "TorqueSpeed",
+    "actuators_figure",
+    "arm_figure",
     "compare_files",
     "compared_studies",
     "draw_stored",
@@ -36,6 +40,7 @@ __all__ = [
     "ranking_figure",
     "recorded_figure",
     "save_figures",
+    "stiffness_figure",
     "study_figures",
     "torque_speed_figure",
 ]

@@ -1,0 +1,54 @@
+"""`vsacli plot ROBOT`: figures of a robot before any run."""
+
+from __future__ import annotations
+
+import pytest
+from samples.command_line import REPOSITORY, ROBOT, contents
+
+NAMES = ("arm", "actuators", "stiffness")
+
+
+def test_a_robot_is_drawn(vsacli, tmp_path):
+    done = vsacli("plot", ROBOT, "-o", "figures", "--format", "svg")
+    assert done.code == 0
+    assert done.err.splitlines() == [f"wrote figures/vsa_3r-{name}.svg" for name in NAMES]
+    first = contents(tmp_path)
+    assert first.keys() == {f"figures/vsa_3r-{name}.svg" for name in NAMES}
+    vsacli("plot", ROBOT, "-o", "figures", "--format", "svg", "--overwrite")
+    assert contents(tmp_path) == first
+
+
+def test_of_rigid_joints_only_the_arm_is_drawn_and_a_note_says_so(vsacli, tmp_path):
+    robot = (REPOSITORY / "robots" / "mixed_3r.yaml").read_text(encoding="utf-8")
+    start, *joints = robot.split("  - name: ")
+    (tmp_path / "rigid.yaml").write_text("  - name: ".join((start, joints[0])), encoding="utf-8")
+    done = vsacli("plot", "rigid.yaml")
+    assert done.code == 0
+    assert "rigid.yaml: no figures of actuators and stiffness: all joints are rigid" in done.err
+    assert contents(tmp_path).keys() == {"rigid.yaml", "rigid-arm.png"}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--from", "1"], "can be chosen of results, not of robots"),
+        (["--joints", "elbow"], "can be chosen of results, not of robots"),
+        (["--robot", ROBOT], "a robot file needs no other"),
+        (["--format", "html"], "--format html needs a result"),
+        ([ROBOT], "robots are drawn one at a time"),
+    ],
+)
+def test_options_of_results_are_refused(vsacli, tmp_path, options, message):
+    done = vsacli("plot", ROBOT, *options)
+    assert done.code == 2
+    assert message in " ".join(done.err.split())
+    assert contents(tmp_path) == {}
+
+
+def test_an_invalid_robot_is_refused_with_the_line(vsacli, tmp_path):
+    text = ROBOT.read_text(encoding="utf-8").replace("type: revolute", "type: revolving", 1)
+    (tmp_path / "bad.yaml").write_text(text, encoding="utf-8")
+    done = vsacli("plot", "bad.yaml")
+    assert done.code == 2
+    assert done.err.startswith("bad.yaml:")
+    assert "revolving" in done.err

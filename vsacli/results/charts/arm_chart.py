@@ -1,0 +1,208 @@
+"""The arm as a drawing: lines of links, places of joints, views of them, at a home configuration."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.units import LENGTH
+from vsacli.robot.joint import Joint
+from vsacli.robot.kinematics import Geometry, frames_in_base
+from vsacli.robot.model import Robot
+
+JOINT_SHARE, SUM_OF_JOINTS = 0.11, 0.9
+"""Length of a drawn joint along its axis, relative to the size of the arm; of all joints together at most."""
+
+ROOM = 1.5
+"""Width of a view relative to the size of the arm."""
+
+FLAT_SHARE = 0.05
+"""Extent of an arm, relative to its size, below which it counts as flat: one view shows all of it."""
+
+SMALLEST_SIZE = 1e-3
+"""Size, m, of the drawing of a robot without lengths."""
+
+
+class Chain(NamedTuple):
+    """Points of a chain of links in the base frame, m.
+
+    Attributes:
+        origins: origins of DH frames 0 to N and of the end effector, (samples, joints + 2, 3).
+        elbows: intersections of the common normal of two axes with the first, (samples, joints, 3): the
+            offset d leads there along the z axis of the previous frame, the length a from there to the next
+            frame.
+        axes: unit vectors along the axes of the joints, (samples, joints, 3).
+        base, tool: axes of DH frame 0 and of the end effector as columns, (samples, 3, 3).
+    """
+
+    origins: FloatArray
+    elbows: FloatArray
+    axes: FloatArray
+    base: FloatArray
+    tool: FloatArray
+
+    @classmethod
+    def of(cls, geometry: Geometry, q: FloatArray) -> Chain:
+        """Return the chain at joint positions, (samples, joints)."""
+        frames = list(frames_in_base(geometry, q))
+        origins = np.stack([frame.origin for frame in frames], axis=1)
+        lengths = np.array([joint.dh.a for joint in geometry.joints])
+        normals = np.stack([frame.axes[..., 0] for frame in frames[1:-1]], axis=1)
+        axes = np.stack([frame.axes[..., 2] for frame in frames[:-2]], axis=1)
+        elbows = origins[:, 1:-1] - lengths[:, None] * normals
+        return cls(origins, elbows, axes, frames[0].axes, frames[-1].axes)
+
+
+def home_position(joint: Joint) -> float:
+    """Return 0, or the middle of the position limits of a joint that they do not let move to both sides."""
+    low, high = joint.limits.position
+    return 0.0 if low < 0 < high or not math.isfinite(low + high) else (low + high) / 2
+
+
+class View(NamedTuple):
+    """An orthographic projection.
+
+    Attributes:
+        name: name of the view.
+        right, up: unit vectors of the picture in the base frame, (3,); the viewer is at `right` x `up`.
+        labels: labels of the axes; empty where lengths are foreshortened.
+        flipped: whether the coordinate in the label decreases along each axis.
+    """
+
+    name: str
+    right: FloatArray
+    up: FloatArray
+    labels: tuple[str, str] | None = None
+    flipped: tuple[bool, bool] = (False, False)
+
+    @property
+    def toward(self) -> FloatArray:
+        """Unit vector toward the viewer."""
+        return np.asarray(np.cross(self.right, self.up))
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) in the picture, (..., 2), m."""
+        return np.stack([points @ self.right, points @ self.up], axis=-1)
+
+
+class ArmChart(NamedTuple):
+    """The arm at its home configuration, in the base frame, m.
+
+    Attributes:
+        title: name of the robot, and the configuration.
+        joints: the joints.
+        q: home configuration, (joints,).
+        chain: points of the links, of one sample.
+        line: corners of the links from the base to the end effector, (corners, 3).
+        centers: places of the joints on their axes, (joints, 3); apart from each other where several axes
+            intersect.
+        down: direction of gravity, (3,); zero without gravity.
+        size: size of the arm.
+        joint_length: length of a drawn joint along its axis.
+        middle: middle of the arm, (3,).
+        views: views that show it.
+    """
+
+    title: str
+    joints: tuple[Joint, ...]
+    q: FloatArray
+    chain: Chain
+    line: FloatArray
+    centers: FloatArray
+    down: FloatArray
+    size: float
+    joint_length: float
+    middle: FloatArray
+    views: tuple[View, ...]
+
+
+def arm_chart(robot: Robot) -> ArmChart:
+    """Return the drawing of a robot's arm."""
+    q = np.array([home_position(joint) for joint in robot.joints])
+    chain = Chain.of(robot, q[None])
+    line = _corners(chain)
+    extents = np.ptp(line, axis=0)
+    size = max(float(extents.max()), SMALLEST_SIZE)
+    length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
+    centers = _centers(chain, length)
+    gravity = np.array(robot.gravity)
+    strength = float(np.linalg.norm(gravity))
+    down = gravity / strength if strength else np.zeros(3)
+    drawn = np.concatenate((line, centers))
+    middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
+    title = f"{robot.name}: arm at {_configuration(robot, q)}"
+    views = _views(down, extents, size)
+    size = max(size, float(np.ptp(drawn, axis=0).max()))
+    return ArmChart(title, robot.joints, q, chain, line, centers, down, size, length, middle, views)
+
+
+def _configuration(robot: Robot, q: FloatArray) -> str:
+    """Return the home configuration in words."""
+    moved = [joint.name for joint, position in zip(robot.joints, q, strict=True) if position != 0]
+    if not moved:
+        return "q = 0"
+    if len(moved) == len(q):
+        return "the middle of the position limits"
+    return f"q = 0, {', '.join(moved)} at the middle of the limits"
+
+
+def _corners(chain: Chain) -> FloatArray:
+    """Return the corners of the links, (corners, 3): base frame, DH frames with elbows between, tool."""
+    origins, elbows = chain.origins[0], chain.elbows[0]
+    moving = np.stack((elbows, origins[1:-1]), axis=1).reshape(-1, 3)
+    return np.concatenate((np.zeros((1, 3)), origins[:1], moving, origins[-1:]))
+
+
+def _centers(chain: Chain, length: float) -> FloatArray:
+    """Return the places of the joints: where the offset d is long, in the middle of it.
+
+    Joints in the place of an earlier one move along their axes: the first one backward, others forward.
+    """
+    origins, elbows, axes = chain.origins[0, :-2], chain.elbows[0], chain.axes[0]
+    far = np.linalg.norm(elbows - origins, axis=1) > 2 * length
+    centers = np.where(far[:, None], (origins + elbows) / 2, origins)
+    for index in range(1, len(centers)):
+        near = np.flatnonzero(np.linalg.norm(centers[:index] - centers[index], axis=1) < length)
+        if near.tolist() == [0]:
+            centers[0] -= 1.1 * length * axes[0]
+        elif near.size:
+            centers[index] += 1.1 * length * axes[index]
+    return centers
+
+
+def _views(down: FloatArray, extents: FloatArray, size: float) -> tuple[View, ...]:
+    """Return an isometric view, a side view, and a top view of an arm that is not flat.
+
+    Their axes are those of the base frame: up is the one most opposite to gravity, and the longer extent of
+    the others is to the right.
+    """
+    up_axis = int(np.argmax(np.abs(down))) if down.any() else 2
+    up = np.zeros(3)
+    up[up_axis] = -1.0 if down[up_axis] > 0 else 1.0
+    level = [axis for axis in range(3) if axis != up_axis]
+    right_axis = level[int(np.argmax(extents[level]))]
+    right = np.zeros(3)
+    right[right_axis] = 1.0
+    side = _along_axes("side view", right, up)
+    views = [_isometric(right, up), side]
+    depth = int(np.argmax(np.abs(side.toward)))
+    if extents[depth] > FLAT_SHARE * size:
+        views.append(_along_axes("top view", right, -side.toward))
+    return tuple(views)
+
+
+def _isometric(right: FloatArray, up: FloatArray) -> View:
+    """Return the view from right, front and above, at equal angles to all three axes."""
+    front = np.cross(right, up)
+    return View("isometric view", (right - front) / math.sqrt(2), (2 * up - right - front) / math.sqrt(6))
+
+
+def _along_axes(name: str, right: FloatArray, up: FloatArray) -> View:
+    """Return a view along an axis of the base frame."""
+    axes: list[IndexArray] = [np.flatnonzero(direction) for direction in (right, up)]
+    labels = tuple(f"{'xyz'[axis[0]]} [{LENGTH}]" for axis in axes)
+    flipped = tuple(bool(direction.sum() < 0) for direction in (right, up))
+    return View(name, right, up, (labels[0], labels[1]), (flipped[0], flipped[1]))

@@ -1,0 +1,239 @@
+"""The arm of a robot as a drawing: links, joints with their axes and motors, base, tool frame and gravity.
+
+Joints are convex solids: cylinders that turn, boxes that slide. A view draws their faces that point toward
+the viewer, the farthest joint first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from vsacli.base.arrays import FloatArray
+from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
+from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.plots.panels import add_title
+from vsacli.results.plots.sheets import complete
+from vsacli.results.plots.styles import house_style, shortened
+
+LABEL_WIDTH = 0.55
+"""Width of the column of names, relative to a view."""
+
+NAME_LENGTH, MOST_NAMES = 18, 14
+"""Characters in the name of a joint, and number of names that fit into the column."""
+
+RADIUS, MOTOR_RADIUS, MOTOR_LENGTH = 0.36, 0.26, 0.3
+"""Radii of a joint and of a motor, and length of a motor, relative to the length of a joint."""
+
+PLATE, PLATE_HEIGHT = 1.6, 0.16
+"""Half-width and height of the base, relative to the length of a joint."""
+
+AXIS_LENGTH = 1.5
+"""Half-length of the line of an axis, relative to that length."""
+
+ARROW_SHARE = 0.19
+"""Length of the arrows of gravity and the tool frame, relative to the size of the arm."""
+
+SHORTEST_ARROW = 0.3
+"""Share of its length below which an arrow of a frame, seen from its tip, is left out."""
+
+EDGE = 0.7
+"""Width of edges, points."""
+
+ROUND = 24
+"""Number of sides of a cylinder."""
+
+FILLS = {"antagonistic": "#8fb8de", "serial": "#f0b27a", "elastic": "#c8e6c0", "rigid": "0.85"}
+"""Fill of joints by kind of actuator; gray values differ as well."""
+
+_OTHER_FILL, _MOTOR_FILL, _BASE_FILL = "white", "0.35", "0.6"
+_LINK: dict[str, Any] = {"color": "0.55", "linewidth": 4.5, "solid_capstyle": "round"}
+_AXIS: dict[str, Any] = {"color": "#d8261c", "linewidth": 0.9, "linestyle": (0, (8, 2, 1.5, 2))}
+_LEADER: dict[str, Any] = {"color": "0.5", "linewidth": 0.6}
+_ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
+
+
+def arm_figure(chart: ArmChart) -> Figure:
+    """Draw the views of an arm at one scale; the first one names the joints."""
+    with house_style():
+        widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
+        figure = Figure((PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4), layout="constrained")
+        panels = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
+        for axes, view in zip(panels, chart.views, strict=True):
+            _frame_panel(axes, chart, view, named=view is chart.views[0])
+            _draw_arm(axes, chart, view)
+        _name_joints(panels[0], chart, chart.views[0])
+        return complete(figure, chart.title, _handles(chart))
+
+
+def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> None:
+    """Set limits of equal scale, and labels and ticks where lengths are not foreshortened."""
+    half = ROOM / 2 * chart.size
+    x, y = view.project(chart.middle)
+    axes.set_xlim(x - half, x + half * (1 + 2 * LABEL_WIDTH * named))
+    axes.set_ylim(y - half, y + half)
+    axes.set_aspect("equal")
+    add_title(axes, view.name)
+    if view.labels is None:
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.spines[:].set_visible(False)
+        return
+    axes.set_xlabel(view.labels[0])
+    axes.set_ylabel(view.labels[1])
+    axes.locator_params(nbins=5)
+    for axis, flipped in zip((axes.xaxis, axes.yaxis), view.flipped, strict=True):
+        if flipped:
+            axis.set_major_formatter(lambda tick, _: f"{-tick + 0:g}")
+
+
+def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
+    """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
+    length, arrow, chain = chart.joint_length, ARROW_SHARE * chart.size, chart.chain
+    axes.plot(*view.project(chart.line).T, **_LINK, zorder=2)
+    for origin, center in zip(chain.origins[0], chart.centers, strict=False):  # joints moved along their axes
+        axes.plot(*view.project(np.stack((origin, center))).T, **{**_LINK, "linewidth": 2.5}, zorder=2)
+    solids = sorted(_solids(chart), key=lambda solid: float(solid.middle @ view.toward))
+    for rank, solid in enumerate(solids):
+        _draw_solid(axes, solid, view, 3 + rank / len(solids))
+    for center, axis in zip(chart.centers, chain.axes[0], strict=True):
+        ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
+        axes.plot(*view.project(ends).T, **_AXIS, zorder=4.2)
+    for direction, name in zip(chain.tool[0].T, "xyz", strict=True):
+        _draw_arrow(axes, view, chain.origins[0, -1], arrow * direction, name)
+    start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
+    _draw_arrow(axes, view, start, arrow * chart.down, "g")
+
+
+class _Solid(NamedTuple):
+    """A convex solid: faces (corners, 3) that turn counterclockwise when seen from outside, and its color."""
+
+    faces: Sequence[FloatArray]
+    middle: FloatArray
+    color: str
+
+
+def _solids(chart: ArmChart) -> Iterator[_Solid]:
+    """Yield base, joints and motors."""
+    length = chart.joint_length
+    foot, up = _base(chart)
+    yield _prism(foot - PLATE_HEIGHT * length * up, foot, PLATE * length, 4, _BASE_FILL)
+    for center, axis, joint in zip(chart.centers, chart.chain.axes[0], chart.joints, strict=True):
+        half, fill = length / 2 * axis, FILLS.get(joint.actuator_type, _OTHER_FILL)
+        yield _prism(center - half, center + half, RADIUS * length, ROUND if joint.is_revolute else 4, fill)
+        motor = MOTOR_LENGTH * length * axis
+        ends = ((center - half - motor, center - half), (center + half, center + half + motor))
+        for low, high in ends[: joint.actuator.motor_count]:
+            yield _prism(low, high, MOTOR_RADIUS * length, ROUND, _MOTOR_FILL)
+
+
+def _base(chart: ArmChart) -> tuple[FloatArray, FloatArray]:
+    """Return place and normal of the base: the base frame, or below the first joint if that is near."""
+    origin, up = chart.chain.origins[0, 0], chart.chain.base[0, :, 2]
+    if np.linalg.norm(origin) > chart.joint_length:
+        return np.zeros(3), np.array([0.0, 0.0, 1.0])
+    below = (0.5 + MOTOR_LENGTH) * chart.joint_length
+    return origin + min(0.0, float((chart.centers[0] - origin) @ up) - below) * up, up
+
+
+def _prism(low: FloatArray, high: FloatArray, radius: float, sides: int, color: str) -> _Solid:
+    """Return a regular prism between the centers of its ends."""
+    axis = (high - low) / np.linalg.norm(high - low)
+    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    across = np.cross(axis, least)
+    across /= np.linalg.norm(across)
+    angles = 2 * math.pi * (np.arange(sides) + 0.5) / sides
+    directions = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * np.cross(axis, across)
+    ring = radius / math.cos(math.pi / sides) * directions if sides == 4 else radius * directions
+    bottom, top = low + ring, high + ring
+    after = np.roll(np.arange(sides), -1)
+    walls = np.stack((bottom, bottom[after], top[after], top), axis=1)
+    return _Solid([*walls, top, bottom[::-1]], (low + high) / 2, color)
+
+
+def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
+    """Draw the faces of a convex solid that point toward the viewer; smooth walls have no edges.
+
+    Black edges of all faces lie below, so that only their outer half is seen, which is the outline.
+    """
+    projected = [view.project(face) for face in solid.faces]
+    shown = [face for face in projected if _area(face) > 0]
+    smooth = len(solid.faces) > ROUND
+    walls, ends = ([face for face in shown if (len(face) == 4) == flat] for flat in (True, False))
+    layers = (
+        (shown, "black", 2 * EDGE),
+        (walls, solid.color if smooth else "black", EDGE),
+        (ends, "black", EDGE),
+    )
+    for rank, (faces, edges, width) in enumerate(layers):
+        look: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
+        axes.add_collection(PolyCollection(faces, **look, zorder=order + 1e-4 * rank))
+
+
+def _area(face: FloatArray) -> float:
+    """Return the signed area of a polygon, (corners, 2): positive if it turns counterclockwise."""
+    x, y = face.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, name: str) -> None:
+    """Draw an arrow with its name, unless it points toward the viewer or away."""
+    tail, tip = view.project(start), view.project(start + arrow)
+    if np.linalg.norm(tip - tail) <= SHORTEST_ARROW * np.linalg.norm(arrow):
+        return
+    axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
+    x, y = tail + 1.25 * (tip - tail)
+    axes.text(x, y, name, fontsize=8, ha="center", va="center", zorder=5)
+
+
+def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
+    """Write names in a column at the right, each with a line to its joint; of long chains only some."""
+    every = math.ceil(len(chart.joints) / MOST_NAMES)
+    places = view.project(chart.centers)[::every]
+    names = [shortened(joint.name, NAME_LENGTH) for joint in chart.joints[::every]]
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    column = left + (right - left) / (1 + LABEL_WIDTH)
+    gap = (top - bottom) / (MOST_NAMES + 1)
+    heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
+    for (x, y), height, name in zip(places, heights, names, strict=True):
+        axes.plot([x, column, column + gap / 2], [y, height, height], **_LEADER, zorder=1)
+        axes.text(column + 0.7 * gap, height, name, fontsize=9, va="center", parse_math=False)
+
+
+def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:
+    """Return heights at least a gap apart, in the same order and between two ends, near the given ones."""
+    order = np.argsort(heights, kind="stable")
+    offsets = gap * np.arange(len(heights))
+    # Without the offsets any ascending order will do; the mean of both bounds keeps clusters centered.
+    free = heights[order] - offsets
+    rising, falling = np.maximum.accumulate(free), np.minimum.accumulate(free[::-1])[::-1]
+    spread = np.empty_like(heights)
+    spread[order] = np.clip((rising + falling) / 2, low, max(low, high - offsets[-1])) + offsets
+    return spread
+
+
+def _handles(chart: ArmChart) -> list[Artist]:
+    """Return the legend: kinds of joints in the robot, motors, axes and base."""
+    kinds = dict.fromkeys(joint.actuator_type for joint in chart.joints)
+    handles: list[Artist] = [
+        Patch(
+            facecolor=FILLS.get(kind, _OTHER_FILL), edgecolor="black", linewidth=EDGE, label=f"{kind} joint"
+        )
+        for kind in kinds
+    ]
+    return [
+        *handles,
+        Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE, label="motor"),
+        Line2D([], [], **_AXIS, label="joint axis"),
+        Line2D([], [], **_LINK, label="link"),
+        Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
+    ]

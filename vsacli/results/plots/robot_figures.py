@@ -1,0 +1,209 @@
+"""Figures of a robot before any run: the torque of its springs, and its attainable stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, TorqueCurve
+from vsacli.results.plots.panels import ZERO
+from vsacli.results.plots.sheets import complete
+from vsacli.results.plots.styles import house_style, line_style, shortened
+
+PANEL_HEIGHT = 2.7
+"""Height of a panel, inches."""
+
+TITLE_LENGTH = 34
+"""Characters in a line of the title of a panel, which has two lines."""
+
+MOST_ROWS = 6
+"""Maximum number of rows of two panels; further panels continue at the right."""
+
+WIDE_RATIO, SMALLEST_SHARE = 50.0, 1e-4
+"""Ratio of the largest to the median minimum stiffness from which the axis is logarithmic, and the lowest
+stiffness on such an axis, relative to the largest."""
+
+_AREA: dict[str, Any] = {"facecolor": "#c9dff4", "linewidth": 0, "zorder": 0.6}
+_BEYOND: dict[str, Any] = {"facecolor": "0.88", "edgecolor": "0.6", "hatch": "////", "linewidth": 0}
+_SINGULAR: dict[str, Any] = {"color": line_style(1).color, "linewidth": 2.8, "linestyle": "-"}
+_END: dict[str, Any] = {"color": line_style(2).color, "linewidth": 1.0, "linestyle": "-"}
+_LOAD: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
+_ALLOWED: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (1, 2))}
+_ONLY: dict[str, Any] = {"color": "black", "linewidth": 1.8}
+_LIMIT: dict[str, dict[str, Any]] = {
+    LIMITS["tau_motor"]: {"color": "0.25", "linewidth": 1.2, "linestyle": (0, (5, 2))},
+    LIMITS["phi"]: {"color": "0.25", "linewidth": 1.4, "linestyle": (0, (1.2, 1.2))},
+}
+
+
+def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
+    """Draw the torque over deflection of the springs, a panel for joints with equal actuators."""
+    with house_style():
+        figure, panels = _panels(len(charts))
+        handles: list[Artist] = []
+        for axes, chart in zip(panels, charts, strict=True):
+            _name(axes, chart)
+            handles += _draw_torques(axes, chart)
+        return complete(figure, f"{title}: torque of springs", handles)
+
+
+def stiffness_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
+    """Draw the attainable stiffness over torque, a panel for joints with equal actuators."""
+    with house_style():
+        figure, panels = _panels(len(charts))
+        handles: list[Artist] = []
+        for axes, chart in zip(panels, charts, strict=True):
+            _name(axes, chart)
+            handles += _draw_map(axes, chart)
+        return complete(figure, f"{title}: attainable stiffness at rest", handles)
+
+
+def _panels(count: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure with so many panels, row by row."""
+    columns = min(2 * math.ceil(count / (2 * MOST_ROWS)), count)
+    rows = math.ceil(count / columns)
+    size = (max(PANEL_WIDTH * columns, 2 * PANEL_WIDTH), PANEL_HEIGHT * rows + 1.1)
+    figure = Figure(size, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).flatten()
+    for unused in panels[count:]:
+        unused.remove()
+    return figure, list(panels[:count])
+
+
+def _name(axes: Axes, chart: ActuatorChart) -> None:
+    """Set the title of a panel: names of the joints, and kind of their actuators."""
+    title = "\n".join(shortened(line, TITLE_LENGTH) for line in (chart.title, chart.kind))
+    axes.set_title(title, loc="left", parse_math=False)
+
+
+def _torque_words(chart: ActuatorChart) -> str:
+    return "torque" if chart.joints[0].is_revolute else "force"
+
+
+def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
+    """Draw the torques of springs into a panel; return the legend entries."""
+    handles: list[Artist] = []
+    axes.axhline(0.0, **ZERO)
+    axes.axvline(0.0, **ZERO)
+    curves = chart.torques
+    for look, curve in enumerate(curves):
+        style = line_style(look)
+        marked = {**style.words, "markevery": max(1, np.isfinite(curve.torque).sum() // 8)}
+        shown = np.isfinite(curve.torque)
+        axes.plot(curve.deflection[shown], curve.torque[shown], **marked, label=curve.label)
+        if math.isfinite(curve.limit):
+            axes.axvline(curve.limit, **_LIMIT[LIMITS["phi"]])
+            axes.axvline(-curve.limit, **_LIMIT[LIMITS["phi"]])
+            handles.append(Line2D([], [], **_LIMIT[LIMITS["phi"]], label=LIMITS["phi"]))
+    axes.margins(x=0.04)
+    _legend(axes, chart, curves)
+    axes.set_xlabel(f"deflection [{chart.unit('phi')}]")
+    axes.set_ylabel(f"{_torque_words(chart)} [{chart.unit('tau_e')}]")
+    return handles
+
+
+def _legend(axes: Axes, chart: ActuatorChart, curves: Sequence[TorqueCurve]) -> None:
+    """Name the curves of a panel inside of it; the corner at the upper left is always free."""
+    mechanism = chart.actuator.spring_elements is None
+    title = rf"$\theta_2$ [{chart.unit('theta')}]" if mechanism else None
+    if mechanism or len(curves) > 1 or chart.commanded:
+        axes.legend(loc="upper left", fontsize=8, title=title, title_fontsize=8, handlelength=2.2)
+
+
+def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:
+    """Draw the attainable stiffness into a panel; return the legend entries."""
+    seen = chart.stiffness
+    handles: list[Artist] = []
+    if chart.commanded:
+        handles += _draw_area(axes, seen)
+        handles += _draw_limits(axes, seen)
+        handles += _draw_ends(axes, seen)
+    else:
+        handles += _draw_only(axes, seen)
+    for size in (-chart.load, chart.load) if chart.load else ():
+        axes.axvline(size, **_LOAD)
+        handles.append(Line2D([], [], **_LOAD, label="largest torque of gravity"))
+    for end in chart.limits:
+        axes.axhline(end, **_ALLOWED)
+        handles.append(Line2D([], [], **_ALLOWED, label="stiffness limit of the file"))
+    axes.set_xlim(seen.tau_e[0], seen.tau_e[-1])
+    axes.set_ylim(0, seen.top)
+    if _is_wide(seen):
+        smallest = SMALLEST_SHARE * seen.top
+        shown = seen.lower[seen.lower > smallest]
+        axes.set_yscale("log")
+        axes.set_ylim(shown.min() / 2 if shown.size else smallest, seen.top)
+    words = "elastic " + _torque_words(chart)
+    axes.set_xlabel(rf"{words} $\tau_e$ [{chart.unit('tau_e')}]")
+    axes.set_ylabel(f"stiffness [{chart.unit('stiffness')}]")
+    return handles
+
+
+def _is_wide(seen: StiffnessMap) -> bool:
+    """Return whether the stiffness needs a logarithmic axis."""
+    lower = seen.lower[np.isfinite(seen.lower)]
+    return bool(seen.top > WIDE_RATIO * np.median(lower))
+
+
+def _draw_area(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+    """Draw the attainable range, and the part of it beyond a limit."""
+    upper = np.minimum(seen.upper, seen.top)
+    axes.fill_between(seen.tau_e, seen.lower, upper, where=upper >= seen.lower, **_AREA)
+    return [Patch(**_AREA, label="attainable")]
+
+
+def _draw_limits(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+    """Draw where motors or springs reach their limits, and hatch the range beyond."""
+    tau_e = np.broadcast_to(seen.tau_e, seen.levels.shape)
+    handles: list[Artist] = []
+    for words, clearance in seen.clearance.items():
+        if not (clearance < 0).any():
+            continue
+        look = _LIMIT[words]
+        lines = {"colors": look["color"], "linewidths": look["linewidth"], "linestyles": [look["linestyle"]]}
+        axes.contour(tau_e, seen.levels, clearance, levels=[0.0], **lines)
+        handles.append(Line2D([], [], **look, label=words))
+    if not handles:
+        return handles
+    worst = np.min(np.stack(list(seen.clearance.values())), axis=0)
+    shading = axes.contourf(
+        tau_e, seen.levels, worst, levels=[-np.inf, 0.0], colors=[_BEYOND["facecolor"]], hatches=["////"]
+    )
+    shading.set_edgecolor(_BEYOND["edgecolor"])
+    shading.set_linewidth(0.0)
+    shading.set_zorder(0.7)
+    return [*handles, Patch(**_BEYOND, label="beyond a limit")]
+
+
+def _draw_ends(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+    """Draw the ends of the attainable range: where A is singular, and where springs or settings end."""
+    handles: list[Artist] = []
+    kinds = ((True, _SINGULAR, "singular decoupling matrix"), (False, _END, "end of springs or settings"))
+    for singular, look, label in kinds:
+        for end, marks in ((seen.lower, seen.lower_singular), (seen.upper, seen.upper_singular)):
+            there = np.isfinite(end) & (end <= seen.top) & (marks == singular)
+            if there.any():
+                joined = there | np.roll(there, 1) & np.isfinite(end)
+                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **look)
+                handles.append(Line2D([], [], **look, label=label))
+    return handles
+
+
+def _draw_only(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+    """Draw the stiffness of springs that no motor adjusts, dotted beyond a limit."""
+    within, beyond = seen.within[0], {**_ONLY, "linestyle": (0, (1, 1.5))}
+    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **_ONLY)
+    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **beyond)
+    handles: list[Artist] = [Line2D([], [], **_ONLY, label="stiffness that no motor adjusts")]
+    if not within.all():
+        handles.append(Line2D([], [], **beyond, label="stiffness beyond a limit"))
+    return handles
