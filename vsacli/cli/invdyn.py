@@ -127,7 +127,8 @@ def invdyn(
         writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
         report = compute(run, talk, writer)
         if drawn is not None:
-            from vsacli.cli.plot import draw_staged, recording_figure
+            from vsacli.cli.plot import draw_staged
+            from vsacli.cli.plot_recording import recording_figure
 
             draw_staged(file, drawn, talk)
             if inputs.trajectory.estimates:
@@ -153,7 +154,7 @@ def _figures(
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
-    from vsacli.cli.plot import RECORDING
+    from vsacli.cli.plot_recording import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
     stored = VARIABLES if variables is None else variables

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
-    read_robot,
     result_line,
     words_of,
 )
@@ -22,21 +20,15 @@ from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import TIME
+from vsacli.cli.plot_recording import RECORDING, draw_recording, has_recording, is_recording, recording_figure
 from vsacli.cli.plot_robot import draw_robot, is_robot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from vsacli.base.outputs import Outputs, Staged
     from vsacli.results.plots import FigureFiles
-    from vsacli.results.plots.figures import Figures
-    from vsacli.results.store.excerpt import Span
     from vsacli.results.store.reader import StoredResult
-    from vsacli.robot.model import Robot
-    from vsacli.trajectory.recorded.samples import SampledProfile
-
-RECORDING = "recording"
-"""Name of the figure of recorded signals, with their splines and the noise found in them."""
 
 DRAWN = ("result", "simulation", "table of a study", "table")
 """Kinds of files of which figures are drawn, as in `FileKind`."""
@@ -373,99 +365,3 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
             talk.detail(result_line(each))
         stack.enter_context(naming_option("--variables"))
         files.save(compare_files([shown.of(each) for each in opened], shown.variables))
-
-
-def is_recording(path: str) -> bool:
-    """Return whether a file is a CSV table or a trajectory; False if its kind is unknown."""
-    from vsacli.files.file_kinds import FileKind, recognize
-
-    try:
-        return recognize(path) in (FileKind.TABLE, FileKind.CATALOG, FileKind.TRAJECTORY)
-    except (InputError, StorageError):
-        return False  # readers of results and simulations report its problems
-
-
-def draw_recording(
-    path: str,
-    robot_path: str | None,
-    joints: tuple[str, ...],
-    span: Span,
-    staged: Callable[[list[str], str], FigureFiles],
-    talk: Talk,
-) -> None:
-    """Draw the figure of a recording, or of a trajectory with recorded signals.
-
-    Args:
-        path: recording or trajectory file.
-        robot_path: robot file; None: joints are named by the columns.
-        joints: names of the joints to show; all if empty.
-        span: first and last time to show, s.
-        staged: callable that stages the files of figures, given their names and the beginning of the file
-            names.
-        talk: shows the progress of the fit.
-
-    Raises:
-        InputError: the file cannot be used, or no spline was fitted to it.
-        StorageError: the figure cannot be written.
-    """
-    from vsacli.documents.source import is_table
-    from vsacli.files.placeholder_robot import placeholder_robot
-    from vsacli.files.recordings.fit_curves import table_profiles
-    from vsacli.trajectory.file import load_trajectory
-
-    robot = (
-        placeholder_robot(path).robot if robot_path is None else read_robot(robot_path, argument="--robot")
-    )
-    figures = staged([RECORDING], Path(path).stem)
-    if is_table(path):
-        profiles = table_profiles(path, robot, talk.fitting)
-    else:
-        profiles = [*load_trajectory(path, robot, progress=talk.fitting).estimates.values()]
-    if not any(profile.fitted for profile in profiles):
-        advice = f"compute a result first: vsacli invdyn ROBOT {path}, then vsacli plot"
-        raise InputError.one(f"has no recorded signals to plot; {advice}", path)
-    figures.save(recording_figure(robot, profiles, path, joints, span))
-
-
-def recording_figure(
-    robot: Robot,
-    profiles: Iterable[SampledProfile],
-    file: str | Path,
-    joints: tuple[str, ...] = (),
-    span: Span | None = None,
-) -> Figures:
-    """Return the figure of recorded signals, by its name.
-
-    Args:
-        robot: robot that was recorded.
-        profiles: recorded signals; a spline was fitted to at least one.
-        file: path in the title and in errors.
-        joints: names of the joints to show; all if empty.
-        span: first and last time to show, s; all times if None.
-
-    Raises:
-        InputError: a joint is unknown, or no sample lies in the span.
-    """
-    from vsacli.files.recordings.fit_curves import recorded_curves
-    from vsacli.results.plots import recorded_figure
-    from vsacli.results.store.excerpt import WHOLE
-
-    curves = recorded_curves(profiles, robot.joint_types, file, joints, span or WHOLE)
-    return {RECORDING: recorded_figure(curves, f"{Path(file).stem}: recorded signals and their splines")}
-
-
-def has_recording(stored: StoredResult, talk: Talk) -> bool:
-    """Return whether the recording behind a result can be drawn; print a note if it exists but cannot."""
-    from vsacli.base.version import __version__
-
-    if stored.kind != "result" or not stored.report_json.get("fits"):
-        return False
-    inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]
-    if not inputs or any(each.content is None for each in inputs):
-        reason = "the result does not hold it"
-    elif made_by != (this := f"vsacli {__version__}"):
-        reason = f"the result was computed by {made_by}, and this is {this}"
-    else:
-        return True
-    talk.note(f"{stored.path}: no figure of its recording: {reason}")
-    return False

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.console import Talk
+from vsacli.cli.input_errors import recognized
 
 if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
@@ -18,12 +18,7 @@ ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 
 def is_robot(path: str) -> bool:
     """Return whether a file is a robot; False if its kind is unknown."""
-    from vsacli.files.file_kinds import FileKind, recognize
-
-    try:
-        return recognize(path) is FileKind.ROBOT
-    except (InputError, StorageError):
-        return False  # readers of results and simulations report its problems
+    return recognized(path) == "robot"
 
 
 def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk: Talk) -> None:
