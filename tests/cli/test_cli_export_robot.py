@@ -108,9 +108,9 @@ def test_a_urdf_comes_back(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "is a robot; say by --format as what to write it: urdf, mjcf"),
-        (["--format", "csv"], "is a robot, which --format csv is not for; there is urdf, mjcf"),
-        (["--format", "urdf", "--rate", "100"], "--rate is for results, and says nothing of a robot"),
+        ([], "is a robot; choose its format: --format urdf or --format mjcf"),
+        (["--format", "csv"], "--format csv is for results; a robot is written as urdf or mjcf"),
+        (["--format", "urdf", "--rate", "100"], "--rate is only for results; leave it out"),
         (["--format", "urdf", "--allow-nan"], "--allow-nan is for results"),
     ],
 )
@@ -123,9 +123,12 @@ def test_what_is_not_for_robots_is_refused(vsacli, arguments, message):
 def test_other_files_are_refused(vsacli, feasible_result, motion):
     done = vsacli("export", feasible_result, "--format", "urdf")
     assert done.code == 2
-    assert "is a result, which --format urdf is not for; there is csv, mat, parquet, joint-traj" in done.err
+    assert "--format urdf is for robots; a result is written as csv, mat, parquet or joint-traj" in done.err
     done = vsacli("export", motion)
-    assert done.err == f"{motion}: is a trajectory; export takes a result, a simulation or a robot\n"
+    assert done.err == (
+        f"{motion}: is a trajectory; export needs a result, a simulation or a robot; "
+        f"compute it first: vsacli invdyn ROBOT {motion}\n"
+    )
 
 
 def test_a_link_that_mujoco_refuses_is_named_and_nothing_is_written(vsacli, tmp_path):

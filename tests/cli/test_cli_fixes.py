@@ -136,7 +136,10 @@ def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
 
 def test_number_of_no_fix(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 9, "-o", "fixed.yaml")
-    assert (done.code, done.err) == (3, "fixed.yaml is not written: there is no fix 9\n")
+    assert (done.code, done.err) == (
+        3,
+        "fixed.yaml is not written: there are 2 fixes, no fix 9; give --write-fix 1 or 2\n",
+    )
     assert contents(tmp_path).keys() == {"soft.yaml"}
 
 
@@ -168,7 +171,7 @@ def test_inputs_are_never_overwritten(vsacli, too_soft):
     before = too_soft.read_text()
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 1, "-o", too_soft, "--overwrite")
     assert done.code == 2
-    assert "soft.yaml: is read by this command" in done.err
+    assert "soft.yaml: is an input of this command" in done.err
     assert too_soft.read_text() == before
 
 

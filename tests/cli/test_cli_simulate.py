@@ -149,10 +149,10 @@ def test_measured_positions_are_reported(vsacli, quick):
         ((*FEEDBACK, "--stiffness-poles", "5"), "the pole 5 of the stiffness error is unstable"),
         ((*FEEDBACK, "--poles", "fast"), "expected poles such as -20,-21"),
         ((*FEEDBACK, "--poles", "none.yaml"), "none.yaml: no such file"),
-        (("--poles", "-20"), "poles and integral action need --controller feedback-linearization"),
+        (("--poles", "-20"), "--poles needs --controller feedback-linearization"),
         (("--feedback", "positions"), "measured positions need the controller feedback-linearization"),
         (("--initial-error", "0.1,0.2"), "one for each of the 3 joints"),
-        (("--initial-error", "much"), "expected a number, or one for each joint"),
+        (("--initial-error", "much"), "expected a value in rad (m), or one for each joint"),
         (("--goal-tolerance", "tight"), "--goal-tolerance: expected a number in rad (m) such as 0.01, or"),
         (("--rtol", "0"), "the tolerances of the integration must be positive and at most 0.001"),
         (("--atol", "0.1"), "not 1e-09 (relative) and 0.1 (absolute)"),
@@ -211,7 +211,5 @@ def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
 
 def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
-    with pytest.raises(
-        InputError, match=r"is a simulation \(vsacli-simulation/2\), expected a result \(vsacli-result/2\)"
-    ):
+    with pytest.raises(InputError, match="is a simulation, expected a result"):
         StoredResult.open(tmp_path / "s.h5")

@@ -68,7 +68,7 @@ def test_where_no_step_can_be_done_nothing_is_drawn_and_nothing_is_made_up(vsacl
     done = vsacli("size", ROBOT, soft, "--catalog", motors, "--plot", "figures", "-o", "s.yaml")
     assert done.code == 3
     assert "base 1: no sample is feasible, so nothing is known of it" in done.out
-    assert "nothing is drawn: no step can be done" in done.err
+    assert "nothing is drawn: no sample is feasible" in done.err
     assert not (tmp_path / "figures").exists()
     assert not (tmp_path / "s.yaml").exists()
 

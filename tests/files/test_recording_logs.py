@@ -261,7 +261,10 @@ def test_a_rate_beside_times_is_refused_by_info(vsacli: Command, tmp_path: Path)
     done = vsacli("info", "log.csv", "--rate", "100")
     assert (done.code, done.err) == (2, "log.csv: has times of its own in column 't'; leave the rate out\n")
     done = vsacli("info", ROBOT, "--rate", "100")
-    assert (done.code, "is a robot; the rate is said of recordings without times" in done.err) == (2, True)
+    assert (done.code, "is a robot; --rate is only for recordings without a time column" in done.err) == (
+        2,
+        True,
+    )
 
 
 def test_a_clock_gives_the_motion_of_its_seconds(vsacli: Command, tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ def test_damage_matters_where_it_is_read(vsacli: Any, small_result: Path, line: 
     done = vsacli(*line.split())
     assert done.code == code
     if code:
-        assert "r.h5: variable flags is damaged or truncated (" in done.out + done.err
+        assert "r.h5: variable flags is damaged or truncated;" in done.out + done.err
         assert "; compute it again\n" in done.out + done.err
         assert not Path("figures").exists()
 
@@ -193,7 +193,7 @@ def test_damage_of_an_attribute_is_found(vsacli: Any, small_result: Path) -> Non
         changed[heap + 16 : heap + 32] = bytes(16)
         Path("r.h5").write_bytes(changed)
         done = vsacli("validate", "r.h5")
-        assert (done.code, "r.h5: is damaged or truncated (" in done.out + done.err) == (2, True), done
+        assert (done.code, "r.h5: is damaged or truncated;" in done.out + done.err) == (2, True), done
         found += vsacli("export", "r.h5").code == 0
     assert found  # at least one of them is no hindrance to an export
 
@@ -237,7 +237,7 @@ def test_shapes_are_not_believed(
     else:
         assert done.code == 2
         part = "" if name in ("time", "joint") else f"variable {name} "
-        assert done.err.startswith(f"r.h5: {part}is damaged or truncated (")
+        assert done.err.startswith(f"r.h5: {part}is damaged or truncated;")
         assert not Path("r.csv").exists()
 
 
@@ -278,7 +278,7 @@ def test_reports_that_are_none(vsacli: Any, small_result: Path, report: str) -> 
         file["report/json"] = report
     done = vsacli("info", "r.h5")
     assert done.code == 2
-    assert done.err.startswith("r.h5: is damaged or truncated (")
+    assert done.err.startswith("r.h5: is damaged or truncated;")
     assert len(done.err) < 400
 
 

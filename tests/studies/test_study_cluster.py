@@ -184,7 +184,7 @@ def test_a_worker_reads_the_study_again(tmp_path: Path) -> None:
     ("address", "message"),
     [
         ("nonsense", "; expected the address of a Dask scheduler such as tcp://host:8786, or local\n"),
-        ("", "is empty; say what is meant"),
+        ("", "is empty; is a shell variable in the command unset?"),
     ],
 )
 def test_addresses_that_are_none(vsacli: Any, own_folder: Path, address: str, message: str) -> None:
