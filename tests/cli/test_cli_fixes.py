@@ -175,11 +175,15 @@ def test_inputs_are_never_overwritten(vsacli, too_soft):
     assert too_soft.read_text() == before
 
 
-@pytest.mark.parametrize("margin", ["0", "-0.1", "1e-9", "1", "2", "nan"])
+@pytest.mark.parametrize("margin", ["0", "-0.1", "1e-09", "1", "2", "nan"])
 def test_margins_out_of_range_are_refused(vsacli, motion, margin):
     done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", margin)
     assert (done.code, done.out) == (2, "")
-    assert done.err == f"the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {float(margin):g}\n"
+    if 0 <= float(margin) <= 1:
+        reason = f"--min-margin: the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {margin}"
+    else:
+        reason = f"'--min-margin': '{margin}': expected a share from 0 % to 100 %, e.g. 2% or 0.02"
+    assert done.err.endswith(f"{reason}\n")
 
 
 def test_margin_decides_which_steps_are_near_singular(vsacli, motion):

@@ -47,7 +47,7 @@ def test_variables_of_several_results_are_compared(vsacli, tmp_path, feasible_re
         (("--from", "1", "--to", "0.5"), "--from 1 must be before --to 0.5"),
         (("--joints", "elbw"), "r.h5: has no joint 'elbw'; did you mean 'elbow'?"),
         (("--variables", "tau_moter"), "no variable is called 'tau_moter'; did you mean 'tau_motor'?"),
-        (("--variables", "flags"), "r.h5: flags are bits, no curve;"),
+        (("--variables", "flags"), "r.h5: flags are bits, not a curve;"),
         (
             ("--variables", "damping"),
             "r.h5: has no damping: no joint of vsa-3r has damping, or --variables left it out",

@@ -84,7 +84,7 @@ def test_variables_of_a_result_leave_its_recording_out(vsacli, result):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("log.csv", "log.csv"), "recordings are drawn one at a time"),
+        (("log.csv", "move.yaml"), "recordings are drawn one at a time"),
         (("log.csv", "--variables", "q"), "--variables needs a result, which `vsacli invdyn` computes"),
         (("log.csv", "--format", "html"), "--format html needs a result"),
         (("log.csv", "--joints", "elbw"), "log.csv: has no joint 'elbw'; did you mean 'elbow'?"),

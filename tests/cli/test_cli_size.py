@@ -97,9 +97,9 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--gear", "50"], "gears and a criterion are for motors of a catalog; give one"),
-        (["--minimize", "mass"], "gears and a criterion are for motors of a catalog; give one"),
-        (["-o", "s.yaml"], "--output is for the motors chosen from a catalog"),
+        (["--gear", "50"], "--gear needs --catalog FILE, the motors to choose from"),
+        (["--minimize", "mass"], "--minimize needs --catalog FILE, the motors to choose from"),
+        (["-o", "s.yaml"], "--output needs --catalog FILE"),
         (["--catalog", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100, or a range"),
         (["--catalog", "motors.csv", "--gear", "160..50"], "is empty; the smaller one comes first"),
         (["--catalog", "motors.csv", "--gear", "0"], "must be positive and finite"),
@@ -109,7 +109,7 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
             "the gears of all joints were given already",
         ),
         (["--catalog", "absent.csv"], "absent.csv: no such file"),
-        (["--catalog", str(ARM)], "expected commas, semicolons or tabs between the columns"),
+        (["--catalog", str(ARM)], "is a robot, but --catalog must be a CSV table"),
     ],
 )
 @pytest.mark.usefixtures("motors")

@@ -237,7 +237,7 @@ def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
         in vsacli("study", grid_study, grid_study).err
     )
     assert "expected K/N with K from 1 to N" in vsacli("study", grid_study, "--shard", "4/3").err
-    assert "give -o FILE" in vsacli("study", "--merge", grid_study).err
+    assert "--merge needs -o FILE" in vsacli("study", "--merge", grid_study).err
     assert "is not an HDF5 file" in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
 
 
