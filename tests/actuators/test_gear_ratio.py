@@ -158,7 +158,7 @@ def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any]):
     assert outcome.err.startswith(
         "result.h5: --side motor needs the gear_ratio of a, c in the robot file (1 without a gear)"
     )
-    assert "add it (1 without a gear)" in outcome.err
+    assert "add it and run invdyn again, or use --side joint" in outcome.err
     assert vsacli("export", "result.h5", "--side", "motor", "--variables", "q,tau_transmission").code == 0
 
 

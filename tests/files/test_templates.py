@@ -184,9 +184,7 @@ def test_every_kind_of_actuator_can_be_had() -> None:
 
 @pytest.mark.parametrize("joints", ["", "X", "RRX", "R R", "R" * (MOST_JOINTS + 1)])
 def test_letters_that_are_no_joints(joints: str) -> None:
-    with pytest.raises(
-        InputError, match=r"joints: expected 1 to 100 letters R \(revolute\) and P \(prismatic\)"
-    ):
+    with pytest.raises(InputError, match=r"expected 1 to 100 letters R \(revolute\) and P \(prismatic\)"):
         robot_template(joints)
 
 

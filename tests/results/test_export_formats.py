@@ -145,7 +145,7 @@ def test_a_joint_trajectory_leaves_out_fields_that_are_not_asked_for(stored):
 @pytest.mark.parametrize(
     ("variables", "match"),
     [
-        (["q", "tau_motor", "phi"], r"no place for phi, tau_motor, only for q \(positions\), dq"),
+        (["q", "tau_motor", "phi"], r"cannot hold phi, tau_motor; it holds q, dq, ddq and tau_e"),
         (["dq"], "needs positions: add q to --variables"),
     ],
 )

@@ -121,7 +121,7 @@ def test_a_heap_of_texts_that_never_ends(
     content = bytearray(small_result.read_bytes())
     struct.pack_into(form, content, heap_object(bytes(content), 3), *fields)
     (tmp_path / "r.h5").write_bytes(content)
-    with pytest.raises(InputError, match=r"r.h5: is damaged or truncated \(.*heap.*\); compute it again"):
+    with pytest.raises(InputError, match=r"r.h5: is damaged or truncated; compute it again"):
         StoredResult.open(tmp_path / "r.h5")
 
 
@@ -237,7 +237,7 @@ def test_shapes_are_not_believed(
     else:
         assert done.code == 2
         part = "" if name in ("time", "joint") else f"variable {name} "
-        assert done.err.startswith(f"r.h5: {part}is damaged or truncated;")
+        assert done.err.startswith(f"r.h5: {part}is damaged or truncated (")
         assert not Path("r.csv").exists()
 
 
@@ -278,7 +278,7 @@ def test_reports_that_are_none(vsacli: Any, small_result: Path, report: str) -> 
         file["report/json"] = report
     done = vsacli("info", "r.h5")
     assert done.code == 2
-    assert done.err.startswith("r.h5: is damaged or truncated;")
+    assert re.match(r"r\.h5: is damaged or truncated( \(report/json is no JSON object\))?; compute", done.err)
     assert len(done.err) < 400
 
 

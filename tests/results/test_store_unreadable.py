@@ -58,7 +58,7 @@ def folder(path):
             "has the format vsacli-result/3, but this version reads vsacli-result/2; run invdyn again",
         ),
         (truncated, "is damaged or truncated; compute it again"),
-        (without_report, "is damaged or truncated; compute it again"),
+        (without_report, r"is damaged or truncated \(report not found\); compute it again"),
     ],
 )
 def test_files_that_are_no_result(tmp_path, block, spoil, match):
