@@ -165,8 +165,8 @@ def test_every_unknown_variable_is_named(vsacli, tmp_path, motion):
     done = vsacli("invdyn", ROBOT, motion, "--variables", "tau_motr,q,flgs")
     assert done.code == 2
     assert done.err.splitlines() == [
-        "no variable is called 'flgs'; did you mean 'flags'?",
-        "no variable is called 'tau_motr'; did you mean 'tau_motor'?",
+        "--variables: no variable is called 'flgs'; did you mean 'flags'?",
+        "--variables: no variable is called 'tau_motr'; did you mean 'tau_motor'?",
     ]
     assert contents(tmp_path).keys() == {"move.yaml"}
 

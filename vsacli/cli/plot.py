@@ -234,9 +234,10 @@ def _are_studies(paths: list[Path]) -> bool:
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    are = [stored_format(path) == FORMAT for path in paths]
+    there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
+    are = [stored_format(path) == FORMAT for path in there]
     if any(are) and not all(are):
-        table, other = paths[are.index(True)], paths[are.index(False)]
+        table, other = there[are.index(True)], there[are.index(False)]
         raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
     return any(are)
 
@@ -306,6 +307,7 @@ def _draw(
 
 
 def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
+    from vsacli.base.variables import select_variables
     from vsacli.results.charts.comparison import comparison_names
     from vsacli.results.plots import compare_files
     from vsacli.results.store.reader import open_stored
@@ -316,7 +318,8 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
         opened = [stack.enter_context(open_stored(path)) for path in paths]
         for each in opened:
             talk.detail(result_line(each))
-        stack.enter_context(naming_option("--variables"))
+        with naming_option("--variables"):
+            select_variables(shown.variables or (), opened[0].declared)
         files.save(compare_files([shown.of(each) for each in opened], shown.variables))
 
 
