@@ -204,4 +204,4 @@ def test_without_dask_the_sentence_says_what_to_install(
     refused = vsacli("study", "study.yaml", "--dask", "local")
     assert (refused.code, "pip install 'vsacli[dask]' gets it" in refused.err) == (2, True)
     both = vsacli("study", "study.yaml", "--dask", "tcp://host:8786", "--processes", "2")
-    assert "--processes are of this machine" in both.err
+    assert "--processes cannot be used with --dask ADDRESS" in both.err
