@@ -155,8 +155,10 @@ def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any]):
     vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5")
     outcome = vsacli("export", "result.h5", "--side", "motor")
     assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err.startswith("result.h5: the robot file gives no gear_ratio at a, c, so what happens on")
-    assert "add it (1 without a gear)" in outcome.err
+    assert outcome.err.startswith(
+        "result.h5: --side motor needs the gear_ratio of a, c in the robot file (1 without a gear)"
+    )
+    assert "add it and run invdyn again, or use --side joint" in outcome.err
     assert vsacli("export", "result.h5", "--side", "motor", "--variables", "q,tau_transmission").code == 0
 
 

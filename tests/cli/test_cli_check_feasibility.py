@@ -59,7 +59,7 @@ def test_json_holds_the_verdict(vsacli, too_soft):
 
 def test_verbose_describes_the_inputs_and_what_computes(vsacli, motion):
     inputs, engine = vsacli("check-feasibility", ROBOT, motion, "--verbose").err.splitlines()
-    assert inputs == "vsa-3r: 3 joints; rest-to-rest: 401 steps over 4 s"
+    assert inputs == "vsa-3r: 3 joints; rest-to-rest: 401 samples over 4 s"
     assert engine == "NumPy computes: 401 samples are few"
 
 

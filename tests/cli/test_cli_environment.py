@@ -172,5 +172,5 @@ def test_a_variable_of_the_shell_that_is_not_set(
 ) -> None:
     done = vsacli(*arguments)
     assert (done.code, done.out) == (2, "")
-    assert done.err.splitlines()[-1].endswith(": is empty; say what is meant")
+    assert done.err.splitlines()[-1].endswith(" is empty; is a shell variable in the command unset?")
     assert not contents(tmp_path)

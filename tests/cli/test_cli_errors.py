@@ -59,7 +59,10 @@ def test_help_of_a_command_explains_each_option_and_shows_an_example(vsacli, com
         (["invdyn", str(ROBOT)], "Missing argument 'TRAJECTORY'"),
         (["invdin"], "No such command 'invdin'"),
         (["plot"], "Missing argument 'FILE...'"),
-        (["export", "r.h5", "--rate", "fast"], "'fast' is not a valid float"),
+        (
+            ["export", "r.h5", "--rate", "fast"],
+            "'fast' is not a number; expected samples per second, e.g. 1000",
+        ),
         (["check-feasibility", "--jason"], "No such option"),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
@@ -124,7 +127,7 @@ def test_full_disk_leaves_the_old_file(tmp_path, motion, feasible_result, comman
     done = installed(command, *arguments[command], "--overwrite", folder=tmp_path, preexec_fn=limit_file_size)
     assert (done.returncode, done.stdout) == (4, "")
     assert re.fullmatch(
-        r"\S+: cannot be written: the file would exceed the largest file size allowed here; .*\n", done.stderr
+        r"\S+: cannot be written: the file would exceed the largest file size allowed here\n", done.stderr
     )
     assert contents(tmp_path) == before
 
@@ -259,13 +262,16 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     [
         (
             "plot r.h5 -o fig.pdf",
-            "'fig.pdf' is the name of a file; name a folder, and the format by --format pdf",
+            "'fig.pdf' looks like a file name, expected a folder; e.g. --output fig --format pdf",
         ),
-        ("plot r.h5 -o fig.csv", "'fig.csv' is the name of a file; name a folder"),
-        ("invdyn a b --plot fig.png", "'fig.png' is the name of a file; name a folder"),
-        ("codegen a -o arm.c", "'arm.c' is the name of a file; name a folder"),
-        ("info r.h5 --extract arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
-        ("examples --copy arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
+        ("plot r.h5 -o fig.csv", "'fig.csv' looks like a file name, expected a folder; e.g. --output fig"),
+        ("invdyn a b --plot fig.png", "'fig.png' looks like a file name, expected a folder; e.g. --plot fig"),
+        ("codegen a -o arm.c", "'arm.c' looks like a file name, expected a folder; e.g. --output arm"),
+        (
+            "info r.h5 --extract arm.yaml",
+            "'arm.yaml' looks like a file name, expected a folder; e.g. --extract arm",
+        ),
+        ("examples --copy arm.yaml", "'arm.yaml' looks like a file name, expected a folder; e.g. --copy arm"),
         ("invdyn a b -o r.mat", "'r.mat' does not end in .h5: the output is HDF5"),
         ("study s -o s.yaml", "'s.yaml' does not end in .h5: the output is HDF5"),
         ("new robot --joints R -o arm.urdf", "'arm.urdf' does not end in .yaml: the output is YAML"),

@@ -54,4 +54,4 @@ def test_a_motion_known_at_its_samples_alone_is_not(tmp_path, vsacli):
     vsacli("invdyn", ROBOT, table, "-o", again)
     done = vsacli("export", again, "--rate", 300)
     assert done.code == 2
-    assert "no whole multiple of 300 Hz; the nearest are 250 and 500 Hz" in done.err
+    assert "--rate: the stored rate of 500 Hz is not a multiple of 300 Hz; use 250 or 500 Hz" in done.err

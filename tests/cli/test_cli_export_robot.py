@@ -28,7 +28,7 @@ def test_forces_that_mjcf_has_no_place_for_are_beside_it(vsacli, tmp_path):
     robot = ROBOTS / "awas_1r.yaml"
     done = vsacli("export", robot, "--format", "mjcf")
     assert (done.code, done.out) == (2, "")
-    assert done.err.endswith("a Python file with forces belongs to this model; name both with -o\n")
+    assert done.err.endswith("this model includes a Python file with forces; give -o FILE\n")
     done = vsacli("export", robot, "--format", "mjcf", "-o", "a.b.xml")
     assert (done.code, done.err) == (0, "wrote a.b.xml\nwrote a.b_forces.py\n")
     assert "In addition, passive forces: springs of elbow." in (tmp_path / "a.b.xml").read_text()
@@ -88,9 +88,9 @@ def test_a_start_that_cannot_be(vsacli, tmp_path, feasible_result):
     assert done.code == 2
     assert "is of another robot, with the joints base, shoulder, elbow, not" in done.err
     done = vsacli("export", ROBOT, "--format", "urdf", "--start", feasible_result)
-    assert done.err == "--start needs --format mjcf; a URDF has no initial state\n"
+    assert done.err.endswith("Error: --start is only for --format mjcf; leave it out\n")
     done = vsacli("export", feasible_result, "--start", feasible_result)
-    assert done.err == f"{feasible_result}: --start is for robots; leave it out\n"
+    assert done.err.endswith("Error: --start is only for MJCF of a robot; leave it out\n")
     assert contents(tmp_path) == {}
 
 
@@ -108,10 +108,10 @@ def test_a_urdf_comes_back(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "is a robot; say by --format as what to write it: urdf, mjcf"),
-        (["--format", "csv"], "is a robot, which --format csv is not for; there is urdf, mjcf"),
-        (["--format", "urdf", "--rate", "100"], "--rate is for results, and says nothing of a robot"),
-        (["--format", "urdf", "--allow-nan"], "--allow-nan is for results"),
+        ([], "is a robot; choose its format: --format urdf or --format mjcf"),
+        (["--format", "csv"], "--format csv is for results; a robot is written as urdf or mjcf"),
+        (["--format", "urdf", "--rate", "100"], "--rate is only for results; leave it out"),
+        (["--format", "urdf", "--allow-nan"], "--allow-nan is only for results"),
     ],
 )
 def test_what_is_not_for_robots_is_refused(vsacli, arguments, message):
@@ -123,9 +123,12 @@ def test_what_is_not_for_robots_is_refused(vsacli, arguments, message):
 def test_other_files_are_refused(vsacli, feasible_result, motion):
     done = vsacli("export", feasible_result, "--format", "urdf")
     assert done.code == 2
-    assert "is a result, which --format urdf is not for; there is csv, mat, parquet, joint-traj" in done.err
+    assert "--format urdf is for robots; a result is written as csv, mat, parquet or joint-traj" in done.err
     done = vsacli("export", motion)
-    assert done.err == f"{motion}: is a trajectory; export takes a result, a simulation or a robot\n"
+    assert done.err == (
+        f"{motion}: is a trajectory; export needs a result, a simulation or a robot; "
+        f"compute it first: vsacli invdyn ROBOT {motion}\n"
+    )
 
 
 def test_a_link_that_mujoco_refuses_is_named_and_nothing_is_written(vsacli, tmp_path):

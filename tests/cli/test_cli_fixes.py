@@ -136,7 +136,10 @@ def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
 
 def test_number_of_no_fix(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 9, "-o", "fixed.yaml")
-    assert (done.code, done.err) == (3, "fixed.yaml is not written: there is no fix 9\n")
+    assert (done.code, done.err) == (
+        3,
+        "fixed.yaml is not written: there are 2 fixes, no fix 9; give --write-fix 1 or 2\n",
+    )
     assert contents(tmp_path).keys() == {"soft.yaml"}
 
 
@@ -168,15 +171,19 @@ def test_inputs_are_never_overwritten(vsacli, too_soft):
     before = too_soft.read_text()
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 1, "-o", too_soft, "--overwrite")
     assert done.code == 2
-    assert "soft.yaml: is read by this command" in done.err
+    assert "soft.yaml: is an input of this command" in done.err
     assert too_soft.read_text() == before
 
 
-@pytest.mark.parametrize("margin", ["0", "-0.1", "1e-9", "1", "2", "nan"])
+@pytest.mark.parametrize("margin", ["0", "-0.1", "1e-09", "1", "2", "nan"])
 def test_margins_out_of_range_are_refused(vsacli, motion, margin):
     done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", margin)
     assert (done.code, done.out) == (2, "")
-    assert done.err == f"the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {float(margin):g}\n"
+    if 0 <= float(margin) <= 1:
+        reason = f"--min-margin: the minimum margin must lie between 1e-09 and 1, e.g. 0.01, not {margin}"
+    else:
+        reason = f"'--min-margin': '{margin}': expected a share from 0 % to 100 %, e.g. 2% or 0.02"
+    assert done.err.endswith(f"{reason}\n")
 
 
 def test_margin_decides_which_steps_are_near_singular(vsacli, motion):

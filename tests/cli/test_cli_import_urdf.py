@@ -69,9 +69,11 @@ def test_placeholders_are_marked_and_come_from_the_options(vsacli, tmp_path):
     assert math.isinf(actuator.motor[0].max_torque)
 
 
-@pytest.mark.parametrize(("word", "kind"), [("elastic", Elastic), ("rigid", Rigid)])
-def test_one_motor_takes_the_effort_limit(vsacli, tmp_path, word, kind):
-    converted(vsacli, "--actuator", word, "--stiffness", "700")
+@pytest.mark.parametrize(
+    ("word", "kind", "options"), [("elastic", Elastic, ("--stiffness", "700")), ("rigid", Rigid, ())]
+)
+def test_one_motor_takes_the_effort_limit(vsacli, tmp_path, word, kind, options):
+    converted(vsacli, "--actuator", word, *options)
     actuator = load_robot(tmp_path / "arm.yaml").joints[1].actuator
     assert isinstance(actuator, kind)
     assert actuator.motor.max_torque == 30
@@ -153,7 +155,7 @@ def test_nothing_is_replaced(vsacli, tmp_path, existing):
     before = contents(tmp_path)
     done = vsacli("import-urdf", "arm.urdf", "-o", existing)
     assert (done.code, done.out) == (4 if existing == "arm.yaml" else 2, "")
-    assert re.match(f"{existing}: (exists already|is read by this command)", done.err)
+    assert re.match(f"{existing}: (exists already|is an input of this command)", done.err)
     assert contents(tmp_path) == before
 
 
@@ -166,10 +168,10 @@ def test_overwriting(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--motor-inertia", "-1"], "inertia: must be positive, not -1"),
-        (["--spring", "400"], "expected two numbers, k and k_c, e.g. 400,2000"),
-        (["--spring", "0,1"], "k: must be positive, not 0"),
-        (["--snap", "1"], "1.0 is not in the range 0<=x<=0.1"),
+        (["--motor-inertia", "-1"], "must be positive, not -1; expected an inertia in kg m^2 (kg)"),
+        (["--spring", "400"], "expected two coefficients k and k_c, e.g. 400,2000, found 1"),
+        (["--spring", "0,1"], "--spring: k: must be positive, not 0"),
+        (["--snap", "1"], "must be at most 0.1, not 1; expected an angle in rad"),
         (["--actuator", "hydraulic"], "'hydraulic' is not one of 'antagonistic', 'elastic', 'rigid'"),
         (["--hold", "left_finger"], "expected JOINT=VALUE, e.g. finger=0.02, found 'left_finger'"),
         (["--hold", "left_finger=0", "--hold", "left_finger=1"], "'left_finger' is held twice"),

@@ -150,7 +150,7 @@ def test_an_input_is_not_replaced_even_with_overwrite(vsacli, tmp_path, motion, 
     before = motion.read_bytes()
     done = vsacli("invdyn", ROBOT, motion, "-o", output, "--overwrite")
     assert done.code == 2
-    assert done.err == f"{output}: is read by this command; choose another name for its output\n"
+    assert done.err == f"{output}: is an input of this command; choose another name for the output\n"
     assert motion.read_bytes() == before
 
 
@@ -165,8 +165,8 @@ def test_every_unknown_variable_is_named(vsacli, tmp_path, motion):
     done = vsacli("invdyn", ROBOT, motion, "--variables", "tau_motr,q,flgs")
     assert done.code == 2
     assert done.err.splitlines() == [
-        "no variable is called 'flgs'; did you mean 'flags'?",
-        "no variable is called 'tau_motr'; did you mean 'tau_motor'?",
+        "--variables: no variable is called 'flgs'; did you mean 'flags'?",
+        "--variables: no variable is called 'tau_motr'; did you mean 'tau_motor'?",
     ]
     assert contents(tmp_path).keys() == {"move.yaml"}
 
@@ -191,7 +191,7 @@ def test_quiet_and_verbose_change_stderr_alone(vsacli, motion):
     )
     assert plain.out == quiet.out == verbose.out
     assert quiet.err == ""
-    notes = "vsa-3r: 3 joints; rest-to-rest: 401 steps over 4 s\nNumPy computes: 401 samples are few\n"
+    notes = "vsa-3r: 3 joints; rest-to-rest: 401 samples over 4 s\nNumPy computes: 401 samples are few\n"
     assert verbose.err == notes + plain.err
 
 

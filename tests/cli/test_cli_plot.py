@@ -67,7 +67,7 @@ def test_overwrite_replaces_figures_and_verbose_describes_the_result(vsacli, tmp
     (tmp_path / "r-motor-torque.png").write_bytes(b"old")
     done = vsacli("plot", "r.h5", "--overwrite", "--verbose")
     assert (tmp_path / "r-motor-torque.png").read_bytes().startswith(b"\x89PNG")
-    assert done.err.startswith("r.h5: vsa-3r, rest-to-rest, 401 steps, ok\n")
+    assert done.err.startswith("r.h5: vsa-3r, rest-to-rest, 401 samples, ok\n")
 
 
 @pytest.mark.parametrize(

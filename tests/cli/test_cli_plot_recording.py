@@ -84,13 +84,16 @@ def test_variables_of_a_result_leave_its_recording_out(vsacli, result):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("log.csv", "log.csv"), "recordings are drawn one at a time"),
+        (("log.csv", "move.yaml"), "recordings are drawn one at a time"),
         (("log.csv", "--variables", "q"), "--variables needs a result, which `vsacli invdyn` computes"),
         (("log.csv", "--format", "html"), "--format html needs a result"),
         (("log.csv", "--joints", "elbw"), "log.csv: has no joint 'elbw'; did you mean 'elbow'?"),
-        (("log.csv", "--from", "9"), "log.csv: has no step from 9.000 s; its 1001 steps go from 0.000 s"),
-        (("move.yaml",), "move.yaml: has no spline to be shown: its signals are not recorded"),
-        (("r.h5", "--robot", ROBOT), "--robot is the robot of a recording"),
+        (("log.csv", "--from", "9"), "log.csv: has no samples from t = 9 s on; it spans 0 to "),
+        (
+            ("move.yaml",),
+            "move.yaml: has no recorded signals to plot; compute a result first: vsacli invdyn ROBOT",
+        ),
+        (("r.h5", "--robot", ROBOT), "--robot is only for recordings; leave it out"),
     ],
 )
 @pytest.mark.usefixtures("log", "motion")

@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 from samples.command_line import ROBOT, edited
+from samples.excited import Excitation, excited
 
+from vsacli import load_robot
 from vsacli.cli.console import Talk
 
 LONG = 100_000
@@ -75,3 +77,19 @@ def test_a_simulation_always_shows_one(vsacli: Callable[..., Any], motion: Path)
     with redirect_stderr(Terminal()) as shown:
         assert vsacli("simulate", ROBOT, motion).code == 0
     assert "computing" in shown.getvalue()
+
+
+def test_searches_for_fixes_and_identifications_have_a_line_now_and_then_if_verbose(
+    vsacli: Callable[..., Any], own_folder: Path, too_soft: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vsacli.cli.console.SECONDS_PER_LINE", 0.0)
+    searched = vsacli("check-feasibility", ROBOT, too_soft, "--fixes", "-v")
+    assert all(f"searching: {each} of 7 " in searched.err for each in range(1, 8))
+    lab = load_robot(ROBOT)
+    motion = Excitation(
+        position=[0] * 3, reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=6, rate=100
+    )
+    record = excited(lab, motion).noisy(seed=0).write(own_folder / "record.csv", lab)
+    identified = vsacli("identify", ROBOT, record, "--fit", "springs,motors", "-v")
+    assert all(f"identifying: {each} of 6 " in identified.err for each in range(1, 7))
+    assert "identifying" not in vsacli("identify", ROBOT, record, "--fit", "springs,motors").err

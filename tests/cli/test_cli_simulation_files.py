@@ -211,8 +211,8 @@ def test_shafts_of_the_motors(vsacli: Callable[..., Any], tmp_path: Path) -> Non
 def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any], simulated: Path) -> None:
     done = vsacli("export", simulated / "s.h5", "--side", "motor")
     assert (done.code, done.out) == (2, "")
-    assert "gives no gear_ratio at base, shoulder, elbow" in done.err
-    assert "add it (1 without a gear) and run simulate again" in done.err
+    assert "--side motor needs the gear_ratio of base, shoulder, elbow in the robot file" in done.err
+    assert "add it and run simulate again, or use --side joint" in done.err
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_a_name_without_a_variable_leads_to_the_nearest(
 ) -> None:
     done = vsacli("export", simulated / "s.h5", "--variables", name)
     assert (done.code, done.out) == (2, "")
-    assert done.err == f"no variable is called {name!r}; did you mean {there}?\n"
+    assert done.err == f"--variables: no variable is called {name!r}; did you mean {there}?\n"
 
 
 @pytest.mark.slow

@@ -234,9 +234,12 @@ def test_a_study_that_cannot_be_computed(vsacli: Any, own_folder: Path, text: st
 
 def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
     assert "a study is read by several processes" in vsacli("study", "-").err
-    assert "expected one study, found 2 files" in vsacli("study", grid_study, grid_study).err
+    assert (
+        "expected one STUDY, found 2; to merge tables of shards give --merge"
+        in vsacli("study", grid_study, grid_study).err
+    )
     assert "expected K/N with K from 1 to N" in vsacli("study", grid_study, "--shard", "4/3").err
-    assert "give -o FILE" in vsacli("study", "--merge", grid_study).err
+    assert "--merge needs -o FILE" in vsacli("study", "--merge", grid_study).err
     assert "is not an HDF5 file" in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
 
 

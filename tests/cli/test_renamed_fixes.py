@@ -18,9 +18,9 @@ from vsacli.studies.identification import identification_report
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        (("--suggest",), "--suggest is now --fixes."),
-        (("--remedy", 2), "--remedy is now --write-fix."),
-        (("--write-fixed", "fixed.yaml"), "--write-fixed is now --write-fix."),
+        (("--suggest",), "--suggest is now --fixes"),
+        (("--remedy", 2), "--remedy is now --write-fix"),
+        (("--write-fixed", "fixed.yaml"), "--write-fixed is now --write-fix N -o FILE"),
     ],
 )
 def test_old_options(vsacli, own_folder, old, new):

@@ -27,7 +27,7 @@ def test_an_old_option_is_refused_with_its_successor(vsacli, command, new):
     outcome = vsacli(*command)
     assert outcome.code == 2
     old = next(word for word in reversed(command) if word.startswith("--"))
-    assert f"{old} is now {new}." in outcome.err
+    assert outcome.err.endswith(f"{old} is now {new}\n")
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_an_old_option_is_refused_with_its_successor(vsacli, command, new):
 def test_an_old_word_of_an_option_is_refused_with_its_successor(vsacli, command, old, new):
     outcome = vsacli(*command, old)
     assert outcome.code == 2
-    assert f"'{old}' is now '{new}'." in outcome.err
+    assert outcome.err.endswith(f"'{old}' is now '{new}'\n")
 
 
 def test_an_old_word_in_python_is_refused_with_its_successor():

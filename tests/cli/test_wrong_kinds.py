@@ -23,7 +23,7 @@ def _files(vsacli, own_folder):
     ("arguments", "message"),
     [
         (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot; are ROBOT "),
-        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory; are ROBOT"),
+        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory or a CSV"),
         (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot; vsacli info FILE"),
         (("samples.csv", "move.yaml"), "samples.csv: is a CSV table, but ROBOT must be a robot"),
         (("robot/arm.yaml", "move.yaml"), "robot/arm.yaml: no such file; did you mean 'robots/arm.yaml'?"),

@@ -136,7 +136,7 @@ def test_joints_and_times_are_chosen(table: Path) -> None:
     ("joints", "span", "message"),
     [
         (("hnad",), (0, 9), r"log\.csv: has no joint 'hnad'; did you mean 'hand'\?"),
-        ((), (7, 9), r"log\.csv: has no step from 7\.000 s to 9\.000 s; its 101 steps go from 5\.000 s"),
+        ((), (7, 9), r"log\.csv: has no samples from t = 7 to 9 s; it spans 5 to "),
     ],
 )
 def test_what_is_not_there_is_refused(

@@ -255,9 +255,8 @@ def test_the_rate_is_an_option_of_invdyn(vsacli: Command, tmp_path: Path) -> Non
 def test_a_rate_that_is_none(vsacli: Command, tmp_path: Path, rate: str) -> None:
     log(tmp_path, shoulder=POSITION, elbow=POSITION)
     done = vsacli("info", "log.csv", "--rate", rate)
-    assert (done.code, "rate: must be a positive number of samples per second" in done.err) == (2, True)
-    done = vsacli("invdyn", ROBOT, "log.csv", "--rate", rate)
-    assert (done.code, done.err.startswith("--rate: must be a positive number of samples")) == (2, True)
+    assert (done.code, "expected samples per second, e.g. 1000" in done.err) == (2, True)
+    assert vsacli("invdyn", ROBOT, "log.csv", "--rate", rate).code == 2
 
 
 def test_a_rate_beside_times_is_refused_by_info(vsacli: Command, tmp_path: Path) -> None:

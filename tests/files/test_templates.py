@@ -245,5 +245,5 @@ def test_a_new_trajectory_never_replaces_its_robot(vsacli: Any) -> None:
     for output in ("arm.yaml", "./arm.yaml"):
         done = vsacli("new", "trajectory", "--robot", "arm.yaml", "-o", output, "--overwrite")
         assert done.code == 2
-        assert done.err.endswith("is read by this command; choose another name for its output\n")
+        assert done.err.endswith("is an input of this command; choose another name for the output\n")
     assert Path("arm.yaml").read_text() == robot_template("RP")

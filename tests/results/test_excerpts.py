@@ -43,15 +43,15 @@ def test_a_single_step_may_be_all() -> None:
 @pytest.mark.parametrize(
     ("span", "words"),
     [
-        ((5.0, 6.0), "from 5.000 s to 6.000 s"),
-        ((-np.inf, -1.0), "to -1.000 s"),
-        ((4.5, np.inf), "from 4.500 s"),
-        ((1.0001, 1.0002), "from 1.000100 s to 1.000200 s"),
-        ((np.nan, np.inf), "from nan s"),
+        ((5.0, 6.0), "from t = 5 to 6 s"),
+        ((-np.inf, -1.0), "up to t = -1 s"),
+        ((4.5, np.inf), "from t = 4.5 s on"),
+        ((1.0001, 1.0002), "from t = 1.0001 to 1.0002 s"),
+        ((np.nan, np.inf), "from t = nan s on"),
     ],
 )
 def test_a_stretch_without_steps_is_refused(span: tuple[float, float], words: str) -> None:
-    expected = f"run.h5: has no step {words}; its 401 steps go from 0.000 s to 4.000 s"
+    expected = f"run.h5: has no samples {words}; it spans 0 to 4 s (--from, --to)"
     with pytest.raises(InputError) as caught:
         excerpt((), span)
     assert str(caught.value) == expected

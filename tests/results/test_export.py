@@ -108,9 +108,12 @@ def test_the_size_of_the_blocks_makes_no_difference(stored, block, monkeypatch):
 @pytest.mark.parametrize(
     ("rate", "match"),
     [
-        (300, "the stored 1000 Hz are no whole multiple of 300 Hz; the nearest are 250 and 333.333333 Hz"),
-        (999, "no whole multiple of 999 Hz; the nearest are 500 and 1000 Hz"),
-        (2000, "the rate 2000 Hz exceeds the stored 1000 Hz; samples are not interpolated"),
+        (300, "the stored rate of 1000 Hz is not a multiple of 300 Hz; use 250 or 500 Hz"),
+        (999, "the stored rate of 1000 Hz is not a multiple of 999 Hz; use 500 or 1000 Hz"),
+        (
+            2000,
+            "2000 Hz exceeds the stored rate of 1000 Hz; use a lower rate, or run invdyn with --set",
+        ),
         (0, "the rate must be positive, not 0 Hz"),
         (-5, "the rate must be positive, not -5 Hz"),
         (float("nan"), "the rate must be positive, not nan Hz"),

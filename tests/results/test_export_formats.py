@@ -145,7 +145,7 @@ def test_a_joint_trajectory_leaves_out_fields_that_are_not_asked_for(stored):
 @pytest.mark.parametrize(
     ("variables", "match"),
     [
-        (["q", "tau_motor", "phi"], r"no place for phi, tau_motor, only for q \(positions\), dq"),
+        (["q", "tau_motor", "phi"], r"cannot hold phi, tau_motor; it holds q, dq, ddq and tau_e"),
         (["dq"], "needs positions: add q to --variables"),
     ],
 )
@@ -199,7 +199,10 @@ def test_undefined_samples_on_request(stored):
     table = parquet.read_table(exported(result, "parquet", ["q"], allow_nan=True))
     assert (table["j0.q"].null_count, table["j1.q"].null_count) == (1, 1)
     assert table["j1.q"][30].as_py() is None
-    with pytest.raises(InputError, match="cannot show that a value is missing; leave out --allow-nan"):
+    with pytest.raises(
+        InputError,
+        match="--allow-nan cannot be used with joint-trajectory, which cannot represent missing values",
+    ):
         exported(result, "joint-trajectory", ["q"], allow_nan=True)
 
 

@@ -121,7 +121,7 @@ def test_a_heap_of_texts_that_never_ends(
     content = bytearray(small_result.read_bytes())
     struct.pack_into(form, content, heap_object(bytes(content), 3), *fields)
     (tmp_path / "r.h5").write_bytes(content)
-    with pytest.raises(InputError, match=r"r.h5: is damaged or truncated \(.*heap.*\); compute it again"):
+    with pytest.raises(InputError, match=r"r.h5: is damaged or truncated; compute it again"):
         StoredResult.open(tmp_path / "r.h5")
 
 
@@ -160,7 +160,7 @@ def test_damage_matters_where_it_is_read(vsacli: Any, small_result: Path, line: 
     done = vsacli(*line.split())
     assert done.code == code
     if code:
-        assert "r.h5: variable flags is damaged or truncated (" in done.out + done.err
+        assert "r.h5: variable flags is damaged or truncated;" in done.out + done.err
         assert "; compute it again\n" in done.out + done.err
         assert not Path("figures").exists()
 
@@ -193,7 +193,7 @@ def test_damage_of_an_attribute_is_found(vsacli: Any, small_result: Path) -> Non
         changed[heap + 16 : heap + 32] = bytes(16)
         Path("r.h5").write_bytes(changed)
         done = vsacli("validate", "r.h5")
-        assert (done.code, "r.h5: is damaged or truncated (" in done.out + done.err) == (2, True), done
+        assert (done.code, "r.h5: is damaged or truncated;" in done.out + done.err) == (2, True), done
         found += vsacli("export", "r.h5").code == 0
     assert found  # at least one of them is no hindrance to an export
 
@@ -278,7 +278,7 @@ def test_reports_that_are_none(vsacli: Any, small_result: Path, report: str) -> 
         file["report/json"] = report
     done = vsacli("info", "r.h5")
     assert done.code == 2
-    assert done.err.startswith("r.h5: is damaged or truncated (")
+    assert re.match(r"r\.h5: is damaged or truncated( \(report/json is no JSON object\))?; compute", done.err)
     assert len(done.err) < 400
 
 

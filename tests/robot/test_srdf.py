@@ -127,7 +127,7 @@ def test_the_command_takes_a_group(vsacli, files):
     assert done.code == 0
     assert "3 joints from l1 to tool" in done.out
     refused = vsacli("import-urdf", "arm.urdf", "--group", "arm", "-o", "other.yaml")
-    assert (refused.code, "--group is one of a file that --srdf names" in refused.err) == (2, True)
+    assert (refused.code, "--group needs --srdf FILE" in refused.err) == (2, True)
     refused = vsacli("import-urdf", "arm.urdf", "--srdf", "arm.srdf", "--tip", "tool", "-o", "other.yaml")
     assert (refused.code, "leave out --base and --tip" in refused.err) == (2, True)
 

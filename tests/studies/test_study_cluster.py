@@ -183,11 +183,8 @@ def test_a_worker_reads_the_study_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("address", "message"),
     [
-        (
-            "nonsense",
-            "address of a scheduler such as tcp://host:8786, or local, found 'nonsense'\n",
-        ),
-        ("", "is empty; say what is meant"),
+        ("nonsense", "; expected the address of a Dask scheduler such as tcp://host:8786, or local\n"),
+        ("", "is empty; is a shell variable in the command unset?"),
     ],
 )
 def test_addresses_that_are_none(vsacli: Any, own_folder: Path, address: str, message: str) -> None:
@@ -207,4 +204,4 @@ def test_without_dask_the_sentence_says_what_to_install(
     refused = vsacli("study", "study.yaml", "--dask", "local")
     assert (refused.code, "pip install 'vsacli[dask]' gets it" in refused.err) == (2, True)
     both = vsacli("study", "study.yaml", "--dask", "tcp://host:8786", "--processes", "2")
-    assert "--processes are of this machine" in both.err
+    assert "--processes cannot be used with --dask ADDRESS" in both.err

@@ -32,6 +32,30 @@ class NoBar:
         self.pos += steps
 
 
+class Countdown:
+    """A counter of an expected number of steps, of which there may be fewer or more.
+
+    Args:
+        progress: function to call with the number of further steps.
+        steps: number of steps that it is told in all.
+    """
+
+    def __init__(self, progress: Callable[[int], object], steps: int) -> None:
+        self._progress, self._left = progress, steps
+
+    def count(self) -> None:
+        """Report one step."""
+        if self._left:
+            self._left -= 1
+            self._progress(1)
+
+    def finish(self) -> None:
+        """Report the steps that were not needed, if any."""
+        if self._left:
+            self._progress(self._left)
+            self._left = 0
+
+
 def unseen(steps: int) -> AbstractContextManager[NoBar]:
     """Return a bar that is not shown, for any number of steps."""
     del steps

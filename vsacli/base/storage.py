@@ -30,7 +30,6 @@ UNCHECKED_BYTES = 2**24
 """Size (bytes) below which free space is not checked, since writing such a file takes less time."""
 
 _REASON = {
-    errno.ENOENT: "no such file or folder",
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is exhausted",
     errno.EFBIG: "the file would exceed the largest file size allowed here",
@@ -67,6 +66,8 @@ def reporting_temporary_errors() -> Iterator[None]:
 
 def reason(error: OSError) -> str:
     """Return an operating system error as a clause."""
+    if isinstance(error, FileNotFoundError) and error.filename is not None:  # else from `tempfile`
+        return "no such file or folder"
     return _REASON.get(error.errno or 0, error.strerror or str(error))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -127,7 +128,10 @@ def check_feasibility(
             report = compute(run, talk)
         else:
             report = _compute_and_draw(run, figures, run_stem(robot, trajectory), outputs, talk)
-        found = fixes(*inputs, min_margin) if list_fixes or output is not None else None
+        found = None
+        if list_fixes or output is not None:
+            progress = partial(talk.progress, shown_from=0, label="searching")
+            found = fixes(*inputs, min_margin, progress=progress)
         if found is not None and output is not None and number is not None:
             _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import click
@@ -153,7 +154,8 @@ def identify(
             stack.enter_context(naming_kind("--columns", columns, ("columns",)))
             for path in recordings:
                 stack.enter_context(naming_kind("RECORDING", path, ("table",)))
-            found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
+            progress = partial(talk.progress, shown_from=0, label="identifying")
+            found = identified(loaded, recordings, fit or WORDS, bandwidth, columns, progress=progress)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if page is not None:

@@ -107,7 +107,8 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     type=Number("an angle in rad, e.g. 1e-4", least=0.0, most=0.1),
     default=1e-4,
     show_default=True,
-    help="Largest angle between axes that are made parallel if their common normal is far away.",
+    help="Largest angle, at most 0.1, between axes that are made parallel if their common normal is far "
+    "away.",
 )
 @overwrite_option
 @talk_options

@@ -260,10 +260,11 @@ def _kind_of(paths: list[Path]) -> str | None:
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    formats = [stored_format(path) for path in paths]
+    there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
+    formats = [stored_format(path) for path in there]
     are = [each == FORMAT for each in formats]
     if any(are) and not all(are):
-        table, other = paths[are.index(True)], paths[are.index(False)]
+        table, other = there[are.index(True)], there[are.index(False)]
         raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
     return formats[0]
 
@@ -353,6 +354,7 @@ def _draw(
 
 
 def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
+    from vsacli.base.variables import select_variables
     from vsacli.results.charts.comparison import comparison_names
     from vsacli.results.plots import compare_files
     from vsacli.results.store.reader import open_stored
@@ -363,5 +365,6 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
         opened = [stack.enter_context(open_stored(path)) for path in paths]
         for each in opened:
             talk.detail(result_line(each))
-        stack.enter_context(naming_option("--variables"))
+        with naming_option("--variables"):
+            select_variables(shown.variables or (), opened[0].declared)
         files.save(compare_files([shown.of(each) for each in opened], shown.variables))

@@ -78,7 +78,7 @@ def _share_or_file(context: click.Context, parameter: click.Parameter, text: str
     "runs",
     metavar="N",
     type=Whole("a number of robots, at least 2, e.g. 1000", least=2),
-    help="Number of robots drawn at random from the tolerances and computed as well.",
+    help="Number of robots, at least 2, drawn at random from the tolerances and computed as well.",
 )
 @seed_option("draws of --monte-carlo")
 @click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time to this HDF5 file.")

@@ -203,8 +203,9 @@ def at_rate(result: StoredResult, rate: float) -> Iterator[StoredResult]:
     check_rate(rate)
     samples = float(result.time[-1] - result.time[0]) * rate
     if samples > MAX_STEPS:
-        message = f"the rate {rate:.9g} Hz gives {samples:.4g} samples; at most {MAX_STEPS:.0e} are possible"
-        raise InputError.one(message, result.path)
+        raise InputError.one(
+            f"{rate:.9g} Hz gives {samples:.4g} samples; at most {MAX_STEPS:.0e} are possible"
+        )
     again = None if _takes_every_nth(result, rate) else _function_of_time(result)
     if again is None:
         yield result

@@ -40,6 +40,10 @@ _LARGEST_CHUNK = 2**20
 """Bytes that a chunk may have in memory, regardless of its compressed size in the file."""
 
 
+class DamageError(ValueError):
+    """Content that no result has; its message is for users, unlike those of HDF5."""
+
+
 class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
     """An HDF5 file open for reading, whose damaged heaps of texts are hidden from the library.
 
@@ -168,7 +172,8 @@ def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
         NotImplementedError,
     ) as error:
         subject = f"variable {what} is" if what else "is"
-        raise InputError.one(f"{subject} damaged or truncated; compute it again", path) from error
+        reason = f" ({' '.join(str(error).split())[:200]})" if isinstance(error, DamageError) else ""
+        raise InputError.one(f"{subject} damaged or truncated{reason}; compute it again", path) from error
 
 
 def _all_end(objects: bytes) -> bool:
@@ -187,18 +192,18 @@ def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
     """Return a dataset if its values are in this file, and chunks and texts claim no more bytes than it has.
 
     Raises:
-        KeyError: the dataset does not exist.
-        ValueError: the dataset is a link or stored elsewhere, or its chunks or texts are too large.
+        DamageError: the dataset does not exist, is a link or stored elsewhere, or its chunks or texts are too
+            large.
     """
     for path in accumulate(name.split("/"), "{}/{}".format):
         link = file.get(path, getlink=True)
         if link is None:
-            raise KeyError(f"{path} not found")
+            raise DamageError(f"{path} not found")
         if not isinstance(link, h5py.HardLink):
-            raise ValueError(f"{path} is a link to elsewhere")
+            raise DamageError(f"{path} is a link to elsewhere")
     dataset = file[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.external or dataset.is_virtual:
-        raise ValueError(f"the values of {name} are not in this file")
+        raise DamageError(f"the values of {name} are not in this file")
     _check_chunks(dataset, file_size(file))
     if h5py.check_string_dtype(dataset.dtype) is not None:
         _check_texts(dataset, file)
@@ -209,11 +214,11 @@ def check_present(attributes: Container[str], needed: Iterable[str], name: str =
     """Refuse an object that lacks attributes required in each file.
 
     Raises:
-        ValueError: with the missing attributes.
+        DamageError: with the missing attributes.
     """
     missing = [each for each in needed if each not in attributes]
     if missing:
-        raise ValueError(f"{name} has no attribute {', '.join(missing)}")
+        raise DamageError(f"{name} has no attribute {', '.join(missing)}")
 
 
 def read_texts(file: h5py.File) -> None:
@@ -236,11 +241,11 @@ def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
     """Return the dataset if its values need no more memory than its file has bytes.
 
     Raises:
-        ValueError: the values need more memory.
+        DamageError: the values need more memory.
     """
     size = file_size(dataset.file)
     if dataset.nbytes > size:
-        raise ValueError(f"{dataset.name} claims {dataset.nbytes:,} bytes in a file of {size:,}")
+        raise DamageError(f"{dataset.name} claims {dataset.nbytes:,} bytes in a file of {size:,}")
     return dataset
 
 
@@ -248,17 +253,17 @@ def check_times(time: FloatArray) -> None:
     """Refuse times that no run has, on which searches, splines and rates would fail.
 
     Raises:
-        ValueError: times are not finite or not ascending, or beyond the range allowed in trajectories.
+        DamageError: times are not finite or not ascending, or beyond the range allowed in trajectories.
     """
     finite, rising = np.isfinite(time), time[1:] > time[:-1]
     if not finite.all():
         sample = int(np.argmin(finite))
-        raise ValueError(f"sample {sample} is at {time[sample]} s")
+        raise DamageError(f"sample {sample} is at {time[sample]} s")
     if not rising.all():
         sample = int(np.argmin(rising))
-        raise ValueError(f"{time[sample + 1]:.9g} s follows {time[sample]:.9g} s, at sample {sample + 1}")
+        raise DamageError(f"{time[sample + 1]:.9g} s follows {time[sample]:.9g} s, at sample {sample + 1}")
     if time.size and not max(-time[0], time[-1]) <= LONGEST:
-        raise ValueError(f"they go from {time[0]:.3g} to {time[-1]:.3g} s")
+        raise DamageError(f"they go from {time[0]:.3g} to {time[-1]:.3g} s")
 
 
 def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
@@ -271,7 +276,7 @@ def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
     if dataset.size:
         claimed = max(claimed, dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).size)
     if claimed > max(size, _LARGEST_CHUNK):
-        raise ValueError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
+        raise DamageError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
 
 
 def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
@@ -283,4 +288,4 @@ def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
     whole = len(references) // _REFERENCE.size * _REFERENCE.size
     claimed = sum(length for length, _, _ in _REFERENCE.iter_unpack(references[:whole]))
     if claimed > size:
-        raise ValueError(f"{dataset.name} claims texts of {claimed:,} bytes in a file of {size:,}")
+        raise DamageError(f"{dataset.name} claims texts of {claimed:,} bytes in a file of {size:,}")

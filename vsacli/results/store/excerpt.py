@@ -87,13 +87,13 @@ def steps_between(time: FloatArray, span: Span, path: str | Path) -> slice:
     """
     start, stop = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
     if start >= stop:
-        whole = f"it spans {time[0]:.4g} to {time[-1]:.4g} s"
+        whole = f"it spans {time[0]:.7g} to {time[-1]:.7g} s"
         raise InputError.one(f"has no samples {_words(span)}; {whole} (--from, --to)", path)
     return slice(int(start), int(stop))
 
 
 def _words(span: Span) -> str:
-    first, last = (f"{time:.4g}" for time in span)
+    first, last = (f"{time:.7g}" for time in span)
     if math.isinf(span[1]):
         return f"from t = {first} s on"
     return f"up to t = {last} s" if math.isinf(span[0]) else f"from t = {first} to {last} s"

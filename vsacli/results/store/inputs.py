@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.base.storage import place_of
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import CheckedFile, own_dataset
+from vsacli.results.store.damage import CheckedFile, DamageError, own_dataset
 from vsacli.results.store.schema import TEXT, storable
 
 LARGEST_STORED = 256 * 2**20
@@ -109,6 +109,6 @@ def _content(file: CheckedFile, name: str) -> bytes | None:
     if f"{name}/content" in file:
         stored = own_dataset(file, f"{name}/content")
         if stored.nbytes > LARGEST_STORED:
-            raise ValueError(f"{name} claims {stored.nbytes:,} bytes, of at most {LARGEST_STORED:,}")
+            raise DamageError(f"{name} claims {stored.nbytes:,} bytes, of at most {LARGEST_STORED:,}")
         return bytes(stored[...])
     return None

@@ -25,6 +25,7 @@ from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABL
 from vsacli.results.store.damage import (
     SCALES,
     CheckedFile,
+    DamageError,
     bounded,
     check_present,
     check_times,
@@ -280,14 +281,14 @@ class StoredResult(StoredFile):
     def _json(self, name: str) -> dict[str, Any]:
         content = json.loads(own_dataset(self._file, name).asstr()[()])
         if not isinstance(content, dict):
-            raise ValueError(f"{name} is no JSON object")
+            raise DamageError(f"{name} is no JSON object")
         return cast("dict[str, Any]", shown(content))
 
     def _samples(self) -> int:
         """Return the number of samples; refuse a file whose joints and times do not match."""
         shape = self._dataset("time").shape
         if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
-            raise ValueError("joints and times do not fit together")
+            raise DamageError("joints and times do not fit together")
         return int(shape[0])
 
     def whole_span(self) -> tuple[float, float]:
@@ -338,7 +339,7 @@ class StoredResult(StoredFile):
         dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name], self.precision)
         shape = (self.samples, *row_shape(self.declared[name], len(self.joint_names)))
         if dataset.shape != shape or dataset.dtype != expected:
-            raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
+            raise DamageError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
         self._whole.add(name)
 
     def check(self) -> None:

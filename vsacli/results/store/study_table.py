@@ -18,7 +18,14 @@ from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS
 from vsacli.base.version import __version__
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read_texts, reporting_damage
+from vsacli.results.store.damage import (
+    SCALES,
+    CheckedFile,
+    DamageError,
+    check_present,
+    read_texts,
+    reporting_damage,
+)
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import NewFile
@@ -290,7 +297,7 @@ class StoredStudy(StoredFile):
     def _check(self) -> None:
         for name in (*TEXTS, *self.parameters, *self.columns):
             if self._dataset(name).shape[0] != self.rows:
-                raise ValueError(f"{name} has not {self.rows} rows")
+                raise DamageError(f"{name} has not {self.rows} rows")
 
     def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
         """Return the texts of rows, or the labels of a dimension.

@@ -10,11 +10,12 @@ import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from vsacli.base.errors import InputError
+from vsacli.base.progress import Countdown, Progress, unseen
 from vsacli.base.wrench import wrench_columns
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.edited import edited, moved_files, texts_at, unaliased, with_errors
@@ -81,6 +82,8 @@ def identify(
     fit: Sequence[str] = WORDS,
     bandwidth: float | None = None,
     columns: str | Path | None = None,
+    *,
+    progress: Progress = unseen,
 ) -> Identification:
     """Identify parameters of a robot from recordings of its motion.
 
@@ -92,6 +95,7 @@ def identify(
             `joints.elbow.actuator.spring.*`.
         bandwidth: bandwidth of the filter, Hz; chosen for each recording if None.
         columns: file that maps other column names.
+        progress: shows the progress over the systems of equations, each of which is reported and explained.
 
     Raises:
         InputError: a recording cannot be used, or `fit` matches no parameter.
@@ -113,14 +117,17 @@ def identify(
     delays = [delay(first, each) for each in signals]
     signals, moved = _without_delays(signals, delays)
     found = solutions(sought, joints, fit, signals) if moved else first
-    reports = tuple(system_report(robot, each, signals) for each in found)
+    with progress(2 * len(found)) as bar:
+        systems = Countdown(bar.update, 2 * len(found))
+        reports = tuple(_counted(systems, (system_report(robot, each, signals) for each in found)))
+        doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
+        of_gains, explained = [], []
+        if not any(doubts):
+            of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
+            explained = list(_counted(systems, _explanations(robot, found, reports, signals, of_gains)))
+        systems.finish()
     links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
-    doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
     used = tuple(map(_used, records, signals, delays, doubts))
-    of_gains, explained = [], []
-    if not any(doubts):
-        of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
-        explained = _explanations(robot, found, reports, signals, of_gains)
     far = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
         robot=robot.name,
@@ -138,6 +145,16 @@ def identify(
         torques=tuple(torques(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
+
+
+_Result = TypeVar("_Result")
+
+
+def _counted(systems: Countdown, results: Iterable[_Result]) -> Iterator[_Result]:
+    """Yield the results, and count each when it is there."""
+    for result in results:
+        systems.count()
+        yield result
 
 
 def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tuple[list[Signals], bool]:
@@ -277,8 +294,8 @@ def _explanations(
     reports: Sequence[SystemReport],
     signals: Sequence[Signals],
     of_gains: Sequence[Gain],
-) -> list[Explanation]:
-    """Return explanations of the residuals."""
+) -> Iterator[Explanation]:
+    """Yield explanations of the residuals."""
     # links are identified from the torque of springs, so a fault of the springs would be explained twice
     explained: list[Explanation] = []
     for system, report in zip(found, reports, strict=True):
@@ -286,7 +303,7 @@ def _explanations(
         if system.system.title != LINKS or not wrong:
             fails = any(map(_fails, report.residuals))
             explained.append(explanation(robot, system, signals, fails=fails))
-    return explained
+            yield explained[-1]
 
 
 def _fitted(

@@ -13,6 +13,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
+from vsacli.base.progress import Countdown
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import as_name
 from vsacli.robot.model import Robot
@@ -29,25 +30,6 @@ from vsacli.trajectory.trajectory import Trajectory
 
 SEARCHES = 10
 """Largest number of inner searches of a joint: a constant, several starts, finer and finer splines."""
-
-
-class Countdown:
-    """Progress of one joint or timing: it reports `SEARCHES` searches in all, however many there are."""
-
-    def __init__(self, progress: Callable[[int], object]) -> None:
-        self._progress, self._left = progress, SEARCHES
-
-    def count(self) -> None:
-        """Report one search."""
-        if self._left:
-            self._left -= 1
-            self._progress(1)
-
-    def finish(self) -> None:
-        """Report the searches that were not needed."""
-        self._progress(self._left)
-        self._left = 0
-
 
 TIME, TIMING, BOTH = "time", "timing", "both"
 """Words for minimizing the time, and for varying the timing or both timing and stiffness."""
@@ -163,7 +145,7 @@ class CheapestStiffness:
         self._acceptance, self._trajectory, self._criterion = acceptance, trajectory, criterion
         self._seed = seed
         self._joints = chosen_joints(acceptance.robot)
-        self._bars = {index: Countdown(progress) for index in self._joints}
+        self._bars = {index: Countdown(progress, SEARCHES) for index in self._joints}
         rest, loads = rests(trajectory), joint_loads(acceptance.robot, trajectory, self._joints)
         self._periods = {
             index: 0 if rest else periods(load) for index, load in zip(self._joints, loads, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import MIN_MARGIN, check_min_margin
+from vsacli.base.progress import Countdown, Progress, unseen
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
 from vsacli.dynamics.inverse import fitted
@@ -44,7 +45,13 @@ FASTER_SHARE = 0.8
 """Share of the extra duration of another fix below which a larger fix of the same kinds is worth offering."""
 
 
-def fixes(robot: Robot, trajectory: Trajectory, min_margin: float = MIN_MARGIN) -> Fixes:
+def fixes(
+    robot: Robot,
+    trajectory: Trajectory,
+    min_margin: float = MIN_MARGIN,
+    *,
+    progress: Progress = unseen,
+) -> Fixes:
     """Return the smallest changes after which every sample has the margin and keeps every limit.
 
     Slow-down, constant stiffness change, other stiffness profile and longer transition are tried alone, then
@@ -54,6 +61,7 @@ def fixes(robot: Robot, trajectory: Trajectory, min_margin: float = MIN_MARGIN) 
         robot: robot that executes the motion.
         trajectory: commanded motion.
         min_margin: margin min(sigma - lower, upper - sigma)/sigma required of every sample.
+        progress: shows the progress over the searches, one for each kind of change or combination of kinds.
 
     Raises:
         InputError: the trajectory is not for the robot, a transmission is damped, or `min_margin` is not a
@@ -72,13 +80,16 @@ def fixes(robot: Robot, trajectory: Trajectory, min_margin: float = MIN_MARGIN) 
     if not acceptance.refused_joints(trajectory).any() and asked.falls_short(as_it_is) is None:
         return Fixes(min_margin)
     found_causes = dict(causes(asked))
-    tried = _tried(asked, found_causes)
-    if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
-        found_causes = {
-            index: replace(cause, fixable=cause.fixable and is_fixable(asked, index))
-            for index, cause in found_causes.items()
-        }
-        tried = _tried(asked, found_causes)
+    with progress(len(ALONE) + len(COMBINED)) as bar:
+        searches = Countdown(bar.update, len(ALONE) + len(COMBINED))
+        tried = _tried(asked, found_causes, searches)
+        if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
+            found_causes = {
+                index: replace(cause, fixable=cause.fixable and is_fixable(asked, index))
+                for index, cause in found_causes.items()
+            }
+            tried = _tried(asked, found_causes, searches)
+        searches.finish()
     return Fixes(
         min_margin,
         **{name: tried.part(name) for name in ALONE},
@@ -109,23 +120,23 @@ class _Tried(NamedTuple):
         return any(each.longer > 0 for each in candidates)
 
 
-def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
+def _tried(task: Task, found_causes: Mapping[int, Cause], searches: Countdown) -> _Tried:
     """Search for fixes of all joints that can be fixed."""
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))
         return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
     asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
-    tried = _searched(asked)
+    tried = _searched(asked, searches)
     # new samples between the recorded ones may exceed a position limit that these keep, at any speed
     lost = not tried.chosen or (tried.slower(tried.failed) and not tried.slower(tried.chosen))
     if lost and isinstance(task.trajectory.times, RecordedTimes):
-        at_samples = _searched(replace(asked, keeps_rate=False))
+        at_samples = _searched(replace(asked, keeps_rate=False), searches)
         return at_samples if at_samples.chosen else tried
     return tried
 
 
-def _searched(asked: Task) -> _Tried:
+def _searched(asked: Task, progress: Countdown) -> _Tried:
     """Run all searches; repeat those whose fix a run refuses, with the refused instants as samples."""
     searches = {**ALONE, **COMBINED}
     if not has_transitions(asked.trajectory):
@@ -141,6 +152,7 @@ def _searched(asked: Task) -> _Tried:
                 found[name] = list(searches[name](task))
             except ImpossibleError as error:
                 found[name] = NotPossible(error.reasons)
+            progress.count()
         by_search = {name: each for name in searches if isinstance(each := found[name], list)}
         chosen, failed, short = _worth_choosing(chain(*by_search.values()), asked, confirmed)
         every_failed.extend(failed)

@@ -15,6 +15,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import MIN_MARGIN, check_min_margin
+from vsacli.base.progress import Countdown
 from vsacli.base.texts import as_name
 from vsacli.base.units import ENERGY
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
@@ -28,7 +29,6 @@ from vsacli.studies.search.cheapest_stiffness import (
     TIME,
     TIMING,
     CheapestStiffness,
-    Countdown,
     cheapest_stiffness,
     check_timing_varies,
     checked_criterion,
@@ -128,7 +128,7 @@ def fastest(
     If no slow-down makes the commanded stiffness feasible, the search starts from the smallest slow-down
     with constant changes of the stiffness.
     """
-    bar, ends = Countdown(progress), _ends(what, trajectory)
+    bar, ends = Countdown(progress, SEARCHES), _ends(what, trajectory)
     try:
         try:
             uniform, found, best = _fastest(what, trajectory, ends, varied, seed, bar.count)
@@ -187,7 +187,7 @@ def cheapest_pace(
     criterion = type(criterion)(repeating=ends.periods > 0)
 
     def along(path: Trajectory, near: Pacing | None = None, slow_down: float = 1.0) -> Optimum:
-        bar = Countdown(progress)
+        bar = Countdown(progress, SEARCHES)
 
         def search(rule: Acceptance) -> CheapestPaceSearch:
             duration = path.duration / max(ends.periods, 1)
@@ -218,7 +218,7 @@ def cheapest_pace(
         except ImpossibleError:
             slower = _smallest_slow_down(what, trajectory)
         path = with_raised_stiffness(trajectory, slower.constants)
-        _, near, quickest = _fastest(what, path, ends, varied, seed, Countdown(progress).count)
+        _, near, quickest = _fastest(what, path, ends, varied, seed, Countdown(progress, SEARCHES).count)
         if quickest.duration <= path.duration:
             return along(path, near)
         return along(path.stretched(slower.factor), slow_down=slower.factor)
