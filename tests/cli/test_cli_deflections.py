@@ -64,7 +64,7 @@ def test_bad_threshold_is_refused_before_the_integration(vsacli, motion, monkeyp
     )
     done = vsacli("check-feasibility", ROBOT, motion, "--deflection-solver", "ode", "--min-margin", "2")
     assert done.code == 2
-    assert "minimum margin must lie between" in done.err
+    assert "expected a share from 0 % to 100 %" in done.err
 
 
 @COMMANDS

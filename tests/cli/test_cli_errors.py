@@ -261,11 +261,13 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     ("arguments", "message"),
     [
         (
-            "plot r.h5 -o fig.pdf",
-            "'fig.pdf' looks like a file name, expected a folder; e.g. --output fig --format pdf",
+            "plot r.h5 -o fig.csv",
+            "'fig.csv': expected a folder, or the name of a figure (.png, .pdf, .svg, .html)",
         ),
-        ("plot r.h5 -o fig.csv", "'fig.csv' looks like a file name, expected a folder; e.g. --output fig"),
-        ("invdyn a b --plot fig.png", "'fig.png' looks like a file name, expected a folder; e.g. --plot fig"),
+        (
+            "invdyn a b --plot fig.html",
+            "'fig.html': expected a folder, or the name of a figure (.png, .pdf, .svg)",
+        ),
         ("codegen a -o arm.c", "'arm.c' looks like a file name, expected a folder; e.g. --output arm"),
         (
             "info r.h5 --extract arm.yaml",

@@ -75,7 +75,7 @@ def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
         # A band begins half a step of 10 ms before its first step.
         assert start == pytest.approx(joint["first_time"]["infeasible"] - 0.005)
         assert end == 4
-    assert labels(figure) == ["reachable", "infeasible"]
+    assert labels(figure) == ["attainable", "infeasible"]
 
 
 def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):

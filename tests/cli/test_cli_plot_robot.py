@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from samples.command_line import REPOSITORY, ROBOT, contents
+from samples.command_line import REPOSITORY, ROBOT, SEVEN_JOINTS, contents
 
 NAMES = ("arm", "actuators", "stiffness")
 
@@ -31,11 +31,11 @@ def test_of_rigid_joints_only_the_arm_is_drawn_and_a_note_says_so(vsacli, tmp_pa
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--from", "1"], "can be chosen of results, not of robots"),
-        (["--joints", "elbow"], "can be chosen of results, not of robots"),
-        (["--robot", ROBOT], "a robot file needs no other"),
+        (["--from", "1"], "--from cannot be used with a robot; leave it out"),
+        (["--joints", "elbow"], "--joints cannot be used with a robot; leave it out"),
+        (["--robot", ROBOT], "--robot is only for recordings; leave it out"),
         (["--format", "html"], "--format html needs a result"),
-        ([ROBOT], "robots are drawn one at a time"),
+        ([SEVEN_JOINTS], "robots are drawn one at a time"),
     ],
 )
 def test_options_of_results_are_refused(vsacli, tmp_path, options, message):

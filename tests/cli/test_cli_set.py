@@ -221,7 +221,6 @@ def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (["--rate", "-5"], "--rate: must be positive, not -5"),
         (
             ["--rate", "1e9"],
             "--rate: duration 4 s times rate 1e+09 Hz gives 4e+09 samples; at most 1e+09 are possible; "

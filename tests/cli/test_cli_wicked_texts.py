@@ -131,7 +131,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("validate", "ROBOT", "OUT/fixed.yaml"),
     ("simulate", "ROBOT", "MOVE", "-o", "OUT/s.h5", "--budget", "60"),
     ("codegen", "ROBOT", "-o", "OUT/code"),
-    ("plot", "RESULT", "RESULT", "-o", "OUT/figures", "--format", "svg", "-v"),
+    ("plot", "RESULT", "-o", "OUT/figures", "--format", "svg", "-v"),
     ("export", "RESULT", "-o", "OUT/table.csv", "--variables", "q,stiffness"),
     ("invdyn", "ROBOT", "OUT/table.csv", "-o", "OUT/again.h5"),
     ("compare", "RESULT", "OUT/table.csv"),

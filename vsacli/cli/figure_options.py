@@ -81,15 +81,16 @@ class FigureTarget(NamedTuple):
 class PlaceType(NameType):
     """A folder for figures, or the name of a figure, whose ending is the format."""
 
-    def __init__(self) -> None:
-        super().__init__("folder", "file")
+    def __init__(self, formats: Iterable[str]) -> None:
+        super().__init__("folder", "dir")
+        self.endings = [f".{each}" for each in formats]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""
         name = super().convert(value, param, ctx)
         ending = ending_of(name)
-        if ending and ending not in FIGURES and not Path(name).is_dir():
-            endings = ", ".join(FIGURES)
+        if ending and ending not in self.endings and not Path(name).is_dir():
+            endings = ", ".join(self.endings)
             self.fail(f"{name!r}: expected a folder, or the name of a figure ({endings})", param, ctx)
         return name
 
@@ -114,7 +115,7 @@ def figure_options(
         @click.option(
             *flags,
             "place",
-            type=PlaceType(),
+            type=PlaceType(formats),
             metavar="FOLDER",
             default=default,
             show_default=True,
