@@ -145,12 +145,11 @@ def test_a_result_alone_is_recognized(vsacli, feasible_result):
 @pytest.mark.parametrize(
     ("words", "argument"),
     [
-        (("plot", ROBOT), "FILE must be a result, a simulation, a study table or a CSV table"),
         (("compare", ROBOT, "r.csv"), "RESULT must be a result or a simulation"),
         (("import-urdf", ROBOT), "URDF must be a URDF file"),
         (("study", ROBOT), "STUDY must be a study"),
         (("identify", ROBOT, ROBOT), "RECORDING must be a CSV table"),
-        ((*SIZE[:3], "--catalog", ROBOT), "--catalog must be a CSV table"),
+        ((*SIZE[:3], "--catalog", ROBOT), "--catalog must be a motor catalog"),
         ((*LINEARIZED, "--poles", ROBOT), "--poles must be a poles file"),
         (("export", ROBOT, "--format", "mjcf", "--start", ROBOT), "--start must be a result"),
     ],

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
 
-DRAWN = ("result", "simulation", "table of a study", "table")
+DRAWN = ("robot", "result", "simulation", "table of a study", "table")
 """Kinds of files of which figures are drawn, as in `FileKind`."""
 
 

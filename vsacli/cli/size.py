@@ -101,7 +101,7 @@ def size(
             outputs.check(output)
         samples = sum(motion.samples for motion in motions)
         with (
-            naming_kind("--catalog", catalog, ("motor catalog", "table")),
+            naming_kind("--catalog", catalog, ("motor catalog",)),
             talk.progress(samples) as progress,
         ):
             found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
