@@ -1,12 +1,11 @@
 """Write the generated parts of README.md and of the pages in docs/ from the code.
 
-python docs/generate.py                     rewrites the parts and draws the images
-python docs/generate.py --check             changes nothing; exit code 1 if a part is stale
-python docs/generate.py --examples [PAGE]   runs the examples of pages, and shows what they print now
+Without options it rewrites the parts and draws the images, which needs Chromium and some minutes.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import re
 import sys
@@ -346,18 +345,24 @@ def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
 
 def main() -> int:
     """Run the script; returns its exit code."""
-    if "--check" in sys.argv[1:]:
+    parser = argparse.ArgumentParser(description=__doc__)
+    one = parser.add_mutually_exclusive_group()
+    one.add_argument(
+        "--check", action="store_true", help="only say which pages are stale; exit code 1 if any is"
+    )
+    one.add_argument("--texts", action="store_true", help="leave the images as they are")
+    one.add_argument("--examples", action="store_true", help="renew the outputs that pages show")
+    parser.add_argument("pages", nargs="*", type=Path, help="pages, of all if none")
+    chosen = parser.parse_args()
+    if chosen.check:
         for page in (outdated := stale()):
             print(f"{page}: generated parts are stale; run python docs/generate.py", file=sys.stderr)
         return 1 if outdated else 0
-    if "--examples" in sys.argv[1:]:
-        chosen = [Path(name) for name in sys.argv[2:]] or PAGES
-        for page in chosen:
-            page.write_text(renewed(page), encoding="utf-8")
-        return 0
-    for page in PAGES:
-        page.write_text(regenerated(page.read_text(encoding="utf-8")), encoding="utf-8")
-    draw_images(PAGES)
+    for page in chosen.pages or PAGES:
+        text = renewed(page) if chosen.examples else regenerated(page.read_text(encoding="utf-8"))
+        page.write_text(text, encoding="utf-8")
+    if not (chosen.examples or chosen.texts):
+        draw_images(PAGES)
     return 0
 
 

@@ -14,7 +14,7 @@ GROUPS = {
     "Robots": "load_robot import_urdf Robot Joint DenavitHartenberg Link Inertia Pose Limits Antagonistic "
     "Elastic Rigid Serial Motor Friction Damper laws mechanisms Placeholders",
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
-    "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result fixes "
+    "Inverse dynamics and its results": "inverse_dynamics motor_torques Result Report Flag open_result fixes "
     "compare Comparison sensitivity Sensitivity identify Identification plan_excitation Excitation "
     "excitation_text optimize Optimum size_drives Sizing run_study StudySummary",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",

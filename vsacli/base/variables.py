@@ -246,8 +246,8 @@ class Block:
         """Return the variables present, by name."""
         return {name: vars(self)[name] for name in self.declared if name in vars(self)}
 
-    def taken(self, steps: slice | AnyArray) -> Self:
-        """Return a block of the selected samples."""
+    def taken(self, steps: int | slice | AnyArray) -> Self:
+        """Return a block of the selected samples; a single number removes the axis of samples."""
         return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
 
     def replaced(self, **arrays: AnyArray) -> Self:

@@ -10,11 +10,13 @@ from vsacli.base.lazy import lazy_exports
 if TYPE_CHECKING:
     from vsacli.dynamics.elastic_torques import link_torques
     from vsacli.dynamics.forward import State, mass_matrix, state_derivative
+    from vsacli.dynamics.inverse import motor_torques
 
 __all__ = [
     "State",
     "link_torques",
     "mass_matrix",
+    "motor_torques",
     "state_derivative",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

@@ -12,8 +12,10 @@ import numpy.typing as npt
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import BoolArray, FloatArray, checked_shape
 from vsacli.base.errors import InputError, check_type
+from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import Wrench, check_wrench
+from vsacli.compute.engine import KEPT_PROGRAMS
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
 from vsacli.dynamics.dry_friction import Response, response_with_friction
@@ -87,7 +89,7 @@ def state_derivative(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench)
-    plant = Plant(robot, None if wrench is None else wrench.frame)
+    plant = plant_of(robot, None if wrench is None else wrench.frame)
     q, dq, theta, dtheta = plant.unpacked(state)
     torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
     least = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
@@ -98,6 +100,12 @@ def state_derivative(
     ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
     merged = plant.drivetrain.merged
     return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
+
+
+@cached_by_identity(KEPT_PROGRAMS)
+def plant_of(robot: Robot, frame: str | None = None) -> Plant:
+    """Return the plant of a robot, prepared once for many calls; see `Plant`."""
+    return Plant(robot, frame)
 
 
 class Plant:

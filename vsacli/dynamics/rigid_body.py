@@ -175,6 +175,7 @@ def _last_pivot(matrices: FloatArray) -> float:
     return float(np.min(np.divide(pivots, entries, out=np.zeros_like(pivots), where=entries > 0)))
 
 
+@lru_cache(maxsize=16)
 def chain_of(robot: Robot, frame: str | None = None) -> Chain:
     """Return the programs of a robot's links and joints; equal chains share them.
 

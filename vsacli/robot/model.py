@@ -117,7 +117,7 @@ class Robot:
         required_of_none = variable.requires in OF_ANY_ROBOT
         return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
 
-    @property
+    @cached_property
     def signals(self) -> tuple[Signal, ...]:
         """Commanded signals in results, in addition to the motion; each commands at least one joint."""
         return tuple(each for each in COMMANDED.values() if self.has(VARIABLES[each.key]))
