@@ -11,7 +11,7 @@ from samples.simulated import mixed_3r, short_motion
 from scipy.integrate import solve_ivp
 
 from vsacli.control.simulation import InitialError, perturbed, simulate
-from vsacli.control.simulation.tabulated import first_undefined, tabulate
+from vsacli.control.simulation.tabulated import Table
 from vsacli.dynamics.forward import Plant
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
@@ -118,27 +118,27 @@ def test_a_table_of_a_function_is_as_good_as_the_function():
         kink = np.where(time < 0.3, np.sin(40 * time), np.sin(12.0) + np.exp(-60 * (time - 0.3)) - 1)
         return np.stack((kink, 1 / (0.001 + (time - 1) ** 2)), axis=1)
 
-    table = tabulate(function, ends)
+    table = Table.of(function, ends)
     times = np.linspace(0, 2, 4001)
     error = np.abs(table(times) - function(times))
     # the tolerance of the table, relative to the peaks 2 and 1000, in the places its probes do not look at
     assert (error.max(axis=0) < np.array([2, 1000]) * 1e-11).all()
     assert table(0.7) == pytest.approx(function(np.array([0.7]))[0], rel=1e-10)
-    assert first_undefined(table) is None
+    assert table.first_undefined is None
 
 
 def test_a_table_says_where_its_function_ends():
     def function(time):
         return np.stack((time, np.where(time <= 0.97, np.sin(time), np.nan)), axis=1)
 
-    time, column = first_undefined(tabulate(function, np.array([0.0, 2.0])))
+    time, column = Table.of(function, np.array([0.0, 2.0])).first_undefined
     assert column == 1
     assert 0.97 - 2 / 32 / 1024 < time <= 0.97  # the smallest cell
 
 
 def test_noise_of_a_function_is_not_resolved():
     noise = np.random.default_rng(0)
-    table = tabulate(
+    table = Table.of(
         lambda time: np.sin(time)[:, None] + noise.normal(0, 1e-9, (len(time), 1)), np.array([0.0, 1.0])
     )
-    assert table.c.shape[1] <= 128
+    assert len(table.coefficients) <= 128

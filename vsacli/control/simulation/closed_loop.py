@@ -12,7 +12,7 @@ from vsacli.base.flags import Flag
 from vsacli.control.gains import Gains, Integral
 from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation.ending import Ending
-from vsacli.control.simulation.tabulated import Constant, Reference, Table, first_undefined
+from vsacli.control.simulation.tabulated import Constant, Reference, Table
 from vsacli.dynamics.dry_friction import Response
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.internal_motion import internal_motions
@@ -107,7 +107,7 @@ class Feedforward:
         ends = np.union1d(trajectory.breakpoints, trajectory.start + internal.breakpoints)
         self._table = Table.of(columns, ends if internal.joints else trajectory.breakpoints)
         self.ending: Ending | None = None
-        if (found := first_undefined(self._table.polynomial)) is not None:
+        if (found := self._table.first_undefined) is not None:
             time, column = found
             motor = column % len(drivetrain.joint)
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))

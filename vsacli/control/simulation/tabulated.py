@@ -7,8 +7,7 @@ of recorded programs; a `Reference` is the tabulated trajectory that a controlle
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,6 @@ from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
 
 
 class Table:
@@ -37,20 +33,19 @@ class Table:
     @classmethod
     def of(cls, function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> Table:
         """Return the table of a function of time; see `tabulate`."""
-        polynomial = tabulate(function, breakpoints)
-        return cls(polynomial.x, np.moveaxis(polynomial.c, 1, 0))
+        return cls(*tabulate(function, breakpoints))
 
     @property
     def columns(self) -> int:
         """Number of columns."""
         return int(self.coefficients.shape[2])
 
-    @cached_property
-    def polynomial(self) -> PPoly[Any]:
-        """The table as a polynomial of SciPy."""
-        from scipy.interpolate import PPoly
-
-        return PPoly(np.moveaxis(self.coefficients, 1, 0), self.ends)
+    @property
+    def first_undefined(self) -> tuple[float, int] | None:
+        """Start of the first cell in which a column is NaN, s, and this column; None without one."""
+        undefined = np.isnan(self.coefficients).any(axis=1)
+        cell = int(undefined.any(axis=1).argmax())
+        return (float(self.ends[cell]), int(undefined[cell].argmax())) if undefined.any() else None
 
     def __call__(self, time: Any) -> FloatArray:
         """Return the columns at a time, (columns,), or at times, (samples, columns)."""
@@ -58,7 +53,12 @@ class Table:
 
     def _at(self, time: float | FloatArray) -> FloatArray:
         if np.ndim(time):
-            return self.polynomial(time)
+            cells = np.searchsorted(self.ends[1:-1], time, "right")
+            elapsed = (time - self.ends[cells])[:, None]
+            values = self.coefficients[cells, 0]
+            for power in range(1, self.coefficients.shape[1]):
+                values = values * elapsed + self.coefficients[cells, power]
+            return values
         cell = int(np.searchsorted(self.ends[1:-1], time, "right"))
         powers = (time - self.ends[cell]) ** np.arange(len(self.coefficients[cell]) - 1, -1, -1)
         columns: FloatArray = powers @ self.coefficients[cell]
@@ -101,9 +101,6 @@ class Instant:
         return self.tables[table]
 
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
 DEGREE = 7
 FIRST_CELLS = 32
 """Initial number of cells of the span; cells with a poor fit are halved."""
@@ -130,16 +127,19 @@ _TO_POWERS = np.linalg.inv(np.vander(_NODES))
 _TO_PROBES = np.vander(_PROBES, DEGREE + 1) @ _TO_POWERS
 
 
-def tabulate(function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> PPoly[Any]:
+def tabulate(
+    function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return a piecewise polynomial that approximates a function of time to about `TOLERANCE`.
 
     Args:
         function: function that returns values, (samples, columns), at times, (samples,), s; analytic between
             breakpoints, or NaN.
         breakpoints: ascending times, s; the first and last are the span.
-    """
-    from scipy.interpolate import PPoly
 
+    Returns:
+        Ends of the cells, and coefficients in them, as of `Table`.
+    """
     ends = np.union1d(breakpoints, np.linspace(breakpoints[0], breakpoints[-1], FIRST_CELLS + 1))
     starts, lengths = ends[:-1], np.diff(ends)
     before = np.full(len(starts), np.inf)
@@ -157,14 +157,7 @@ def tabulate(function: Callable[[FloatArray], FloatArray], breakpoints: FloatArr
         before = np.tile(error[halve], 2)
     first, coefficients = (np.concatenate(parts) for parts in zip(*cells, strict=True))
     order = np.argsort(first)
-    return PPoly(np.moveaxis(coefficients[order], 1, 0), np.append(first[order], ends[-1]))
-
-
-def first_undefined(table: PPoly[Any]) -> tuple[float, int] | None:
-    """Return the start of the first cell in which a column is NaN, s, and this column; None without one."""
-    undefined = np.isnan(table.c).any(axis=0)
-    cell = int(undefined.any(axis=1).argmax())
-    return (float(table.x[cell]), int(undefined[cell].argmax())) if undefined.any() else None
+    return np.append(first[order], ends[-1]), coefficients[order]
 
 
 def _sampled(
