@@ -140,11 +140,13 @@ def figure_options(
         @click.option("--no-title", is_flag=True, help="Draw figures without a title.")
         @wraps(command)
         def drawing(*args: Any, place: str | None, file_format: str | None, **kwargs: Any) -> Any:
-            from vsacli.results.charts.look import drawing_with
-
             chosen = {name: kwargs.pop(name) for name in LOOK}
             target = None if place is None else _target(place, file_format)
             _refuse_unused(target, file_format, chosen)
+            if target is None:
+                return command(*args, figures=None, **kwargs)
+            from vsacli.results.charts.look import drawing_with
+
             with drawing_with(_look(**chosen)):
                 return command(*args, figures=target, **kwargs)
 

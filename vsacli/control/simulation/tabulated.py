@@ -55,7 +55,7 @@ class Table:
         if np.ndim(time):
             cells = np.searchsorted(self.ends[1:-1], time, "right")
             elapsed = (time - self.ends[cells])[:, None]
-            values = self.coefficients[cells, 0]
+            values: FloatArray = self.coefficients[cells, 0]
             for power in range(1, self.coefficients.shape[1]):
                 values = values * elapsed + self.coefficients[cells, power]
             return values
