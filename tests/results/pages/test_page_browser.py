@@ -103,7 +103,7 @@ def test_plots_are_drawn_without_complaint(browser: Browser, pages: Pages, name:
     if name == "result":
         browser.run("document.querySelectorAll('details.section').forEach(d => { d.open = true; })")
         browser.run("return vsacli.charts.buildRest()")
-    seen = "[...document.querySelectorAll('.plot')].filter(p => p.offsetParent !== null)"
+    seen = "[...document.querySelectorAll('.plot')].filter(p => !p.closest('details:not([open])'))"
     plots = browser.run(f"return {seen}.map(p => p.childElementCount)")
     assert len(plots) > 2
     assert all(plots)
@@ -201,14 +201,38 @@ def test_a_filter_hides_a_joint_everywhere_and_axes_follow(page: Browser) -> Non
     assert not page.run("return vsacli.charts.cards[0].curves[0].drawn[0].visible")
 
 
-def test_stretches_are_shaded_and_the_robot_says_what_is_wrong(browser: Browser, pages: Pages) -> None:
+AREAS = """const { figure } = vsacli.charts.cards[0], { start, end } = figure.y_range;
+const [{ data_source: { data } }] = figure.renderers.filter(each => each.glyph.type === 'Quad');
+const share = (value) => (value - start) / (end - start);
+return data.paint.map((paint, at) => ({ paint, top: share(data.top[at]), bottom: share(data.bottom[at]) }))"""
+"""Marks of failures in the first plot, as shares of its height, with their colors."""
+
+
+def test_failures_are_marked_and_the_robot_says_what_is_wrong(browser: Browser, pages: Pages) -> None:
+    """In strips of the joints' colors below the curves of several joints, behind the curve of one."""
+    browser.media(prefers_color_scheme="light")
     browser.open(pages["failing"])
-    lanes = browser.texts(".trouble span")
-    assert lanes
+    failing = browser.texts(".trouble span")
+    assert failing
     browser.run("vsacli.setCursor(4)")
     assert "infeasible" in browser.settled("return document.getElementById('chain-note').textContent")
-    strips = "return vsacli.charts.cards[0].figure.renderers.filter(r => r.glyph.type === 'VStrip').length"
-    assert browser.run(strips) >= 1
+    names = browser.run("return vsacli.data.joints.map(joint => joint.name)")
+    paints = browser.run("return vsacli.data.joints.map((_, joint) => vsacli.curveColor(joint))")
+    areas = browser.run(AREAS)
+    assert {area["paint"] for area in areas} == {paints[names.index(name)] for name in failing}
+    assert all(area["top"] < 0.03 * len(failing) for area in areas)
+    lowest = browser.run(
+        """const card = vsacli.charts.cards[0], { start, end } = card.figure.y_range;
+        return (card.curveExtent().start - start) / (end - start)"""
+    )
+    assert lowest > max(area["top"] for area in areas)  # no curve passes through a strip
+    assert "infeasible, by color of joint" in browser.texts(".chart .legend")[0]
+    for name in names:
+        browser.run("vsacli.state.joints = new Set([arguments[0]]); vsacli.tell('shown')", names.index(name))
+        alone = browser.run(AREAS)
+        assert [(area["bottom"], area["top"]) for area in alone] == [pytest.approx((0, 1))] * len(alone)
+        assert bool(alone) == (name in failing)
+    assert "by color of joint" not in browser.texts(".chart .legend")[0]
 
 
 def test_a_run_of_a_study_is_found_in_all_plots(browser: Browser, pages: Pages) -> None:
@@ -222,7 +246,67 @@ def test_a_page_can_be_printed(page: Browser) -> None:
     printed = page.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": False})
     content = base64.b64decode(printed["data"])
     assert content.startswith(b"%PDF")
-    assert content.count(b"/Subtype /Image") >= 4  # plots, and the robot
+    assert content.count(b"/Subtype /Image") == 0  # plots and robot are lines
+
+
+INKS = """const inks = new Set();
+for (const each of document.querySelectorAll('.copy *')) {
+  inks.add(each.getAttribute('fill')); inks.add(each.getAttribute('stroke'));
+}
+return [...inks]"""
+
+BRIGHTEST = """const chain = document.getElementById('chain');
+const { data } = chain.getContext('2d').getImageData(0, 0, chain.width, chain.height);
+let brightest = 0;
+for (let at = 0; at < data.length; at += 4) {
+  if (data[at + 3] > 250) brightest = Math.max(brightest, data[at + 1]);
+}
+return brightest"""
+"""Largest green component of an opaque pixel of the robot."""
+
+
+@pytest.mark.parametrize("name", ["result", "failing", "compared", "simulated", "studied"])
+def test_paper_has_the_colors_of_paper_in_the_dark(browser: Browser, pages: Pages, name: str) -> None:
+    """As a browser prints: every plot of an open section is copied in the same colors as in the light."""
+    browser.open(pages[name])
+    inks = {}
+    for scheme in ("light", "dark"):
+        browser.media(prefers_color_scheme=scheme)
+        browser.open(pages[name])
+        browser.run("dispatchEvent(new Event('beforeprint'))")
+        inks[scheme] = set(browser.run(INKS))
+        uncopied = "document.querySelectorAll('details[open] > .charts .plot:not(.copied)').length"
+        assert browser.run(f"return {uncopied}") == 0
+        assert browser.run("return document.querySelectorAll('.copy').length") > 2
+        browser.run("dispatchEvent(new Event('afterprint'))")
+        assert browser.run("return document.querySelectorAll('.copy, .copied').length") == 0
+        ground = browser.run("return vsacli.color('ground')")
+        assert (ground == "#ffffff") == (scheme == "light")  # as before
+    assert inks["dark"] == inks["light"]
+    assert browser.complaints() == []
+
+
+def test_the_robot_is_dark_on_paper(browser: Browser, pages: Pages) -> None:
+    browser.media(prefers_color_scheme="dark")
+    browser.open(pages["result"], whole=False)
+    dark = browser.settled(BRIGHTEST)
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    paper = browser.run(BRIGHTEST)
+    browser.run("dispatchEvent(new Event('afterprint'))")
+    assert paper < dark
+
+
+@pytest.mark.parametrize("name", ["result", "failing", "compared", "simulated", "studied"])
+def test_no_page_is_wider_than_a_phone(browser: Browser, pages: Pages, name: str) -> None:
+    size = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        browser.open(pages[name])
+        assert browser.run("return document.documentElement.scrollWidth") == 420
+        narrowest = "return Math.min(...[...document.querySelectorAll('th')].map(cell => cell.offsetWidth))"
+        assert browser.run(narrowest) > 30  # no name has one letter per line
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_names_that_would_act_are_texts(browser: Browser, tmp_path: Path, feasible_result: Path) -> None:

@@ -22,10 +22,11 @@ from samples.wicked import TEXTS, clean
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
 from vsacli.cli.main import run
+from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.reduction import FULL_DETAIL
 from vsacli.results.charts.stored import BOUNDS
 from vsacli.results.pages.result_page import sections_of
-from vsacli.results.store.reader import StoredResult
+from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.kinematics import forward_kinematics
 
@@ -47,9 +48,32 @@ def page(feasible_result: Path, tmp_path_factory: pytest.TempPathFactory) -> Pag
 
 
 def test_a_page_says_verdict_and_report_before_anything_else(page: Page) -> None:
-    body = page.text[page.text.index("vsa-3r, rest-to-rest: 401 steps, 0 to 4 s") :]
-    assert re.match(r"vsa-3r, rest-to-rest: 401 steps, 0 to 4 s\s*ok\s*Report\s*joint", body)
+    body = page.text[page.text.index("vsa-3r, rest-to-rest; 401 samples, 0 to 4 s") :]
+    assert re.match(r"vsa-3r, rest-to-rest; 401 samples, 0 to 4 s\s*ok\s*Report\s*joint", body)
     assert body.index("self-check passed") < body.index("Inputs and provenance")
+
+
+def test_headings_are_the_titles_of_figures(vsacli: Any, tmp_path: Path, feasible_result: Path) -> None:
+    """Of simulations with controller and model error; of several files with what distinguishes them."""
+    motion = edited(rest_to_rest(tmp_path / "m.yaml"), tmp_path / "short.yaml", ("rate: 100 ", "rate: 10 "))
+    assert vsacli("simulate", ROBOT, motion, "--perturb", "5%", "-o", "sim.h5", "-q").code in (0, 3)
+    with open_stored("sim.h5") as simulation:
+        title = result_title(simulation)
+    assert title == "vsa-3r, rest-to-rest: simulation, feedforward, model error 5 %"
+    page = page_of(vsacli, "sim.h5")
+    assert f"{title}; 41 samples, 0 to 4 s" in page.text
+    assert page.text.lstrip().startswith(title)  # of the window
+    shutil.copy(feasible_result, "again.h5")
+    both = page_of(vsacli, feasible_result, "again.h5").text
+    for stem in (feasible_result.stem, "again"):
+        assert f"vsa-3r, rest-to-rest ({stem}); 401 samples" in both
+
+
+def test_provenance_is_in_words(vsacli: Any, motion: Path) -> None:
+    assert vsacli("invdyn", ROBOT, motion, "--set", "rate=50", "-o", "set.h5", "-q").code == 0
+    text = page_of(vsacli, "set.h5").text
+    assert re.search(r"--set\s*\S*move.yaml: rate = 50\s", text)
+    assert "stop_on_infeasible = false, min_margin = 0.01" in text
 
 
 def test_findings_come_before_the_table_and_values_after_it(vsacli: Any, too_soft: Path) -> None:
@@ -278,7 +302,7 @@ def test_a_report_of_another_form_is_refused_with_a_sentence(
         file["report/json"][()] = json.dumps({**json.loads(file["report/json"][()]), **wrong})
     done = vsacli("plot", "odd.h5", "--format", "html")
     assert done.code == 2
-    sentence = r"odd\.h5: variable report is damaged or truncated \(.*\); compute it again\n"
+    sentence = r"odd\.h5: variable report is damaged or truncated; compute it again\n"
     assert re.fullmatch(sentence, done.err)
     assert not Path("odd.html").exists()
 

@@ -15,7 +15,7 @@ from samples.wicked import TEXTS, clean
 
 from vsacli.base.version import __version__
 
-HEADING = "What would fix it"
+HEADING = "Fixes"
 
 
 def page_of(vsacli: Any, *files: Path) -> tuple[Page, str]:

@@ -73,12 +73,16 @@ def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
     return groups
 
 
-def result_title(result: StoredResult) -> str:
+def result_title(result: StoredResult, label: str = "") -> str:
     """Return robot and trajectory, the conditions of a simulation, and the end of an incomplete run.
 
     Names of robot and trajectory that are equal are written once.
+
+    Args:
+        result: open result or simulation.
+        label: name that distinguishes the file from others; by default that of the trajectory.
     """
-    names = ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name)))
+    names = ", ".join(dict.fromkeys((result.robot_name, label or result.trajectory_name)))
     ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
     return f"{names}{_conditions(result)}{ending}"
 

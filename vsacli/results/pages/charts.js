@@ -2,7 +2,7 @@
 /* The plots over time: each a card with a legend that shows the values at the cursor; one window of time for all. */
 vsacli.charts = (() => {
   const { data, state, array, valueAt, number, color, curveColor, element } = vsacli;
-  const { dash, addSeries, shade, newFigure, addTools } = vsacli.figures;
+  const { FAILURES, IN_STRIPS, STRIP, dash, addSeries, areasOf, addAreas, newFigure, addTools } = vsacli.figures;
   const NEAR = 0.5, ROOM = 0.06;  // how far limits may be from curves to be shown, and room left; in heights of the curves
   const MANY = 8;  // joints, from which on a legend scrolls
   const cards = [];
@@ -19,6 +19,8 @@ vsacli.charts = (() => {
         this.area = element("span", { class: "area" });
         legend.append(element("span", { class: "key" }, this.area, chart.band));
       }
+      this.strips = FAILURES.map((kind) => [kind, stripKey(kind)]);
+      legend.append(...this.strips.map(([, key]) => key));
       if (chart.note) legend.append(element("span", { class: "note" }, chart.note));
       this.node = element("figure", { class: "chart" },
         element("figcaption", {}, chart.title, " ", element("code", {}, chart.name)), this.plot, legend);
@@ -38,9 +40,9 @@ vsacli.charts = (() => {
       return box;
     }
 
-    /* The corridor has a color of its own; uncertainty that of its curve. */
+    /* The attainable range has a color of its own; uncertainty that of its curve. */
     get bandColor() {
-      return this.chart.name === "stiffness" ? color("reachable") : "";
+      return this.chart.name === "stiffness" ? "attainable" : "";
     }
 
     get visible() {
@@ -48,36 +50,37 @@ vsacli.charts = (() => {
       return box.width > 0 && box.bottom > -200 && box.top < innerHeight + 200;
     }
 
+    /* Whether the section is open; plots in closed ones are laid out all the same, so that their size does not tell. */
+    get open() {
+      return !this.node.closest("details:not([open])");
+    }
+
     async build() {
-      if (this.figure || this.node.offsetParent === null) return;
+      if (this.figure || !this.open) return;
       const [start, end] = state.window.map((time) => time + data.start);
       const ranges = { x_range: new Bokeh.Range1d({ start, end }), y_range: new Bokeh.Range1d(this.extent()) };
       this.figure = newFigure(ranges, ["time [s]", `[${this.chart.unit}]`]);
       addTools(this.figure);
-      this.shadeAll();
-      this.curves = this.chart.series.map((series) => addSeries(this.figure, series, this.bandColor));
+      this.place = addAreas(this.figure);
+      this.curves = this.chart.series.map((series) => addSeries(this.figure, series, this.bandColor && color(this.bandColor)));
       this.addLimits();
       this.span = new Bokeh.Span({ dimension: "height", location: state.cursor + data.start,
                                    line_color: color("cursor"), line_width: 1 });
       this.figure.add_layout(this.span);
       this.follow();
       this.show();
-      await Bokeh.Plotting.show(this.figure, this.plot);
+      this.view = await Bokeh.Plotting.show(this.figure, this.plot);
       this.update();
     }
 
-    shadeAll() {
-      const joints = new Set(this.chart.series.map((series) => series.joint ?? -1));
-      if (joints.has(-1)) data.joints.forEach((_, joint) => joints.add(joint));
-      shade(this.figure, "unreliable", joints, { fill_alpha: 0.18 });
-      shade(this.figure, "near-singular", joints, { fill_alpha: 0.25 });
-      shade(this.figure, "infeasible", joints, { fill_alpha: 0.35 });
-      shade(this.figure, "singular", joints, { fill_alpha: 0.0, hatch_pattern: "right_diagonal_line",
-                                               hatch_color: color("singular"), hatch_alpha: 0.6, hatch_scale: 8 });
+    /* What the axis of values shows at first: all curves that are not hidden, and strips of failures below them. */
+    extent() {
+      const { start, end } = this.curveExtent(), room = STRIP * (this.marked.strips && this.marked.strips + 1);
+      return { start: start - (end - start) * room / (1 - room), end };
     }
 
-    /* What the axis of values shows at first: all curves that are not hidden, and limits that are near them. */
-    extent() {
+    /* The range of the curves that are not hidden, and of limits that are near them. */
+    curveExtent() {
       if (this.chart.shown) return { start: this.chart.shown[0], end: this.chart.shown[1] };
       let low = Infinity, high = -Infinity;
       for (const series of this.chart.series.filter(vsacli.shown)) {
@@ -104,13 +107,14 @@ vsacli.charts = (() => {
         const [start, end] = state.window.map((time) => time + data.start);
         if (x.start !== start || x.end !== end) vsacli.setWindow(x.start - data.start, x.end - data.start, this);
       });
+      this.figure.y_range.change.connect(() => this.place(this.marked.areas));
       this.figure.on_event("mousemove", (event) => vsacli.setCursor(event.x - data.start));
       this.figure.on_event("doubletap", () => vsacli.tell("reset"));
     }
 
     /* Take over window, cursor and values, if there is somebody to see it. */
-    update() {
-      if (!this.visible) return;
+    update(seen = this.visible) {
+      if (!seen) return;
       this.values.forEach(({ series, value }) => {
         value.textContent = number(valueAt(array(series.time), array(series.values), state.cursor));
       });
@@ -122,12 +126,17 @@ vsacli.charts = (() => {
     }
 
     reset() {
-      if (this.figure) this.figure.y_range.setv(this.extent());
+      if (!this.figure) return;
+      this.figure.y_range.setv(this.extent());
+      this.place(this.marked.areas);
     }
 
     /* Hide what the filters hide. */
     show() {
-      if (this.area) this.area.style.background = this.bandColor || color("soft");
+      this.marked = areasOf(this.chart.series.filter(vsacli.shown));
+      const kinds = new Set(this.marked.strips ? this.marked.areas.map(({ kind }) => kind) : []);
+      this.strips.forEach(([kind, key]) => key.classList.toggle("hidden", !kinds.has(kind)));
+      if (this.area) this.area.style.background = `var(--${this.bandColor || "soft"})`;
       this.values.forEach(({ series, part, swatch }) => {
         part.classList.toggle("hidden", !vsacli.shown(series));
         swatch.style.borderTopColor = vsacli.named(series.color);
@@ -139,6 +148,12 @@ vsacli.charts = (() => {
       this.reset();
     }
 
+    print() {
+      if (!this.view || !this.open) return;
+      this.update(true);
+      vsacli.figures.copyForPaper(this.view, this.plot);
+    }
+
     fail(error) {
       console.error(error);
       this.plot.textContent = `cannot be drawn: ${error.message}`;
@@ -146,8 +161,14 @@ vsacli.charts = (() => {
 
     drop() {
       this.plot.replaceChildren();
-      this.figure = undefined;
+      this.figure = this.view = undefined;
     }
+  }
+
+  function stripKey(kind) {
+    const area = element("span", { class: kind === "singular" ? "area hatched" : "area strip" });
+    area.style.opacity = IN_STRIPS[kind];
+    return element("span", { class: "key hidden" }, area, `${kind}, by color of joint`);
   }
 
   function add(parent, charts) {
@@ -173,10 +194,10 @@ vsacli.charts = (() => {
     }
   }, { rootMargin: "300px" });
 
-  /* Whatever is open but out of sight, while nothing else is to be done: it may be printed. */
+  /* Plots of open sections that are out of sight, when idle: they may be printed. */
   async function buildRest() {
     for (const card of cards) {
-      if (!card.figure && card.node.offsetParent !== null) await build(card);
+      if (!card.figure && card.open) await build(card);
     }
     document.documentElement.dataset.ready = "yes";
   }
@@ -192,6 +213,8 @@ vsacli.charts = (() => {
   vsacli.listen("shown", () => cards.forEach((card) => card.show()));
   vsacli.listen("reset", () => { cards.forEach((card) => card.reset()); vsacli.setWindow(...data.span); });
   vsacli.listen("scheme", () => { cards.forEach((card) => { card.drop(); card.show(); }); buildRest(); });
+  vsacli.listen("paper", () => cards.forEach((card) => card.print()));
+  vsacli.listen("screen", () => { cards.forEach((card) => vsacli.figures.removeCopy(card.plot)); updateSoon(); });
   addEventListener("scroll", updateSoon, { passive: true });
   return { add, buildRest, cards };
 })();

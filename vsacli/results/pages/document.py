@@ -164,10 +164,16 @@ def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = []
     for name, value in provenance.items():
         if name != "inputs" and value not in ("", {}):
-            text = value if isinstance(value, str) else json.dumps(value)
-            rows.append((name.replace("_", " "), text))
+            rows.append((name.replace("_", " "), _words(value)))
     changed = {each["path"]: each["changes"] for each in provenance["inputs"] if "changes" in each}
-    return rows + [(f"--set of {path}", json.dumps(changes)) for path, changes in changed.items()]
+    return rows + [("--set", f"{path}: {_words(changes)}") for path, changes in changed.items()]
+
+
+def _words(value: Any) -> str:
+    """Return a value of the provenance as text; of a mapping without keys that have no value."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} = {_words(each)}" for name, each in value.items() if each is not None)
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def input_text(file: StoredInput) -> InputText:

@@ -2,7 +2,7 @@
 /* Figures of the library in the page's colors, and what is drawn into them: curves, their bands, stretches of time. */
 Bokeh.set_log_level("warn");
 vsacli.figures = (() => {
-  const { data, array, color, curveColor } = vsacli;
+  const { data, state, array, color, curveColor, onPaper } = vsacli;
   /* Dashes of a curve, and the border that stands for them in a legend. */
   const DASHES = [["solid", "solid"], ["dashed", "dashed"], ["dotdash", "double"], ["dotted", "dotted"]];
 
@@ -16,10 +16,17 @@ vsacli.figures = (() => {
     return Float64Array.from(times, (time) => time + data.start);
   }
 
-  /* The stretches of a kind at some joints of any file, those that overlap as one. */
-  function stretches(kind, joints) {
-    const every = data.files.flatMap((file) => (kind === "unreliable" ? file.unreliable
-      : (file.troubles[kind] || []).filter((_, joint) => joints.has(joint)).flat()));
+  /* Failures of a joint that plots mark, each above those before it. */
+  const FAILURES = ["near-singular", "infeasible", "singular"];
+  const OPACITY = { unreliable: 0.18, "near-singular": 0.25, infeasible: 0.35, singular: 0.6 };  // of areas behind curves
+  const IN_STRIPS = { "near-singular": 0.4, infeasible: 1, singular: 1 };
+  const STRIP = 0.03;  // height of a strip, relative to the plot
+
+  /* Intervals of a kind at a joint, or at the ends of recordings, in any file that is shown; overlapping ones merged. */
+  function stretches(kind, joint) {
+    const every = data.files.filter((_, file) => state.files.has(file))
+      .flatMap((file) => (kind === "unreliable" ? file.unreliable : (file.troubles[kind] || [])[joint] || []))
+      .map((span) => [...span]);
     const merged = [];
     for (const [start, end] of every.sort((one, other) => one[0] - other[0])) {
       const last = merged.at(-1);
@@ -28,13 +35,65 @@ vsacli.figures = (() => {
     return merged;
   }
 
-  function shade(figure, kind, joints, look) {
-    const spans = stretches(kind, joints);
-    if (spans.length) {
-      const [x0, x1] = [0, 1].map((end) => spans.map((span) => span[end] + data.start));
-      figure.vstrip({ x0, x1, fill_color: color(kind), line_color: color(kind), line_alpha: look.fill_alpha,
-                      level: "underlay", ...look });
+  /* Areas to mark in a plot of some curves, from and to shares of its height. Failures of the only curve are behind it;
+     those of one of several joints are in a strip below, in its color: over the full height, all joints would look
+     infeasible. */
+  function areasOf(series) {
+    const curves = new Set(series.map(({ joint, file }) => `${joint} ${file}`));
+    const joints = [...new Set(series.map(({ joint }) => joint))].filter((joint) => joint !== null);
+    const failing = joints.map((joint) => FAILURES.flatMap((kind) => stretches(kind, joint).map((span) => ({ kind, joint, span }))))
+      .filter((found) => found.length);
+    const strips = curves.size > 1 ? failing.length : 0;
+    const marked = failing.flatMap((found, at) => found.map(({ kind, joint, span }) => (strips
+      ? { kind, span, paint: curveColor(joint), opacity: IN_STRIPS[kind], from: (strips - at - 0.9) * STRIP, to: (strips - at - 0.1) * STRIP }
+      : { kind, span, paint: color(kind), opacity: OPACITY[kind], from: 0, to: 1 })));
+    const ends = stretches("unreliable").map((span) => (
+      { kind: "unreliable", span, paint: color("unreliable"), opacity: OPACITY.unreliable, from: 0, to: 1 }));
+    return { strips, areas: [...ends, ...marked] };
+  }
+
+  /* Add what draws areas, before any curve; return a function that places them in the range of values that is shown. */
+  function addAreas(figure) {
+    const columns = ["left", "right", "bottom", "top", "paint", "opacity"];
+    const looks = [
+      { fill_color: { field: "paint" }, fill_alpha: { field: "opacity" }, line_color: { field: "paint" }, line_alpha: { field: "opacity" } },
+      { fill_alpha: 0, line_alpha: 0, hatch_pattern: "right_diagonal_line", hatch_color: { field: "paint" }, hatch_alpha: { field: "opacity" }, hatch_scale: 8 },
+    ];
+    const sources = looks.map((look) => {
+      const source = new Bokeh.ColumnDataSource({ data: Object.fromEntries(columns.map((name) => [name, []])) });
+      const places = Object.fromEntries(columns.slice(0, 4).map((name) => [name, { field: name }]));
+      figure.quad({ ...places, source, ...look });
+      return source;
+    });
+    return (areas) => {
+      const { start, end } = figure.y_range;
+      const rows = areas.map(({ kind, span, paint, opacity, from, to }) => ({
+        kind, paint, opacity, left: span[0] + data.start, right: span[1] + data.start,
+        bottom: start + from * (end - start), top: start + to * (end - start) }));
+      sources.forEach((source, hatched) => {
+        const chosen = rows.filter(({ kind }) => (kind === "singular") === Boolean(hatched));
+        source.data = Object.fromEntries(columns.map((name) => [name, chosen.map((row) => row[name])]));
+      });
+    };
+  }
+
+  /* Put a copy of a figure in the colors of paper into its place, as lines that may be scaled, and return it. */
+  function copyForPaper(view, place) {
+    const { canvas: copy } = view.export("svg", false), { width, height } = view.bbox;
+    for (const node of copy.querySelectorAll("*")) {
+      for (const name of ["fill", "stroke"]) {
+        if (node.hasAttribute(name)) node.setAttribute(name, onPaper(node.getAttribute(name)));
+      }
     }
+    copy.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    copy.setAttribute("class", "copy");
+    place.append(copy);
+    place.classList.add("copied");
+  }
+
+  function removeCopy(place) {
+    place.querySelector(":scope > .copy")?.remove();
+    place.classList.remove("copied");
   }
 
   /* Runs of points between gaps, as index pairs; single points are what a line would not show. */
@@ -103,5 +162,5 @@ vsacli.figures = (() => {
     figure.toolbar.setv({ tools, active_drag: tools[0], active_scroll: tools[2] });
   }
 
-  return { DASHES, dash, addSeries, shade, newFigure, addTools };
+  return { DASHES, FAILURES, IN_STRIPS, STRIP, dash, addSeries, areasOf, addAreas, newFigure, addTools, copyForPaper, removeCopy };
 })();

@@ -44,8 +44,19 @@ const vsacli = (() => {
     return size !== 0 && (size >= 1e6 || size < 1e-3) ? value.toExponential(3) : String(Number(value.toPrecision(6)));
   }
 
+  /* A color of the scheme; `names` finds it again when a plot is copied in the colors of paper. */
+  const names = new Map();
   function color(name) {
-    return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    const value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim().toLowerCase();
+    names.set(value, name);
+    return value;
+  }
+
+  /* The color of paper that stands for one of the screen, given as #rrggbb or rgb(r, g, b); others stay. */
+  function onPaper(value) {
+    const parts = value.match(/^rgb\((\d+),\s*(\d+),\s*(\d+)\)$/)?.slice(1);
+    const hex = parts ? `#${parts.map((part) => Number(part).toString(16).padStart(2, "0")).join("")}` : value.toLowerCase();
+    return names.has(hex) ? color(names.get(hex)) : value;
   }
 
   const COLORS = 8;
@@ -69,7 +80,8 @@ const vsacli = (() => {
     files: new Set((data.files || []).keys()),
   };
 
-  /* Call a function whenever something changes: "window", "cursor", "shown", "scheme", "reset". */
+  /* Call a function whenever something changes: "window", "cursor", "shown", "scheme", "reset"; and when the
+     page goes to "paper" or comes back to the "screen". */
   function listen(topic, heard) {
     if (!listeners.has(topic)) listeners.set(topic, []);
     listeners.get(topic).push(heard);
@@ -96,7 +108,13 @@ const vsacli = (() => {
 
   const shown = (series) => (series.joint === null || state.joints.has(series.joint)) && state.files.has(series.file);
 
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => tell("scheme"));
-  return { data, state, array, after, valueAt, number, color, curveColor, named, COLORS, element,
+  const dark = matchMedia("(prefers-color-scheme: dark)"), root = document.documentElement.classList;
+  root.toggle("dark", dark.matches);
+  dark.addEventListener("change", () => { root.toggle("dark", dark.matches); tell("scheme"); });
+  /* Canvases keep their colors on paper, unlike all that the style sheet colors: they are drawn again, which must be
+     done when the listener returns, since the browser prints then. */
+  addEventListener("beforeprint", () => { root.add("on-paper"); tell("paper"); });
+  addEventListener("afterprint", () => { root.remove("on-paper"); tell("screen"); });
+  return { data, state, array, after, valueAt, number, color, curveColor, named, onPaper, COLORS, element,
            listen, tell, setCursor, setWindow, shown };
 })();

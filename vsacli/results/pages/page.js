@@ -1,5 +1,5 @@
 "use strict";
-/* What surrounds the plots: time and zoom, filters, what is wrong when, sections, keys. */
+/* The parts around the plots: time and zoom, filters, lanes of findings, sections, keys. */
 (() => {
   const { data, state, element, number } = vsacli;
   const byId = (name) => document.getElementById(name);
@@ -62,7 +62,7 @@
         if (found.length) addLane(data.files.length > 1 ? `${name}, ${file.label}` : name, found.map(([kind, spans]) => [kind, spans[joint]]));
         found.forEach(([kind]) => kinds.add(kind));
       });
-      if (file.unreliable.length) { addLane("unreliable ends of the record", [["unreliable", file.unreliable]]); kinds.add("unreliable"); }
+      if (file.unreliable.length) { addLane("unreliable ends of the recording", [["unreliable", file.unreliable]]); kinds.add("unreliable"); }
     });
     if (!kinds.size) return;
     place.hidden = false;

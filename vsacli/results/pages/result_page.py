@@ -18,10 +18,11 @@ from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
-from vsacli.base.texts import one_line
+from vsacli.base.texts import counted, one_line
 from vsacli.base.variables import deviation
 from vsacli.results.charts.arm_chart import Chain
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
+from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.charts.reduction import marked_spans
 from vsacli.results.charts.stored import BOUNDS, StoredCharts
@@ -128,8 +129,8 @@ def result_page(
         "sections": sections,
     }
     texts = [_texts(*each) for each in zip(files, labels, reports, fixes, strict=True)]
-    names = [name for file in files for name in (file.robot_name, file.trajectory_name)]
-    return rendered(library, ", ".join(dict.fromkeys(names)), texts, data, packed)
+    titles = [result_title(file, label) for file, label in zip(files, labels, strict=True)]
+    return rendered(library, " / ".join(titles), texts, data, packed)
 
 
 def sections_of(variables: Collection[str]) -> Iterator[Section]:
@@ -163,11 +164,10 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
 
 
 def _texts(file: StoredResult, label: str, report: ReportText, fix: FixText | None) -> PageTexts:
-    ended = "" if file.complete else ", ended early"
     first, last = file.time[[0, -1]].tolist()
-    steps = "1 step" if file.samples == 1 else f"{file.samples} steps"
+    extent = f"{counted(file.samples, 'sample')}, {first:.4g} to {last:.4g} s"
     return PageTexts(
-        title=f"{file.robot_name}, {label}: {steps}, {first:g} to {last:g} s{ended}",
+        title=f"{result_title(file, label)}; {extent}",
         label=label,
         verdict=file.verdict.replace("_", " "),
         tone=tone_of(file.verdict),

@@ -177,6 +177,7 @@ vsacli.robot = (() => {
   function tellTroubles() {
     const said = chains.flatMap((chain) => joints.map((joint, at) => [joint.name, trouble(chain.file, at)]));
     const bad = said.filter(([, kinds]) => kinds.length).map(([name, kinds]) => `${name}: ${kinds.join(", ")}`);
+    note.classList.toggle("hint", !bad.length);
     note.textContent = bad.length ? bad.join("; ") : "drag, or arrow keys, turn the view; double-click resets it";
   }
 
@@ -208,6 +209,7 @@ vsacli.robot = (() => {
     });
     new ResizeObserver(drawSoon).observe(canvas);
     ["cursor", "shown", "scheme"].forEach((topic) => vsacli.listen(topic, drawSoon));
+    ["paper", "screen"].forEach((topic) => vsacli.listen(topic, draw));
   }
 
   if (chains.length) {

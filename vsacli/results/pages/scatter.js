@@ -3,11 +3,12 @@
 (() => {
   const { data, array, number, color, curveColor, element } = vsacli;
   if (data.kind !== "study") return;
-  const { newFigure, addTools } = vsacli.figures;
+  const { newFigure, addTools, copyForPaper, removeCopy } = vsacli.figures;
   const place = document.getElementById("plots");
   const FEASIBLE = 2, LOST = 1;  // colors of curves
   let plots = [], section;
 
+  const MOST_COPIED = 3000;  // runs of a study, since copying a point for paper takes 0.1 ms
   const ROOM = 0.05;  // left around all points, relative to what they span
 
   function rangeOf(arrays) {
@@ -35,9 +36,9 @@
     return { plot, legend };
   }
 
-  function addKey(legend, paint, words) {
+  function addKey(legend, curve, words) {
     const area = element("span", { class: "area" });
-    area.style.background = paint;
+    area.style.background = vsacli.named(curve);
     legend.append(element("span", { class: "key" }, area, words));
   }
 
@@ -53,7 +54,7 @@
       const source = new Bokeh.ColumnDataSource({ data: { x: rows.map((row) => x[row]), y: rows.map((row) => y[row]) } });
       figure.scatter({ field: "x" }, { field: "y" }, { source, size: 6, marker, line_color: curveColor(curve),
                                                        fill_color: curveColor(curve), fill_alpha: 0.5 });
-      addKey(legend, curveColor(curve), words);
+      addKey(legend, curve, words);
     }
     const chosen = new Bokeh.ColumnDataSource({ data: { x: [], y: [] } });
     figure.scatter({ field: "x" }, { field: "y" }, { source: chosen, size: 14, line_color: color("cursor"), line_width: 2.5,
@@ -91,14 +92,14 @@
     return made;
   }
 
-  /* The worst runs; whatever is chosen in a plot is added. */
+  /* The runs with the smallest margins; a run that is chosen in a plot is added. */
   function addTable(study, parent) {
     const heads = ["run", "verdict", "smallest margin [%]", ...(study.cost === null ? [] : [study.cost_words]),
                    ...study.varying.map(({ words, unit }) => (unit ? `${words} [${unit}]` : words))];
     study.table = element("table", { class: "runs" },
       element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
       element("tbody", {}, ...study.worst.map((row) => line(study, row))));
-    parent.append(element("p", { class: "note" }, "the worst runs; click a point, or a line, to find a run in all plots"),
+    parent.append(element("p", { class: "note" }, "runs with the smallest margins", element("span", { class: "hint" }, "; click a point or a row to mark its run in all plots")),
                   element("div", { class: "wide" }, study.table));
   }
 
@@ -112,7 +113,7 @@
       figure.step({ field: "x" }, { field: "y" }, "before", { source, line_color: curveColor(index), line_width: 1.8 });
       const [share, low, high] = study.share.map((each) => number(Number((100 * each).toPrecision(3))));
       const interval = low === undefined ? "" : ` (95 % interval ${low} to ${high} %)`;  // a grid has none
-      addKey(legend, curveColor(index), `${study.label}: ${share} % feasible${interval}`);
+      addKey(legend, index, `${study.label}: ${share} % feasible${interval}`);
     });
     figure.add_layout(new Bokeh.Span({ dimension: "height", location: 0, line_color: color("soft"), line_width: 1 }));
     plots.push({ figure, plot, choose: () => {} });
@@ -122,7 +123,7 @@
     const details = element("details", { class: "section", open: "" }, element("summary", {}, study.label));
     place.append(details);
     if (study.runs.length < study.of) {
-      details.append(element("p", { class: "note" }, `${study.runs.length} of ${study.of} runs are drawn, evenly chosen, with the worst`));
+      details.append(element("p", { class: "note" }, `${study.runs.length} of ${study.of} runs are drawn: evenly spaced ones, and those with the smallest margins`));
     }
     addTable(study, details);
     const charts = element("div", { class: "charts" });
@@ -151,13 +152,18 @@
     place.append(section);
     addExceedance();
     data.studies.forEach(addStudy);
-    for (const { figure, plot } of plots) {
-      await Bokeh.Plotting.show(figure, plot);
+    for (const each of plots) {
+      each.view = await Bokeh.Plotting.show(each.figure, each.plot);
       if (!performance.getEntriesByName("first plot").length) performance.mark("first plot");
     }
     document.documentElement.dataset.ready = "yes";
   }
 
   vsacli.listen("scheme", build);
+  vsacli.listen("paper", () => {
+    if (data.studies.some(({ runs }) => runs.length > MOST_COPIED)) return;
+    for (const { view, plot } of plots) if (view && !plot.closest("details:not([open])")) copyForPaper(view, plot);
+  });
+  vsacli.listen("screen", () => plots.forEach(({ plot }) => removeCopy(plot)));
   build();
 })();

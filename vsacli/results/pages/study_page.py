@@ -31,26 +31,23 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
             installed.
     """
     library, packed = plotting_library(), Packed()
-    labels = [table.study_name for table in tables]
+    studies = [StudyPoints(table) for table in tables]
     data = {
         "kind": "study",
-        "studies": [
-            _study(StudyPoints(table), table, label, packed)
-            for table, label in zip(tables, labels, strict=True)
-        ],
+        "studies": [_study(points, table, packed) for points, table in zip(studies, tables, strict=True)],
     }
-    texts = [_texts(table, report) for table, report in zip(tables, reports, strict=True)]
-    return rendered(library, ", ".join(dict.fromkeys(labels)), texts, data, packed)
+    texts = [_texts(*each) for each in zip(studies, tables, reports, strict=True)]
+    return rendered(library, " / ".join(points.title for points in studies), texts, data, packed)
 
 
-def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
+def _study(points: StudyPoints, table: StoredStudy, packed: Packed) -> dict[str, Any]:
     """Return the values of a study for the scripts, with arrays of the drawn runs."""
     drawn = _drawn(points)
     verdicts = table.texts("verdict")
     margins, shares = points.exceedance
     kept = evenly(len(margins), MOST_RUNS)
     return {
-        "label": label,
+        "label": points.name,
         "of": len(points.runs),
         "runs": [int(run) for run in points.runs[drawn]],
         "verdicts": [verdicts[row] for row in drawn],
@@ -78,12 +75,12 @@ def _drawn(points: StudyPoints) -> IndexArray:
     return np.unique(np.concatenate(chosen))
 
 
-def _texts(table: StoredStudy, report: ReportText) -> PageTexts:
+def _texts(points: StudyPoints, table: StoredStudy, report: ReportText) -> PageTexts:
     made = table.provenance()
-    feasible = int(StudyPoints(table).feasible.sum())
+    feasible = int(points.feasible.sum())
     return PageTexts(
-        title=f"{table.study_name}: {table.rows} runs of {table.robot_name}",
-        label=table.study_name,
+        title=points.title,
+        label=points.name,
         verdict=f"{feasible} of {table.rows} feasible",
         tone="good" if feasible == table.rows else "fair" if feasible else "bad",
         report=report,
