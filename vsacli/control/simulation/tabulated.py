@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.trajectory.motion import Motion
@@ -43,7 +43,7 @@ class Table:
     @property
     def first_undefined(self) -> tuple[float, int] | None:
         """Start of the first cell in which a column is NaN, s, and this column; None without one."""
-        undefined = np.isnan(self.coefficients).any(axis=1)
+        undefined: BoolArray = np.any(np.isnan(self.coefficients), axis=1)
         cell = int(undefined.any(axis=1).argmax())
         return (float(self.ends[cell]), int(undefined[cell].argmax())) if undefined.any() else None
 
