@@ -21,6 +21,7 @@ import compiled
 import controllers
 import growth
 import kernel
+import one_sample
 import page
 import recorders
 import sensitivities
@@ -61,6 +62,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "kernel": lambda: page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats)),
         "batches": lambda: page.batch_table(compiled.batches(SAMPLES, repeats)),
         "subnormals": lambda: page.subnormal_table(small_numbers.compare(SAMPLES, repeats)),
+        "samples": lambda: page.sample_part(*one_sample.compare(3 * repeats)),
         "calls": lambda: page.call_sentence(single_calls.calls_of_seven_joints()),
         "recorders": lambda: page.recorder_table(recorders.compare(SAMPLES, repeats)),
         "controllers": lambda: page.controller_table(controllers.measure()),

@@ -43,7 +43,7 @@ class CasadiPeer:
     """Compiled link torques of a robot; `__call__` times a loop over all samples, in processor time."""
 
     def __init__(self, robot: Robot, folder: Path) -> None:
-        function = _function(robot)
+        function = function_of(robot)
         source, library = folder / "peer.c", folder / "peer.so"
         generator = casadi.CodeGenerator(source.name)
         generator.add(function)
@@ -72,7 +72,8 @@ class CasadiPeer:
         return seconds, torques
 
 
-def _function(robot: Robot) -> casadi.Function:
+def function_of(robot: Robot) -> casadi.Function:
+    """The torques of the links with two derivatives as a function of the rows of the motion."""
     joints = len(robot.joints)
     rows = casadi.SX.sym("rows", ORDERS * joints)
     derivatives = casadi.vertsplit(rows, joints)

@@ -10,6 +10,7 @@ from compiled import Cost
 from controllers import Controller
 from growth import SAMPLES_OF_CHAIN, Growth
 from kernel import CASADI, Kernel
+from one_sample import PEER
 from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
 from simulations import COMPILED, RECORDED, TEXT, Simulated
@@ -63,6 +64,16 @@ def subnormal_table(ratios: Mapping[str, Seconds]) -> str:
     header = ("derivatives times", *ratios)
     sizes = next(iter(ratios.values()))
     return table(header, ([size, *(f"{taken[size]:.2f}" for taken in ratios.values())] for size in sizes))
+
+
+def sample_part(seconds: Seconds, recording: float) -> str:
+    """What single samples cost from Python, and recording a robot."""
+    peer = seconds[PEER]
+    rows = table(
+        ("one sample, 7R arm", "ms", "ratio"),
+        ([name, f"{1e3 * taken:.2g}", f"{taken / peer:.2g}"] for name, taken in seconds.items()),
+    )
+    return f"{rows}\n\nThe call that records the robot takes {recording:.2g} s."
 
 
 def call_sentence(calls: Calls) -> str:

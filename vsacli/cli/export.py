@@ -50,7 +50,7 @@ _INSTEAD = {
     "trajectory": "; compute it first: vsacli invdyn ROBOT {}",
     "table of a study": "; its columns are read with h5py or pandas",
 }
-"""What to do with a file of another kind, by the kind."""
+"""Advice on a file of another kind, by the kind."""
 
 
 @click.command(

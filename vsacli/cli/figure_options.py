@@ -33,7 +33,7 @@ LOOK = ("style", "width", "height", "font_size", "no_title")
 
 
 class FigureTarget(NamedTuple):
-    """Where a command writes its figures, or its page.
+    """The place where a command writes its figures, or its page.
 
     Attributes:
         folder: folder of the files.

@@ -1,4 +1,4 @@
-"""Where a user finds the parameters of a robot: words of data sheets, CAD programs, or a measurement."""
+"""Sources of the parameters of a robot: words of data sheets, CAD programs, or a measurement."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class StiffnessMap(NamedTuple):
 
     @property
     def within(self) -> BoolArray:
-        """Where values of the levels keep all limits, (levels, points)."""
+        """Marks of the values of the levels that keep all limits, (levels, points)."""
         return _within(self.levels, self.clearance)
 
 
