@@ -20,7 +20,8 @@ from samples.studies import DRAWN, GRID, HEAD
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANGLE, MASS, POSITION
 from vsacli.documents import fields
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 from vsacli.documents.fields import Check, Kind, OwnKind, declared
 from vsacli.documents.json_schema import json_schema
 from vsacli.documents.tree import Node, Scope

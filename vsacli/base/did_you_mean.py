@@ -25,7 +25,9 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
     options = list(valid)
     if hint := now_called(word, options):
         return hint
-    if 0 < len(near := _near(word, options)) <= MOST_NEAR:
+    close, beginning = _near(word, options), [each for each in options if word and each.startswith(word)]
+    several = list(dict.fromkeys((*close, *beginning)))
+    if 0 < len(near := several if len(several) <= MOST_NEAR else close) <= MOST_NEAR:
         return f"; did you mean {' or '.join(map(repr, near))}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""
 

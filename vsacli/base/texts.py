@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
@@ -56,6 +56,12 @@ def sentence(clause: str) -> str:
 def counted(number: int, noun: str, several: str = "") -> str:
     """Return a number with its noun, in the plural unless it is 1; regular plurals need not be given."""
     return f"{number} {noun if number == 1 else several or noun + 's'}"
+
+
+def alternatives(words: Iterable[str]) -> str:
+    """Return words as alternatives, `rad, deg or rev`."""
+    *first, last = words
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def verdict_words(verdict: str) -> str:

@@ -18,6 +18,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.input_errors import naming_kind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,9 +86,13 @@ def compare(
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         stem = f"{Path(result).stem}-{Path(recording).stem}"
         page = page_asked_for(folder, file_format, f"{stem}-comparison", outputs)
-        with open_stored(result) as stored:
+        with naming_kind("RESULT", result, ("result", "simulation")), open_stored(result) as stored:
             talk.detail(result_line(stored))
-            comparison = compared(stored, recording, time_offset, columns)
+            with (
+                naming_kind("RECORDING", recording, ("table",)),
+                naming_kind("--columns", columns, ("columns",)),
+            ):
+                comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
                 page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
         if page is None and folder is not None:

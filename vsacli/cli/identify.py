@@ -21,6 +21,7 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
+from vsacli.cli.input_errors import naming_kind
 
 
 @click.command(
@@ -149,7 +150,11 @@ def identify(
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
         page = page_asked_for(folder, file_format, f"{Path(robot).stem}-identification", outputs)
-        found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
+        with (
+            naming_kind("RECORDING", recordings, ("table",)),
+            naming_kind("--columns", columns, ("columns",)),
+        ):
+            found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if page is not None:

@@ -10,6 +10,7 @@ import click
 
 from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say, tell
+from vsacli.cli.input_errors import naming_kind
 
 if TYPE_CHECKING:
     from vsacli.studies.identification.excitation import Noise
@@ -47,7 +48,8 @@ def plan(
 
     sensors = _noise(noise)
     robot = read_robot(robot_path)
-    own = load_trajectory(own_paths[0], robot) if own_paths else None
+    with naming_kind("TRAJECTORY", own_paths, ("trajectory", "table")):
+        own = load_trajectory(own_paths[0], robot) if own_paths else None
     inputs = [*robot.sources, *(() if own is None else own.sources)]
     with Outputs(overwrite=overwrite, inputs=[source.path for source in inputs]) as outputs:
         file = None if output is None else outputs.file(Path(output))

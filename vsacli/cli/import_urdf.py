@@ -10,6 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
+from vsacli.cli.input_errors import naming_kind
 
 
 def _spring(
@@ -141,7 +142,8 @@ def import_urdf(
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
     with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
         file = outputs.file(path)
-        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
+        with naming_kind("URDF", urdf, ("urdf",)):
+            conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
         file.write_text(conversions.robot_text(conversion))
     click.echo(str(conversion))
     talk.wrote(outputs)

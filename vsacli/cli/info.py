@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.input_errors import naming_kind
 
 
 @click.command(
@@ -110,7 +111,8 @@ def _extract(file: str, folder: str, talk: Talk) -> None:
     from vsacli.documents.reading import written
     from vsacli.files.repetition import extract
 
-    found = extract(file)
+    with naming_kind("FILE", file, ("result", "simulation", "table of a study")):
+        found = extract(file)
     with Outputs(inputs=[file]) as outputs:
         for place, content in found.files.items():
             target = Path(folder) / place

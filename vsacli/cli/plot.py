@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.input_errors import naming_kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -112,7 +113,10 @@ def plot(
         elif robot is not None:
             raise click.UsageError("--robot is the robot of a recording; results name theirs")
         else:
-            _draw_computed([Path(file) for file in files], shown, target, talk)
+            with naming_kind(
+                "FILE", files, ("result", "simulation", "table of a study", "table", "trajectory")
+            ):
+                _draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
 
 

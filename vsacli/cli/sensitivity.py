@@ -24,6 +24,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.input_errors import naming_kind
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -102,7 +103,8 @@ def sensitivity(
     inputs = load_inputs(robot, trajectory, talk, changes)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
+        with naming_kind("--tolerances", tolerances, ("tolerances",)):
+            found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
         if folder is not None:
             _draw(found, inputs.robot, folder, run_stem(robot, trajectory), outputs)
     say(found, as_json)

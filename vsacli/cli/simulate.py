@@ -28,6 +28,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
+from vsacli.cli.input_errors import naming_kind
 from vsacli.cli.option_types import SHARE
 
 if TYPE_CHECKING:
@@ -296,7 +297,8 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:
             raise InputError.one("--stiffness-poles: the poles file holds these too", poles)
-        return load_gains(poles, robot, integral=integral)
+        with naming_kind("--poles", poles, ("poles",)):
+            return load_gains(poles, robot, integral=integral)
     return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral)
 
 

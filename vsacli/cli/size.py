@@ -17,6 +17,7 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
+from vsacli.cli.input_errors import naming_kind
 from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
@@ -86,13 +87,15 @@ def size(
     from vsacli.trajectory.file import load_trajectory
 
     loaded = read_robot(robot)
-    motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
+    with naming_kind("TRAJECTORY", trajectories, ("trajectory", "table")):
+        motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
     sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
     inputs = [*(source.path for source in sources), *([] if catalog is None else [catalog])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         if output is not None:
             outputs.check(output)
-        with talk.progress(sum(motion.samples for motion in motions)) as progress:
+        samples = sum(motion.samples for motion in motions)
+        with naming_kind("--catalog", catalog, ("catalog", "table")), talk.progress(samples) as progress:
             found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
         if output is not None and found.lacking:
             talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")

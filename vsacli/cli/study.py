@@ -14,6 +14,7 @@ from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
+from vsacli.cli.input_errors import naming_kind
 
 if TYPE_CHECKING:
     from vsacli.results.store.study_table import StoredStudy
@@ -98,18 +99,21 @@ def study(
         raise click.UsageError("--processes are of this machine; a cluster has workers of its own")
     from vsacli.studies.sweeps import run_study
 
-    with run_study(
-        files[0],
-        output,
-        shard=shard,
-        processes=processes,
-        dask=dask,
-        engine=engine,
-        overwrite=overwrite,
-        command_line=_command_line(),
-        progress=partial(talk.progress, shown_from=0, label="runs"),
-        tell=talk.note,
-    ) as table:
+    with (
+        naming_kind("STUDY", files[0], ("study",)),
+        run_study(
+            files[0],
+            output,
+            shard=shard,
+            processes=processes,
+            dask=dask,
+            engine=engine,
+            overwrite=overwrite,
+            command_line=_command_line(),
+            progress=partial(talk.progress, shown_from=0, label="runs"),
+            tell=talk.note,
+        ) as table,
+    ):
         return _shown(table, as_json, talk)
 
 
@@ -120,7 +124,8 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
 
     if output is None:
         raise click.UsageError("--merge needs a name for the whole table: give -o FILE")
-    with Outputs(overwrite=overwrite, inputs=files) as outputs:
+    kinds = naming_kind("STUDY", files, ("table of a study",))
+    with kinds, Outputs(overwrite=overwrite, inputs=files) as outputs:
         merge(files, outputs.file(output), command_line=_command_line())
     with StoredStudy(output) as table:
         return _shown(table, as_json, talk)

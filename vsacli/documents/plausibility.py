@@ -18,7 +18,8 @@ import numpy as np
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents import tree
-from vsacli.documents.expression import ANGLES, ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import ANGLES, evaluate
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import parse_yaml

@@ -11,7 +11,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
 from vsacli.documents import tree
-from vsacli.documents.csv_file import Header, cells_of, filled_lines, header_of, split_heading
+from vsacli.documents.csv_file import (
+    HEADER,
+    Header,
+    cells_of,
+    filled_lines,
+    header_of,
+    split_heading,
+    wrong_count,
+)
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.fields import REQUIRED, Kind, Number, declared
 from vsacli.documents.nested import read_record
@@ -71,7 +79,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     Raises:
         InputError: with file and line of every problem.
     """
-    source, text = read_source(path, MAX_BYTES)
+    source, text = read_source(path, MAX_BYTES, HEADER)
     problems = Problems(source.path)
     header = header_of(BytesIO(text.encode()), source.path)
     columns = _columns(header, cls, problems)
@@ -87,10 +95,10 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
             records[number] = record
             key = getattr(record, unique)
             if first.setdefault(key, number) != number:
-                problems.add(number, f"{unique} {tree.quoted(key)} stands in line {first[key]} already")
+                problems.add(number, f"the {unique} {tree.quoted(key)} is already used in line {first[key]}")
     problems.check()
     if not records:
-        raise InputError.one("there are no rows below the header", source.path)
+        raise InputError.one("has a header but no rows of values", source.path)
     return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
 
 
@@ -111,9 +119,15 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
             if near is not None:
                 problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
                 meant.add(near)
-    for name, (field, default) in fields.items():
-        if default is REQUIRED and name not in columns.places and name not in meant:
-            problems.add(header.line, f"there is no column {name!r} ({field.doc})")
+    missing = [
+        f"{name!r} ({field.doc})"
+        for name, (field, default) in fields.items()
+        if default is REQUIRED and name not in columns.places and name not in meant
+    ]
+    if missing:
+        problems.add(
+            header.line, f"missing {'column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
+        )
     return columns
 
 
@@ -136,9 +150,7 @@ def _record(
     """Return the record of a row; None if its problems were noted."""
     if len(cells) != columns.width:
         hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
-        scope.problems.add(
-            line, f"expected {columns.width} values as in the header, found {len(cells)}{hint}"
-        )
+        scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
     given = {
         field: tree.Scalar(line, _in_si(cells[index], columns.factors[field]), plain=False)
