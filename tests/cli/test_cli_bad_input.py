@@ -22,7 +22,7 @@ ROBOT_EDITS = {
     "unknown key": (("gravity:", "gravty:"), ["7: unknown key 'gravty'; did you mean 'gravity'?"]),
     "duplicate key": (("name: vsa-3r", "name: a\nname: b"), ["6: duplicate key 'name'"]),
     "boolean": (("mass: 9.0478", "mass: on"), ["13: mass: expected a number in kg, found 'on'"]),
-    "vector length": (("com: [0, 0, 0]", "com: [0, 0]"), ["14: com: expected 3 numbers, found 2"]),
+    "vector length": (("com: [0, 0, 0]", "com: [0, 0]"), ["14: com: expected 3 numbers in m, found 2"]),
     "negative eigenvalue": (("xx: 0.1299", "xx: -0.1299"), ["15: negative eigenvalue -0.1299 kg m^2"]),
     "Python tag": (("name: vsa-3r", "name: !!python/name:os.system vsa"), ["5: !!python/name:os.system"]),
     "NaN": (("mass: 9.0478", "mass: .nan"), ["13: only finite numbers"]),
@@ -37,7 +37,10 @@ ROBOT_EDITS = {
 TRAJECTORY_EDITS = {
     "degree 5 position": (("degree: 7", "degree: 5"), ["9: must be four times differentiable"]),
     "degree 1 stiffness": (("degree: 3", "degree: 1"), ["14: must be twice differentiable"]),
-    "list length": (("[90 deg, 45 deg, -60 deg]", "[1, 2]"), ["11: end: expected 3 numbers"]),
+    "list length": (
+        ("[90 deg, 45 deg, -60 deg]", "[1, 2]"),
+        ["11: end: expected 3 values, one for each joint (base, shoulder, elbow), found 2"],
+    ),
     "infinity": (("duration: 4.0", "duration: .inf"), ["5: only finite numbers"]),
     "negative stiffness": (
         ("start: 850", "start: [1, -1, 1]"),
@@ -46,19 +49,22 @@ TRAJECTORY_EDITS = {
 }
 
 ROBOT_FILES = {
-    "empty file": (b"", [": the file is empty"]),
+    "empty file": (b"", [": is empty; expected a YAML file that begins with `format: vsacli-robot/1`"]),
     "alias bomb": (ALIAS_BOMB.encode(), ["6: more than 100,000 keys and values"]),
     "nested brackets": (b"[" * 3000 + b"]" * 3000, ["1: nested more than 20 levels deep"]),
-    "binary": (b"\0\1\2", ["1: the character U+0000 is not allowed"]),
+    "binary": (b"\0\1\2", [": is a binary file, but ROBOT must be a robot file (YAML)"]),
     "not UTF-8": (b"name: \xff\xfe", ["1: UTF-8"]),
-    "text": (b"hello", ["1: expected a mapping that begins with `format: vsacli-robot/1`"]),
+    "text": (b"hello", ["1: expected a YAML file that begins with `format: vsacli-robot/1`"]),
 }
 
 TABLES = {
     "time goes back": ((ROWS[4], ROWS[2]), ["6: time must increase strictly, but 0.2 s follows 0.3 s"]),
-    "ragged row": ((ROWS[4], "0.4,0,0\n"), ["6: expected 7 values as in the header, found 3"]),
-    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1': expected a finite number, found 'nan'"]),
-    "text": (("0.4,0", "0.4,up"), ["6: column 'q1': expected a finite number, found 'up'"]),
+    "ragged row": (
+        (ROWS[4], "0.4,0,0\n"),
+        ["6: expected 7 values, one for each column of the header, found 3"],
+    ),
+    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1': expected a number, found 'nan'"]),
+    "text": (("0.4,0", "0.4,up"), ["6: column 'q1': expected a number, found 'up'"]),
     "negative stiffness": ((ROWS[4], "0.4,0,0,0,9,-9,9\n"), ["6: stiffness2 must be positive, not -9"]),
     "unknown column": (
         ("stiffness3", "stifness3"),
@@ -114,7 +120,8 @@ def test_unchanged_table_is_accepted(vsacli, tmp_path):
 
 @pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
 @pytest.mark.parametrize(
-    ("name", "message"), [("absent.yaml", "no such file"), (".", "is a directory, expected a file")]
+    ("name", "message"),
+    [("absent.yaml", "no such file"), (".", "is a folder; give the name of a file in it")],
 )
 def test_what_is_not_a_file(vsacli, tmp_path, command, name, message):
     for arguments in ((name, REST_TO_REST), (ROBOT, name)):

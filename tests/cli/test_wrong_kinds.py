@@ -22,9 +22,9 @@ def _files(vsacli, own_folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot; are ROBOT "),
-        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory; are ROBOT"),
-        (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot; vsacli info FILE"),
+        (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot file (YAML); the order is ROBOT "),
+        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory (YAML or CSV); the order is ROBOT "),
+        (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot file (YAML); vsacli info run.h5 --extract FOLDER gives"),
         (("samples.csv", "move.yaml"), "samples.csv: is a CSV table, but ROBOT must be a robot"),
         (("robot/arm.yaml", "move.yaml"), "robot/arm.yaml: no such file; did you mean 'robots/arm.yaml'?"),
         (("ARM.yaml", "move.yaml"), "ARM.yaml: no such file; did you mean 'arm.yaml'?"),
@@ -38,6 +38,67 @@ def test_the_error_says_what_a_file_is(vsacli, arguments, message):
         outcome = vsacli(command, *arguments)
         assert outcome.code == 2
         assert message in outcome.err
+
+
+_RESULT = "RESULT must be a result or a simulation (HDF5)"
+_COMPUTE = "to compute a result: vsacli invdyn ROBOT TRAJECTORY"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "identify arm.yaml run.h5",
+            "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
+        ),
+        (
+            "compare run.h5 run.h5",
+            "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
+        ),
+        (
+            "compare run.h5 arm.yaml",
+            "is a robot, but RECORDING must be a CSV table; the order is RESULT RECORDING",
+        ),
+        ("compare arm.yaml samples.csv", f"is a robot, but {_RESULT}; {_COMPUTE}"),
+        ("plot arm.yaml", f"is a robot, but {_RESULT.replace('RESULT', 'FILE')}; {_COMPUTE}"),
+        ("info arm.yaml --extract x", f"is a robot, but {_RESULT.replace('RESULT', 'FILE')}; {_COMPUTE}"),
+        (
+            "size arm.yaml move.yaml --catalog arm.yaml",
+            "is a robot, but --catalog must be a motor catalog (CSV)",
+        ),
+        (
+            "size arm.yaml arm.yaml",
+            "is a robot, but TRAJECTORY must be a trajectory (YAML or CSV); the order is",
+        ),
+        (
+            "identify arm.yaml samples.csv --columns arm.yaml",
+            "is a robot, but --columns must be a columns file (YAML)",
+        ),
+        ("import-urdf samples.csv", "is a CSV table, but URDF must be a URDF file"),
+        ("study arm.yaml -o s.h5", f"is a robot, but STUDY must be a study file (YAML); {_COMPUTE}"),
+        ("study --merge arm.yaml -o s.h5", "is a robot, but STUDY must be a study table (HDF5)"),
+        ("invdyn arm.yaml photo.csv", "is a PNG image, but TRAJECTORY must be a trajectory (YAML or CSV)"),
+        ("invdyn plan.zip move.yaml", "is a ZIP archive, but ROBOT must be a robot file (YAML)"),
+        ("plot photo.csv", f"is a PNG image, but {_RESULT.replace('RESULT', 'FILE')}"),
+        ("validate photo.csv", "is a PNG image; expected text"),
+        ("invdyn robots move.yaml", "robots: is a folder; give the name of a file in it"),
+        (
+            "sensitivity arm.yaml move.yaml --tolerances arm.yaml",
+            "is a robot, but --tolerances must be a tolerances file (YAML)",
+        ),
+        (
+            "simulate arm.yaml move.yaml --controller feedback-linearization --poles move.yaml",
+            "is a trajectory, but --poles must be a poles file (YAML)",
+        ),
+    ],
+)
+def test_every_argument_says_what_a_file_is(vsacli, own_folder, arguments, message):
+    (own_folder / "photo.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR")
+    (own_folder / "plan.zip").write_bytes(b"PK\x03\x04\x14\x00")
+    outcome = vsacli(*arguments.split())
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert outcome.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

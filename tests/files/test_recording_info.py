@@ -154,8 +154,8 @@ def test_more_columns_than_are_read_at_a_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("stamp,a\n0,1\n1,2,3\n", "log.csv:3: expected 2 values as in the header, found 3"),
-        ("stamp,a\n", "there are no rows below the header"),
+        ("stamp,a\n0,1\n1,2,3\n", "log.csv:3: expected 2 values, one for each column of the header, found 3"),
+        ("stamp,a\n", "has a header but no rows of values"),
         ("", "found nothing"),
     ],
 )

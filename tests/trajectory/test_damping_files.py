@@ -29,8 +29,8 @@ def robot(tmp_path: Path) -> Path:
     ("replaced", "message"),
     [
         (("[1, 5]", "[-1, 5]"), "range: must be [lower, upper] with 0 <= lower, such as [0, 5]"),
-        (("[1, 5]", "-5"), "range: the lower bound 0 exceeds the upper bound -5"),
-        (("[1, 5]", "[6, 5]"), "range: the lower bound 6 exceeds the upper bound 5"),
+        (("[1, 5]", "-5"), "range: the lower limit 0 exceeds the upper limit -5"),
+        (("[1, 5]", "[6, 5]"), "range: the lower limit 6 exceeds the upper limit 5"),
         (("location: link", "location: tip"), "location: unknown word 'tip'; valid: link"),
     ],
 )

@@ -37,7 +37,7 @@ CASES = {
     ),
     "degrees for a length": (
         LASTING + VIA.replace("slide: 0.2", "slide: 2 deg") + FIRM,
-        "8: points: expected a number in m, found '2 deg'",
+        "8: points: '2 deg' is an angle; expected a number in m",
     ),
     "no list of points": (
         LASTING + VIA.replace("[0, {", "{").replace(", [1, 0.1]]", "") + FIRM,
@@ -106,7 +106,7 @@ CASES = {
     "no amplitudes": (LASTING + SINUSOIDS + FIRM, "5: position: missing key 'sine' or 'cosine' (amplitudes)"),
     "amplitudes that are no list": (
         LASTING + SINUSOIDS + "  sine: 1\n" + FIRM,
-        "9: sine: expected a list of one or more, found '1'",
+        "9: sine: expected a list with at least one entry, found '1'",
     ),
     "no frequency": (
         LASTING + SINUSOIDS.replace("0.5", "0") + "  sine: [1]\n" + FIRM,
@@ -172,7 +172,7 @@ CASES = {
     ),
     "no parts": (
         HEAD + "position: {type: sequence, parts: []}\n" + FIRM,
-        "3: parts: expected a list of one or more",
+        "3: parts: expected a list with at least one entry",
     ),
     "a part without duration": (
         HEAD + SEQUENCE + GO + "  - {type: via, degree: 9, points: [[1, 0.2], 0]}\n" + FIRM,

@@ -192,12 +192,12 @@ def test_a_bare_table_without_stiffness(robot):
         (
             "start: 0\n",
             "start: 90 deg\n",
-            "8: start: expected a number in m, found '90 deg': degrees are for",
+            "8: start: '90 deg' is an angle; expected a number in m",
         ),
         (
             "{slide: 0.2, arm: 60 deg}",
             "{slide: 60 deg, arm: 0}",
-            "9: end: expected a number in m, found '60 deg'",
+            "9: end: '60 deg' is an angle; expected a number in m",
         ),
         ("{slide: 0.2, arm: 60 deg}", "{slide: 0.2}", "9: end: no value for arm; each joint needs one"),
         ("slide: 0.2", "slid: 0.2", "9: end: no joint is called 'slid'; did you mean 'slide'?"),

@@ -50,8 +50,8 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _INDEX = re.compile(r"\d+")
 """Index in brackets, as in `position[2]`, which is not a unit."""
-HEADER = "a header line with column names such as time, base.q"
-"""Description of a header, for messages."""
+HEADER = "expected a header line with column names such as time, base.q"
+"""Beginning of messages about a header."""
 
 _KEY = re.compile(r"format: +\S")
 """Beginning of a YAML file of this program."""
@@ -144,16 +144,18 @@ def is_number(cell: str) -> bool:
 
 
 def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: bool) -> Iterator[str]:
-    if not line.strip():
-        yield f"is empty; expected {HEADER}"
+    if not line:
+        yield f"is empty; {HEADER}"
+    elif not line.strip():
+        yield f"{HEADER}, found blanks"
     elif NOT_UTF8 in line or "\0" in line:
-        yield f"expected {HEADER} in UTF-8, found other bytes"
+        yield f"{HEADER} in UTF-8, found other bytes"
     elif len(line) == MAX_HEADER:
-        yield f"expected {HEADER}, found more than {MAX_HEADER} characters without a line break"
+        yield f"{HEADER}, found more than {MAX_HEADER} characters without a line break"
     elif all(is_number(column) for column in columns):
-        yield f"expected {HEADER}, found numbers{_advice(comment)}"
+        yield f"{HEADER}, found numbers{_advice(comment)}"
     elif _KEY.match(line):
-        yield f"expected {HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
+        yield f"{HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
     elif len(columns) == 1 and len(line.partition("[")[0].split()) > 1:
         yield "expected commas, semicolons or tabs between columns, found spaces"
     elif strict:
@@ -213,7 +215,7 @@ class Rows(NamedTuple):
 
 def wrong_count(expected: int, found: int) -> str:
     """Return the problem of a row with another number of values than the header."""
-    return f"expected {counted(expected, 'value')} (one for each column of the header), found {found}"
+    return f"expected {counted(expected, 'value')}, one for each column of the header, found {found}"
 
 
 def of_columns(problems: Iterable[tuple[str, str]]) -> Iterator[str]:

@@ -47,12 +47,12 @@ def read_document(
         InputError: with every problem of the file, each with its line.
     """
     with recognizing_other_formats(path):
-        expected = f"a YAML file that begins with `format: {format_name}`"
+        expected = f"expected a YAML file that begins with `format: {format_name}`"
         source, text = read_source(path, expected=expected)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)
         if not isinstance(root, tree.Mapping):
-            problems.fail(root.line, f"expected {expected}, found {root}")
+            problems.fail(root.line, f"{expected}, found {root}")
         _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
     problems.check()

@@ -58,7 +58,7 @@ def read_source(
     Args:
         path: path of the file, repeated in errors as given.
         max_bytes: size above which the file is refused without being read.
-        expected: description of the content, for the error of an empty file.
+        expected: clause of the error of an empty file, `expected ...`.
 
     Returns:
         The source, and its text without a byte order mark.
@@ -73,7 +73,7 @@ def read_source(
     if len(content) > max_bytes:  # the file grew after its size was checked
         raise _too_large(name, len(content), max_bytes)
     if not content.strip():
-        raise InputError.one("is empty" + (f"; expected {expected}" if expected else ""), name)
+        raise InputError.one("is empty" + (f"; {expected}" if expected else ""), name)
     text = decode_utf8(content, name)
     return Source(name, hashlib.sha256(content).hexdigest(), text), text
 
@@ -328,7 +328,7 @@ def _format(name: str) -> str:
 
 def _binary(beginning: bytes) -> str:
     """Return `binary` for content with many NUL bytes; a damaged table may hold a few."""
-    return "binary" if beginning.count(0) > len(beginning) / 20 else ""
+    return "binary" if beginning.count(0) > len(beginning) / 5 else ""
 
 
 def _of_xml(text: str, ending: str) -> str:
