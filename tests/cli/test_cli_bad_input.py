@@ -28,6 +28,10 @@ ROBOT_EDITS = {
     "NaN": (("mass: 9.0478", "mass: .nan"), ["13: only finite numbers"]),
     "word": (("mass: 9.0478", "mass: heavy"), ["13: mass: expected a number in kg, found 'heavy'"]),
     "other format": (("robot/1", "robot/2"), ["4: format: expected 'vsacli-robot/1'"]),
+    "undefined alias": (
+        ("*spring             # the same springs as at the base\n    ", "*sprng\n    "),
+        ["31: the alias *sprng has no anchor; did you mean *spring (line 20)?"],
+    ),
     "two problems": (
         ("damping: 1e-5                 # N m s/rad, b", "damping: -1e-5\n    dampping: 0"),
         ["16: damping: must be", "17: unknown key 'dampping'; did you mean 'damping'?"],
@@ -44,7 +48,15 @@ TRAJECTORY_EDITS = {
     "infinity": (("duration: 4.0", "duration: .inf"), ["5: only finite numbers"]),
     "negative stiffness": (
         ("start: 850", "start: [1, -1, 1]"),
-        ["15: joint shoulder: must be positive, not -1"],
+        ["15: joint shoulder: must be positive, not -1 N m/rad"],
+    ),
+    "negative stiffness of two": (
+        ("start: 850", "start: [-1, 1, -1]"),
+        ["15: start of joints base, elbow: must be positive, not -1 N m/rad"],
+    ),
+    "negative stiffness of all": (
+        ("start: 850", "start: -850"),
+        ["15: start: must be positive, not -850 N m/rad"],
     ),
 }
 

@@ -123,7 +123,7 @@ def test_what_is_refused(vsacli, arguments, message):
     ("row", "message"),
     [
         ("m,1e-4,,,,,,,", "nothing bounds its torque: give one of continuous_torque, max_torque"),
-        ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001"),
+        ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001 kg m^2"),
         ("m,1e-4,1,,,,0.5,,", "resistance: needs torque_constant, too"),
         ("m,1e-4,1,,,0.1,,,24", "max_voltage: needs resistance, too"),
         ("m,1e-4,1,2,,,,,,", "expected 9 values"),

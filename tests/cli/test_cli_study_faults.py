@@ -209,7 +209,7 @@ SPRING = "joints.*.actuator.spring.k"
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
         ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
-        ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
+        ("vary: {name: [a, b]}", "study.yaml:5: name: the name of a file cannot be changed here; edit the file"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),
         ("method: random\nsamples: 3", "vary: nothing varies that the method random could draw"),
@@ -235,7 +235,10 @@ def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
     assert "expected one study, found 2 files" in vsacli("study", grid_study, grid_study).err
     assert "expected K/N with K from 1 to N" in vsacli("study", grid_study, "--shard", "4/3").err
     assert "give -o FILE" in vsacli("study", "--merge", grid_study).err
-    assert "is not an HDF5 file" in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
+    assert (
+        "is a study, but STUDY must be a study table (HDF5)"
+        in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
+    )
 
 
 def test_no_file_is_replaced_or_read_for_nothing(vsacli: Any, own_folder: Path) -> None:

@@ -22,9 +22,9 @@ def _files(vsacli, own_folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot file (YAML); the order is ROBOT "),
-        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory (YAML or CSV); the order is ROBOT "),
-        (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot file (YAML); vsacli info run.h5 --extract FOLDER gives"),
+        (("move.yaml", "arm.yaml"), "is a trajectory, but ROBOT must be a robot file (YAML); the order is"),
+        (("arm.yaml", "arm.yaml"), "is a robot, but TRAJECTORY must be a trajectory (YAML or CSV); the "),
+        (("run.h5", "move.yaml"), "is a result, but ROBOT must be a robot file (YAML); vsacli info run.h5 "),
         (("samples.csv", "move.yaml"), "samples.csv: is a CSV table, but ROBOT must be a robot"),
         (("robot/arm.yaml", "move.yaml"), "robot/arm.yaml: no such file; did you mean 'robots/arm.yaml'?"),
         (("ARM.yaml", "move.yaml"), "ARM.yaml: no such file; did you mean 'arm.yaml'?"),
@@ -80,7 +80,7 @@ _COMPUTE = "to compute a result: vsacli invdyn ROBOT TRAJECTORY"
         ("invdyn arm.yaml photo.csv", "is a PNG image, but TRAJECTORY must be a trajectory (YAML or CSV)"),
         ("invdyn plan.zip move.yaml", "is a ZIP archive, but ROBOT must be a robot file (YAML)"),
         ("plot photo.csv", f"is a PNG image, but {_RESULT.replace('RESULT', 'FILE')}"),
-        ("validate photo.csv", "is a PNG image; expected text"),
+        ("info photo.csv", "is a PNG image; expected text"),
         ("invdyn robots move.yaml", "robots: is a folder; give the name of a file in it"),
         (
             "sensitivity arm.yaml move.yaml --tolerances arm.yaml",

@@ -176,8 +176,8 @@ def test_values_per_joint() -> None:
         (
             "joints.elbow.actuator.type",
             "rigid",
-            "joints.elbow.actuator.type: the type cannot be changed alone, since each type has other keys; give the "
-            "whole mapping, 'joints.elbow.actuator={type: rigid, ...}'",
+            "joints.elbow.actuator.type: the type cannot be changed alone, since each type has other keys; "
+            "give the whole mapping, 'joints.elbow.actuator={type: rigid, ...}'",
         ),
         ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1 kg"),
         ("joints.elbow.link.mass", "x", "joints.elbow.link.mass: expected a number in kg, found 'x'"),

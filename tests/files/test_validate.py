@@ -135,7 +135,7 @@ def test_a_trajectory_fits_one_of_the_robots_or_none(vsacli: Any, tmp_path: Path
     edited(REST_TO_REST, tmp_path / "move.yaml", ("end: [", "end: [0, "))
     done = vsacli("validate", ROBOT, slide, "move.yaml")
     assert done.code == 2
-    assert "end: expected 3 numbers, one for each joint, found a list of 4" in done.out
+    assert "end: expected 3 values, one for each joint (base, shoulder, elbow), found 4" in done.out
     assert f"move.yaml: fits none of the 2 robots; the problems above are those with {ROBOT}\n" in done.out
 
 
@@ -231,7 +231,10 @@ def test_a_placeholder_has_the_joints_of_a_table(tmp_path: Path) -> None:
 
 
 def test_what_does_not_fit_any_robot_is_found_without_one(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"end: expected 3 numbers, one for each joint, found a list of 2"):
+    with pytest.raises(
+        InputError,
+        match=r"end: expected 3 values, one for each joint .*, found 2; is the file for another robot",
+    ):
         joints_of(
             "position: {type: polynomial, degree: 7, start: [1, 2, 3], end: [1, 2]}", tmp_path / "m.yaml"
         )

@@ -178,10 +178,14 @@ def test_a_spring_shared_by_an_alias(load):
         ("[0.1, 0, 0]", "0.1", "10: com: expected a list of 3 numbers in m, found '0.1'"),
         ("yy: 0.2", "yy: -0.2", "11: inertia: the tensor has the negative eigenvalue -0.2 kg m^2"),
         ("yz: -0.01", "yz: -0.2", "21: inertia: the tensor has the negative eigenvalue -0.1 kg m^2"),
-        ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower limit 1.5708 m exceeds"),
+        ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower limit 1.5708 rad exceeds"),
         ("[-pi, 90 deg]", "[-pi, 1e31]", "17: position: must be at most 1e+30 in size, not 1e+31"),
         ("[-pi, 90 deg]", "[1, 2, 3]", "17: position: expected [lower, upper] or one number"),
-        ("velocity: 3", "velocity: -3", "17: velocity: the lower limit 3 m/s exceeds the upper limit -3 m/s"),
+        (
+            "velocity: 3",
+            "velocity: -3",
+            "17: velocity: the lower limit 3 rad/s exceeds the upper limit -3 rad/s",
+        ),
         # nesting
         (
             "link: {mass: 1,",
@@ -256,7 +260,7 @@ def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
     text = TEXT.replace("spring: {type: cubic, k: 400", "spring: &s {type: cubic, k: 0")
     with pytest.raises(InputError) as caught:
         load(re.sub(r"spring: \[.*\]", "spring: *s", text))
-    assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0 N/m"
+    assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0 N m/rad"
 
 
 def test_implausible_physics_is_a_warning(load):

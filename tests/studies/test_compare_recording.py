@@ -286,7 +286,7 @@ BAD = {
     "no column is a variable of the result": ("time,bose.q\n0,1\n1,2\n", []),
     "the times must ascend": ("time,base.q\n0,1\n1,2\n1,3\n", []),
     "a recording needs two rows": ("time,base.q\n0,1\n", []),
-    "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
+    "[N] is a force, expected an angle in rad, deg or rev": ("time,base.q [N]\n0,1\n1,2\n", []),
     "are the same; leave one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
     "is like the computed signals at no shift": ("time,base.q\n" + "".join(f"{t},1\n" for t in range(9)), []),
     "write it in the header, e.g. time[ms]": (

@@ -29,8 +29,14 @@ def robot(tmp_path: Path) -> Path:
     ("replaced", "message"),
     [
         (("[1, 5]", "[-1, 5]"), "range: must be [lower, upper] with 0 <= lower, such as [0, 5]"),
-        (("[1, 5]", "-5"), "range: the lower limit 0 exceeds the upper limit -5"),
-        (("[1, 5]", "[6, 5]"), "range: the lower limit 6 exceeds the upper limit 5"),
+        (
+            ("[1, 5]", "-5"),
+            "range: the lower limit 0 N m s/rad exceeds the upper limit -5 N m s/rad; swap them",
+        ),
+        (
+            ("[1, 5]", "[6, 5]"),
+            "range: the lower limit 6 N m s/rad exceeds the upper limit 5 N m s/rad; swap them",
+        ),
         (("location: link", "location: tip"), "location: unknown word 'tip'; valid: link"),
     ],
 )

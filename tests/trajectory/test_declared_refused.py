@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("own_folder")
 CASES = {
     "a point of another length": (
         LASTING + VIA.replace("[1, 0.1]", "[1, 0.1, 2]") + FIRM,
-        "8: points: expected 2 numbers, one for each joint, found a list of 3",
+        "8: points: expected 2 values, one for each joint (arm, slide), found 3; is the file for another robot?",
     ),
     "an unknown joint": (
         LASTING + VIA.replace("slide", "slid") + FIRM,
@@ -228,7 +228,7 @@ CASES = {
     ),
     "a wrench of other than six numbers": (
         LASTING + STANDING + FIRM + PUSH.replace(", 6]", "]") + "  times: [1]\n  transition: 1\n",
-        "11: levels: expected 6 numbers, found 5",
+        "11: levels: expected 6 numbers in N (forces), N m (moments), found 5",
     ),
     "a polynomial of no duration": (
         HEAD + "duration: 1e-300\nposition: {type: polynomial, degree: 7, start: 0, end: 1}\n" + FIRM,

@@ -201,9 +201,17 @@ def test_a_bare_table_without_stiffness(robot):
         ),
         ("{slide: 0.2, arm: 60 deg}", "{slide: 0.2}", "9: end: no value for arm; each joint needs one"),
         ("slide: 0.2", "slid: 0.2", "9: end: no joint is called 'slid'; did you mean 'slide'?"),
-        ("[900, 9000]", "[900]", "13: start: expected 2 numbers, one for each joint, found a list of 1"),
-        ("[900, 9000]", "[900, 9000, 1]", "13: start: expected 2 numbers, one for each joint, found a list"),
-        ("[900, 9000]", "[900, -9000]", "13: start of joint slide: must be positive, not -9000"),
+        (
+            "[900, 9000]",
+            "[900]",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 1; is the file for another robot?",
+        ),
+        (
+            "[900, 9000]",
+            "[900, 9000, 1]",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 3; is the file for another robot?",
+        ),
+        ("[900, 9000]", "[900, -9000]", "13: start of joint slide: must be positive, not -9000 N/m"),
         ("[900, 9000]", "{arm: 0, slide: 9000}", "13: start of joint arm: must be positive, not 0"),
     ],
 )

@@ -105,7 +105,8 @@ def plot(
     from vsacli.base.outputs import Outputs
 
     shown = _Shown(joints or (), _span(start, end), variables)
-    with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
+    kinds = naming_kind("FILE", files, ("result", "simulation", "table of a study", "table", "trajectory"))
+    with kinds, Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
         target = _Target(Path(folder), file_format, outputs)
         if any(map(is_recording, files)):
             _check_recording(files, shown, file_format)
@@ -113,10 +114,7 @@ def plot(
         elif robot is not None:
             raise click.UsageError("--robot is the robot of a recording; results name theirs")
         else:
-            with naming_kind(
-                "FILE", files, ("result", "simulation", "table of a study", "table", "trajectory")
-            ):
-                _draw_computed([Path(file) for file in files], shown, target, talk)
+            _draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
 
 

@@ -55,12 +55,14 @@ class _Columns(NamedTuple):
         width: number of columns.
         places: index of the column of each field that has one.
         factors: factors that convert the numbers of a field to SI units.
+        units: units of the numbers of a field, as written and SI, where they differ.
         others: names of columns without a field.
     """
 
     width: int
     places: dict[str, int]
     factors: dict[str, float]
+    units: dict[str, tuple[str, str]]
     others: list[str]
 
 
@@ -105,7 +107,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
 def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
     """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
     fields = declared(cls)
-    columns = _Columns(len(header.columns), {}, {}, [])
+    columns = _Columns(len(header.columns), {}, {}, {}, [])
     meant = set()
     for index, (name, unit) in enumerate(map(split_heading, header.columns)):
         if name in columns.places:
@@ -113,6 +115,8 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
         elif name in fields:
             columns.places[name] = index
             columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
+            if columns.factors[name] != 1 and unit is not None:
+                columns.units[name] = unit, Scope(problems, {}, {}).unit(fields[name][0].quantity)
         else:
             columns.others.append(name)
             near = nearest(name, fields)
@@ -164,8 +168,25 @@ def _record(
         scope.problems.add(line, f"column {name!r} is empty")
     if missing:
         return None
-    record = read_record(cls, tree.Mapping(line, given, dict.fromkeys(given, line)), "", scope)
+    problems = Problems(scope.problems.file)
+    mapping = tree.Mapping(line, given, dict.fromkeys(given, line))
+    record = read_record(cls, mapping, "", scope._replace(problems=problems))
+    try:
+        problems.check()
+    except InputError as error:
+        for problem in error.problems:
+            scope.problems.add(line, _as_written(problem.message, cells, columns))
     return None if record is INVALID else record
+
+
+def _as_written(message: str, cells: Sequence[str], columns: _Columns) -> str:
+    """Return a message about a converted number with the number and unit of the file."""
+    field = message.partition(":")[0]
+    if field not in columns.units:
+        return message
+    cell, (written, expected) = cells[columns.places[field]], columns.units[field]
+    converted = f"{float(_in_si(cell, columns.factors[field])):g} {expected}"
+    return message.replace(converted, f"{cell} {written}")
 
 
 def _in_si(cell: str, factor: float) -> str:

@@ -327,8 +327,9 @@ def _format(name: str) -> str:
 
 
 def _binary(beginning: bytes) -> str:
-    """Return `binary` for content with many NUL bytes; a damaged table may hold a few."""
-    return "binary" if beginning.count(0) > len(beginning) / 5 else ""
+    """Return `binary` for a first line with many NUL bytes; further lines of a damaged table may have some."""
+    first = beginning.partition(b"\n")[0]
+    return "binary" if first.count(0) > len(first) / 5 else ""
 
 
 def _of_xml(text: str, ending: str) -> str:
