@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("own_folder")
 CASES = {
     "a point of another length": (
         LASTING + VIA.replace("[1, 0.1]", "[1, 0.1, 2]") + FIRM,
-        "8: points: expected 2 values, one for each joint (arm, slide), found 3; is the file for another robot?",
+        "8: points: expected 2 values, one for each joint (arm, slide), found 3; is the file for another",
     ),
     "an unknown joint": (
         LASTING + VIA.replace("slide", "slid") + FIRM,

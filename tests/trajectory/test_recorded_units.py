@@ -98,7 +98,8 @@ def test_all_units_that_do_not_fit_are_named_with_the_line():
     assert found == [
         "m.csv:1: column 'time': unknown unit [h]; expected a time in s, ms, us, ns or min",
         "m.csv:1: column 'arm.q': [m] is a length, expected an angle in rad, deg or rev",
-        "m.csv:1: column 'arm.stiffness': [N/m] is a linear stiffness, expected a rotational stiffness in N m/rad",
+        "m.csv:1: column 'arm.stiffness': [N/m] is a linear stiffness, expected a rotational stiffness in "
+        "N m/rad",
         "m.csv:1: column 'slide.stiffness': unknown unit []; expected a linear stiffness in N/m",
     ]
 

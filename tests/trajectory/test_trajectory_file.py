@@ -204,12 +204,12 @@ def test_a_bare_table_without_stiffness(robot):
         (
             "[900, 9000]",
             "[900]",
-            "13: start: expected 2 values, one for each joint (arm, slide), found 1; is the file for another robot?",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 1; is the file for",
         ),
         (
             "[900, 9000]",
             "[900, 9000, 1]",
-            "13: start: expected 2 values, one for each joint (arm, slide), found 3; is the file for another robot?",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 3; is the file for",
         ),
         ("[900, 9000]", "[900, -9000]", "13: start of joint slide: must be positive, not -9000 N/m"),
         ("[900, 9000]", "{arm: 0, slide: 9000}", "13: start of joint arm: must be positive, not 0"),

@@ -327,7 +327,7 @@ def _format(name: str) -> str:
 
 
 def _binary(beginning: bytes) -> str:
-    """Return `binary` for a first line with many NUL bytes; further lines of a damaged table may have some."""
+    """Return `binary` for a first line with many NUL bytes; other lines of a damaged table may have some."""
     first = beginning.partition(b"\n")[0]
     return "binary" if first.count(0) > len(first) / 5 else ""
 
