@@ -252,7 +252,10 @@ def test_the_rate_is_an_option_of_invdyn(vsacli: Command, tmp_path: Path) -> Non
 def test_a_rate_that_is_none(vsacli: Command, tmp_path: Path, rate: str) -> None:
     log(tmp_path, shoulder=POSITION, elbow=POSITION)
     done = vsacli("info", "log.csv", "--rate", rate)
-    assert (done.code, "rate must be a positive number of samples per second" in done.err) == (2, True)
+    assert (
+        done.code,
+        f"--rate: must be a positive number of samples per second, not {rate}" in done.err,
+    ) == (2, True)
     assert vsacli("invdyn", ROBOT, "log.csv", "--rate", rate).code == 2
 
 

@@ -13,7 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
-from vsacli.cli.input_errors import naming_kind
+from vsacli.cli.input_errors import naming_kind, naming_option
 
 
 @click.command(
@@ -81,7 +81,9 @@ def info(
     else:
         from vsacli.files.info import describe_file
 
-        _show(describe_file(file, robot, talk.looking, rate), as_json, field)
+        with naming_option("--rate"):
+            description = describe_file(file, robot, talk.looking, rate)
+        _show(description, as_json, field)
 
 
 def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:

@@ -19,7 +19,7 @@ def naming_option(option: str, kind: type[InputError] = InputError) -> Iterator[
     """Put the name of an option before each error that its value causes.
 
     Problems of a file keep their place, since the option only names that file. Problems of a record lose the
-    name of its class, which no user has seen.
+    name of its class, which no user has seen, and others a first word that repeats the option.
 
     Args:
         option: the option, e.g. `--rate`; or an argument such as RECORDING.
@@ -33,7 +33,7 @@ def naming_option(option: str, kind: type[InputError] = InputError) -> Iterator[
         else:
             problems = list(error.problems)
         change = getattr(error, "change", "")  # of `--set`, which may be given several times
-        label, path = f"{option} {change}".rstrip(), change.partition("=")[0]
+        label, path = f"{option} {change}".rstrip(), change.partition("=")[0] or option.lstrip("-")
         raise InputError(
             each if each.file else each._replace(message=f"{label}: {each.message.removeprefix(f'{path}: ')}")
             for each in problems

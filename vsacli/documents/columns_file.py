@@ -190,5 +190,6 @@ def checked_rate(given: Any) -> float:
     except (ExpressionError, TypeError, ValueError):
         rate = math.nan
     if not 0 < rate <= LARGEST:
-        raise InputError.one(f"rate: must be a positive number of samples per second, not {given}")
+        shown = f"{given:g}" if isinstance(given, float) else given
+        raise InputError.one(f"rate: must be a positive number of samples per second, not {shown}")
     return rate

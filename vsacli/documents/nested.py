@@ -296,7 +296,8 @@ def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], 
 def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> Any:
     content = node.entries.get(name)
     if content is None:
-        scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc})")
+        example = f", e.g. {name}: {{type: constant, value: ...}}" if "constant" in field.kind.records else ""
+        scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
         return INVALID
     value = field.kind.read(content, name, scope)
     if value is INVALID:
