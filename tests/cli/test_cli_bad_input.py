@@ -29,8 +29,11 @@ ROBOT_EDITS = {
     "word": (("mass: 9.0478", "mass: heavy"), ["13: mass: expected a number in kg, found 'heavy'"]),
     "other format": (("robot/1", "robot/2"), ["4: format: expected 'vsacli-robot/1'"]),
     "undefined alias": (
-        ("*spring             # the same springs as at the base\n    ", "*sprng\n    "),
-        ["31: the alias *sprng has no anchor; did you mean *spring (line 20)?"],
+        ("&spring {type", "&sprng {type"),
+        [
+            "33: the alias *spring has no anchor; did you mean *sprng (line 20)?",
+            "46: the alias *spring has no anchor; did you mean *sprng (line 20)?",
+        ],
     ),
     "two problems": (
         ("damping: 1e-5                 # N m s/rad, b", "damping: -1e-5\n    dampping: 0"),

@@ -109,7 +109,7 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
             "the gears of all joints were given already",
         ),
         (["--catalog", "absent.csv"], "absent.csv: no such file"),
-        (["--catalog", str(ARM)], "expected commas, semicolons or tabs between the columns"),
+        (["--catalog", str(ARM)], "is a robot, but --catalog must be a motor catalog (CSV)"),
     ],
 )
 @pytest.mark.usefixtures("motors")

@@ -202,13 +202,13 @@ SPRING = "joints.*.actuator.spring.k"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.0.actuator.spring has no 'kx'"),
-        (f"vary: {{{SPRING}: [400, -1]}}", "study.yaml:5: joints.*.actuator.spring.k: joints.0"),
+        (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.base.actuator.spring has no 'kx'"),
+        (f"vary: {{{SPRING}: [400, -1]}}", f"study.yaml:5: {SPRING}: joints.base.actuator.spring.k: must"),
         (f"vary: {{{SPRING}: []}}", f"study.yaml:5: {SPRING}: expected a list of values, "),
         (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
-        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
+        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a key 'foo'"),
         ("vary: {name: [a, b]}", "study.yaml:5: name: the name of a file cannot be changed here"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),

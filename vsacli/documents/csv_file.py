@@ -23,7 +23,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.storage import place_of
 from vsacli.base.texts import counted
-from vsacli.documents.source import check_input_file
+from vsacli.documents.source import check_input_file, recognizing_other_formats
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -90,7 +90,7 @@ def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> H
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with open(place_of(name), "rb") as content:
+        with recognizing_other_formats(name), open(place_of(name), "rb") as content:
             return header_of(content, name, strict=False, numbered=numbered)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None

@@ -268,7 +268,8 @@ def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside:
     except InvalidRecordError as error:
         for problem in error.fields:
             message = problem.in_units(scope.variant).in_file(list(scope.members))
-            scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}")
+            fault = f"{prefix}{problem.path} {problem.joint} {problem.message}"
+            scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}", fault)
         return INVALID
     except InputError as error:
         scope.problems.include(error)
@@ -303,15 +304,23 @@ def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope:
     if value is INVALID:
         return INVALID
     problems = list(field.problems(name, value))
-    of_joints = field.kind.per_joint
-    alike: dict[tuple[int, str], list[str]] = {}
+    _note(problems, name, field.kind.per_joint, node, scope)
+    return INVALID if problems else value
+
+
+def _note(
+    problems: Iterable[FieldProblem], name: str, of_joints: bool, node: tree.Mapping, scope: Scope
+) -> None:
+    """Note the problems of a field; joints with the same problem share a message."""
+    alike: dict[tuple[int, str, str], list[str]] = {}
     for problem in problems:
         joint = list(scope.members)[int(problem.path[-1])] if of_joints else ""
-        found = problem.in_units(scope.members[joint] if of_joints else scope.variant).message
-        alike.setdefault((line_of(problem.path, node, scope), found), []).append(joint)
-    for (line, message), joints in alike.items():
-        scope.problems.add(line, f"{name}{_of_joints(joints, scope) if of_joints else ''}: {message}")
-    return INVALID if problems else value
+        message = problem.in_units(scope.members[joint] if of_joints else scope.variant).message
+        fault = "" if of_joints else f"{name}: {problem.message}"
+        alike.setdefault((line_of(problem.path, node, scope), message, fault), []).append(joint)
+    for (line, message, fault), joints in alike.items():
+        place = _of_joints(joints, scope) if of_joints else ""
+        scope.problems.add(line, f"{name}{place}: {message}", fault)
 
 
 def _of_joints(joints: Sequence[str], scope: Scope) -> str:

@@ -165,13 +165,23 @@ class Problems:
     def __init__(self, file: str) -> None:
         self.file = file
         self._found: list[Problem] = []
+        self._faults: set[tuple[int, str]] = set()
 
-    def add(self, line: int, message: str) -> None:
+    def add(self, line: int, message: str, fault: str = "") -> None:
         """Note a problem.
+
+        Args:
+            line: line number from 1, or 0.
+            message: as in `Problem`.
+            fault: message without units. A value that an alias repeats at joints of several types is noted
+                once.
 
         Raises:
             InputError: there are more than MAX_PROBLEMS.
         """
+        if fault and (line, fault) in self._faults:
+            return
+        self._faults.add((line, fault))
         if len(self._found) == MAX_PROBLEMS:
             self._found.append(
                 Problem(self.file, line, f"more than {MAX_PROBLEMS} problems; reading stopped here")
@@ -329,7 +339,7 @@ def _format(name: str) -> str:
 def _binary(beginning: bytes) -> str:
     """Return `binary` for a first line with many NUL bytes; other lines of a damaged table may have some."""
     first = beginning.partition(b"\n")[0]
-    return "binary" if first.count(0) > len(first) / 5 else ""
+    return "binary" if len(first) <= 3 * first.count(0) > 0 else ""
 
 
 def _of_xml(text: str, ending: str) -> str:
