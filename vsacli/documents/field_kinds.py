@@ -72,7 +72,7 @@ class Check(NamedTuple):
         return None
 
 
-_WITHOUT_UNIT = (str(DIMENSIONLESS), str(ANY_SI_UNIT))
+_WITHOUT_UNIT = {str(DIMENSIONLESS), str(ANY_SI_UNIT)}
 _ANY = Check(lambda _: True, "any number")
 
 
@@ -117,9 +117,7 @@ class Kind(ABC):
     @property
     def _has_unit(self) -> bool:
         """Whether numbers have a unit to show after them, at joints of any type."""
-        if self.unit is None:
-            return False
-        return {self.unit.revolute, self.unit.prismatic}.isdisjoint(_WITHOUT_UNIT)
+        return self.unit is not None and _WITHOUT_UNIT.isdisjoint((self.unit.revolute, self.unit.prismatic))
 
     def _problem(self, path: FieldPath, message: str) -> FieldProblem:
         """Return a problem; each `{}` in the message stands for the unit."""
@@ -308,8 +306,7 @@ class Text(Kind):
     def fault(self, content: Any) -> str | None:
         """See `Kind.fault`."""
         if self.identifier and not IDENTIFIER.fullmatch(content):
-            requirement = "letters, digits, _ and -, beginning with a letter or _"
-            return f"must be made of {requirement}, not {quoted(content)}"
+            return f"must be made of letters, digits, _ and -, beginning with a letter or _, not {quoted(content)}"
         return _unprintable(content, allowed="\n")
 
 
@@ -379,8 +376,7 @@ class TableFile(Kind):
         try:
             table = read_table(Path(scope.problems.file).parent / name)
             if table.columns != self.columns:
-                expected, found = ",".join(self.columns), ",".join(table.columns)
-                message = f"expected the header {expected}, found {found}"
+                message = f"expected the header {','.join(self.columns)}, found {','.join(table.columns)}"
                 raise InputError.one(message, table.source.path, 1)
         except InputError as error:
             scope.problems.include(error)
@@ -405,8 +401,8 @@ class Vector(Kind):
 
     def fault(self, content: Any) -> str | None:
         """See `Kind.fault`."""
-        right = len(content) == self.length
-        return None if right else f"expected {self.length} numbers in {{}}, found {len(content)}"
+        found = len(content)
+        return None if found == self.length else f"expected {self.length} numbers in {{}}, found {found}"
 
 
 class Interval(Kind):
