@@ -306,7 +306,8 @@ class Text(Kind):
     def fault(self, content: Any) -> str | None:
         """See `Kind.fault`."""
         if self.identifier and not IDENTIFIER.fullmatch(content):
-            return f"must be made of letters, digits, _ and -, beginning with a letter or _, not {quoted(content)}"
+            requirement = "letters, digits, _ and -, beginning with a letter or _"
+            return f"must be made of {requirement}, not {quoted(content)}"
         return _unprintable(content, allowed="\n")
 
 
