@@ -8,9 +8,9 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from vsacli.base.texts import MOST_LETTERS
+from vsacli.base.texts import MOST_LETTERS, on_one_line
 from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.field_kinds import Field, on_one_line
+from vsacli.documents.field_kinds import Field
 from vsacli.documents.fields import (
     FINITE,
     REQUIRED,

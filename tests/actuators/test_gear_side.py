@@ -268,7 +268,7 @@ def test_both_keys_may_be_set_in_either_order(keys, vsacli, tmp_path):
     done = vsacli("invdyn", path, tmp_path / "move.yaml", "--set=joints.turn.actuator.motor.gear_ratio=100")
     assert done.code == 2
     assert (
-        "joints.turn.actuator.motor.gear_ratio: 100 needs side: shaft or joint; inertia 0.0001 kg m^2 at"
+        "--set joints.turn.actuator.motor.gear_ratio=100: 100 needs side: shaft or joint; inertia 0.0001"
         in (done.err)
     )
 

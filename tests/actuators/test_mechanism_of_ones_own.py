@@ -146,3 +146,9 @@ def test_generated_code_agrees_with_numpy(arm, tmp_path):
         ["make", "test"], cwd=tmp_path / "code", capture_output=True, text=True, check=False
     )
     assert "all values agree" in done.stdout, done.stdout + done.stderr
+
+
+def test_an_attribute_of_an_earlier_name_is_refused():
+    attributes = {"__module__": "mine", "other_preload": lambda self: self}
+    with pytest.raises(TypeError, match=r"^Old.other_preload has no effect; it is now 'other_branch'$"):
+        type("Old", (AdjustableArm,), attributes)

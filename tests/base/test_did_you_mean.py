@@ -9,19 +9,25 @@ from vsacli.base.errors import InputError
 from vsacli.base.variables import select_variables
 
 ROBOTS = ["awas_1r", "cam_1r", "vsa_3r", "vsa_cubebot", "vsa_ii"]
+KEYS = ["vary", "variables", "robot", "stiffness_min", "stiffness_max", "start", "stop"]
 
 
 @pytest.mark.parametrize(
-    ("word", "clause"),
+    ("word", "valid", "clause"),
     [
-        ("vsa", "; did you mean 'vsa_3r', 'vsa_cubebot' or 'vsa_ii'?"),
-        ("cam", "; did you mean 'cam_1r'?"),
-        ("vsa_4r", "; did you mean 'vsa_3r'?"),
-        ("puma", f"; valid: {', '.join(ROBOTS)}"),
+        ("vsa", ROBOTS, "; did you mean 'vsa_3r', 'vsa_cubebot' or 'vsa_ii'?"),
+        ("cam", ROBOTS, "; did you mean 'cam_1r'?"),
+        ("vsa_4r", ROBOTS, "; did you mean 'vsa_3r'?"),
+        ("puma", ROBOTS, f"; valid: {', '.join(ROBOTS)}"),
+        ("var", KEYS, "; did you mean 'vary' or 'variables'?"),
+        ("robt", KEYS, "; did you mean 'robot'?"),
+        ("stiff", KEYS, "; did you mean 'stiffness_min' or 'stiffness_max'?"),
+        ("sta", KEYS, "; did you mean 'start'?"),
+        ("zzz", KEYS, f"; valid: {', '.join(KEYS)}"),
     ],
 )
-def test_words_with_this_beginning_come_before_similar_ones(word: str, clause: str) -> None:
-    assert did_you_mean(word, ROBOTS) == clause
+def test_words_with_this_beginning_come_before_similar_ones(word: str, valid: list[str], clause: str) -> None:
+    assert did_you_mean(word, valid) == clause
 
 
 def test_of_many_words_with_one_beginning_the_most_similar_is_proposed() -> None:

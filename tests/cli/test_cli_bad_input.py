@@ -22,12 +22,19 @@ ROBOT_EDITS = {
     "unknown key": (("gravity:", "gravty:"), ["7: unknown key 'gravty'; did you mean 'gravity'?"]),
     "duplicate key": (("name: vsa-3r", "name: a\nname: b"), ["6: duplicate key 'name'"]),
     "boolean": (("mass: 9.0478", "mass: on"), ["13: mass: expected a number in kg, found 'on'"]),
-    "vector length": (("com: [0, 0, 0]", "com: [0, 0]"), ["14: com: expected 3 numbers, found 2"]),
+    "vector length": (("com: [0, 0, 0]", "com: [0, 0]"), ["14: com: expected 3 numbers in m, found 2"]),
     "negative eigenvalue": (("xx: 0.1299", "xx: -0.1299"), ["15: negative eigenvalue -0.1299 kg m^2"]),
     "Python tag": (("name: vsa-3r", "name: !!python/name:os.system vsa"), ["5: !!python/name:os.system"]),
     "NaN": (("mass: 9.0478", "mass: .nan"), ["13: only finite numbers"]),
     "word": (("mass: 9.0478", "mass: heavy"), ["13: mass: expected a number in kg, found 'heavy'"]),
     "other format": (("robot/1", "robot/2"), ["4: format: expected 'vsacli-robot/1'"]),
+    "undefined alias": (
+        ("&spring {type", "&sprng {type"),
+        [
+            "33: the alias *spring has no anchor; did you mean *sprng (line 20)?",
+            "46: the alias *spring has no anchor; did you mean *sprng (line 20)?",
+        ],
+    ),
     "two problems": (
         ("damping: 1e-5                 # N m s/rad, b", "damping: -1e-5\n    dampping: 0"),
         ["16: damping: must be", "17: unknown key 'dampping'; did you mean 'damping'?"],
@@ -40,28 +47,42 @@ TRAJECTORY_EDITS = {
         ["9: derivatives up to the third must vanish at both ends"],
     ),
     "degree 1 stiffness": (("degree: 3", "degree: 1"), ["14: its rate must vanish at both ends"]),
-    "list length": (("[90 deg, 45 deg, -60 deg]", "[1, 2]"), ["11: end: expected 3 numbers"]),
+    "list length": (
+        ("[90 deg, 45 deg, -60 deg]", "[1, 2]"),
+        ["11: end: expected 3 values, one for each joint (base, shoulder, elbow), found 2"],
+    ),
     "infinity": (("duration: 4.0", "duration: .inf"), ["5: only finite numbers"]),
     "negative stiffness": (
         ("start: 850", "start: [1, -1, 1]"),
-        ["15: joint shoulder: must be positive, not -1"],
+        ["15: joint shoulder: must be positive, not -1 N m/rad"],
+    ),
+    "negative stiffness of two": (
+        ("start: 850", "start: [-1, 1, -1]"),
+        ["15: start of joints base, elbow: must be positive, not -1 N m/rad"],
+    ),
+    "negative stiffness of all": (
+        ("start: 850", "start: -850"),
+        ["15: start: must be positive, not -850 N m/rad"],
     ),
 }
 
 ROBOT_FILES = {
-    "empty file": (b"", [": the file is empty"]),
+    "empty file": (b"", [": is empty; expected a YAML file that begins with `format: vsacli-robot/1`"]),
     "alias bomb": (ALIAS_BOMB.encode(), ["6: more than 100,000 keys and values"]),
     "nested brackets": (b"[" * 3000 + b"]" * 3000, ["1: nested more than 20 levels deep"]),
-    "binary": (b"\0\1\2", ["1: the character U+0000 is not allowed"]),
+    "binary": (b"\0\1\2", [": is a binary file, but ROBOT must be a robot file (YAML)"]),
     "not UTF-8": (b"name: \xff\xfe", ["1: UTF-8"]),
-    "text": (b"hello", ["1: expected a mapping that begins with `format: vsacli-robot/1`"]),
+    "text": (b"hello", ["1: expected a YAML file that begins with `format: vsacli-robot/1`"]),
 }
 
 TABLES = {
     "time goes back": ((ROWS[4], ROWS[2]), ["6: time must increase, but 0.2 s follows 0.3 s"]),
-    "ragged row": ((ROWS[4], "0.4,0,0\n"), ["6: expected 7 values as in the header, found 3"]),
-    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1': expected a finite number, found 'nan'"]),
-    "text": (("0.4,0", "0.4,up"), ["6: column 'q1': expected a finite number, found 'up'"]),
+    "ragged row": (
+        (ROWS[4], "0.4,0,0\n"),
+        ["6: expected 7 values, one for each column of the header, found 3"],
+    ),
+    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1': expected a number, found 'nan'"]),
+    "text": (("0.4,0", "0.4,up"), ["6: column 'q1': expected a number, found 'up'"]),
     "negative stiffness": ((ROWS[4], "0.4,0,0,0,9,-9,9\n"), ["6: stiffness2 must be positive, not -9"]),
     "unknown column": (
         ("stiffness3", "stifness3"),
@@ -117,7 +138,8 @@ def test_unchanged_table_is_accepted(vsacli, tmp_path):
 
 @pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
 @pytest.mark.parametrize(
-    ("name", "message"), [("absent.yaml", "no such file"), (".", "is a directory, expected a file")]
+    ("name", "message"),
+    [("absent.yaml", "no such file"), (".", "is a folder; give the name of a file in it")],
 )
 def test_what_is_not_a_file(vsacli, tmp_path, command, name, message):
     for arguments in ((name, REST_TO_REST), (ROBOT, name)):

@@ -89,7 +89,7 @@ def test_identify(vsacli: Command, tmp_path: Path) -> None:
         ),
         (
             "format: vsacli-columns/1\ncolumns: {base.p: t}\n",
-            "columns.yaml:2: columns: 'base.p' is not kn",
+            "columns.yaml:2: columns: unknown name 'base.p'",
         ),
         ("format: vsacli-columns/1\nignore: [t]\n", "log.csv:1: there is no column 'time'"),
     ],

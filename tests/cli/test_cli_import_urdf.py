@@ -177,7 +177,7 @@ def test_overwriting(vsacli, tmp_path):
         (["--hold", "left_finger=0", "--hold", "left_finger=1"], "'left_finger' is held twice"),
         (
             ["--hold", "left_finger=1 deg"],
-            "expected a number in m, found '1 deg': degrees are for angles only",
+            "'1 deg' is an angle; expected a number in m",
         ),
         (["--tip", "flang"], "--tip: there is no link 'flang'; did you mean 'flange'?"),
     ],

@@ -228,7 +228,7 @@ def test_bug_leaves_a_traceback_a_sentence_and_no_file(vsacli, tmp_path, motion,
 def test_trajectory_of_another_robot_is_refused(vsacli, tmp_path):
     done = vsacli("invdyn", ROBOT, SEVEN_JOINTS_MOTION)
     assert (done.code, done.out) == (2, "")
-    assert f"{SEVEN_JOINTS_MOTION}:11: end: expected 3 numbers, one for each joint" in done.err
+    assert f"{SEVEN_JOINTS_MOTION}:11: end: expected 3 values, one for each joint (base, " in done.err
     assert contents(tmp_path) == {}
 
 

@@ -142,16 +142,22 @@ def test_a_result_alone_is_recognized(vsacli, feasible_result):
     assert reason == f"Missing argument 'TRAJECTORY'; {hint}"
 
 
+COMPUTE = f"to compute a result: vsacli invdyn {ROBOT} TRAJECTORY"
+
+
 @pytest.mark.parametrize(
     ("words", "argument"),
     [
-        (("compare", ROBOT, "r.csv"), "RESULT must be a result or a simulation"),
+        (("compare", ROBOT, "r.csv"), f"RESULT must be a result or a simulation (HDF5); {COMPUTE}"),
         (("import-urdf", ROBOT), "URDF must be a URDF file"),
-        (("study", ROBOT), "STUDY must be a study"),
-        (("identify", ROBOT, ROBOT), "RECORDING must be a CSV table"),
-        ((*SIZE[:3], "--catalog", ROBOT), "--catalog must be a motor catalog"),
-        ((*LINEARIZED, "--poles", ROBOT), "--poles must be a poles file"),
-        (("export", ROBOT, "--format", "mjcf", "--start", ROBOT), "--start must be a result"),
+        (("study", ROBOT), f"STUDY must be a study file (YAML); {COMPUTE}"),
+        (("identify", ROBOT, ROBOT), "RECORDING must be a CSV table; the order is ROBOT RECORDING..."),
+        ((*SIZE[:3], "--catalog", ROBOT), "--catalog must be a motor catalog (CSV)"),
+        ((*LINEARIZED, "--poles", ROBOT), "--poles must be a poles file (YAML)"),
+        (
+            ("export", ROBOT, "--format", "mjcf", "--start", ROBOT),
+            f"--start must be a result (HDF5); {COMPUTE}",
+        ),
     ],
 )
 def test_every_command_says_what_a_file_of_a_wrong_kind_is(vsacli, words, argument):

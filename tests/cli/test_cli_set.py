@@ -87,11 +87,17 @@ def test_what_is_read_is_the_changed_file(own_folder: Path, motion: Path, case: 
         ("sensitivity --json", '"path": "joints.elbow.link.mass",\n   "value": 5.25,'),
     ],
 )
-def test_what_is_set_last_counts(vsacli: Any, motion: Path, command: str, told: str) -> None:
-    settings = ("duration=5", "joints.elbow.link.mass=5.25", "position.end=0.001", "duration=0.3")
+def test_several_values_are_set(vsacli: Any, motion: Path, command: str, told: str) -> None:
+    settings = ("joints.elbow.link.mass=5.25", "position.end=0.001", "duration=0.3")
     done = vsacli(*command.split(), ROBOT, motion, *(part for each in settings for part in ("--set", each)))
     assert done.code == 0
     assert told in done.out
+
+
+def test_a_path_is_set_once(vsacli: Any, motion: Path) -> None:
+    done = vsacli("check-feasibility", ROBOT, motion, "--set", "duration=5", "--set", "duration = 0.3")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == "--set duration = 0.3: duration is also set to '5'; set it once\n"
 
 
 def test_a_result_remembers_what_was_set(vsacli: Any, motion: Path) -> None:
@@ -160,23 +166,27 @@ def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
             "neither robot nor trajectory has 'elbow' at the top level; did you mean joints.*.link.mass?",
         ),
         ("foo=2", "neither robot nor trajectory has 'foo' at the top level; valid: placeholder, gravity, "),
-        ("name=x", "name says what the file is and stays; change the file itself"),
-        ("format=x", "format says what the file is and stays; change the file itself"),
+        ("name=x", "the name of a file cannot be changed here; edit the file"),
+        ("format=x", "the format of a file cannot be changed here; edit the file"),
         ("joints.elbow.link.mas=1", "joints.elbow.link has no 'mas'; did you mean 'mass'?"),
-        ("joints.elbow.link.mass=-1", "joints.elbow.link.mass: must be zero or positive, not -1"),
-        ("joints.elbow.link.mass=heavy", "joints.elbow.link.mass: expected a number in kg, found 'heavy'"),
-        ("position.degree=4", "position.degree: must be odd, from 7 to 15"),
+        ("joints.elbow.link.mass=-1", "must be zero or positive, not -1 kg"),
+        ("joints.elbow.link.mass=heavy", "expected a number in kg, found 'heavy'"),
+        ("position.degree=4", "must be odd, from 7 to 15"),
+        ("joints.*.link.mass=-1", "joints.base.link.mass: must be zero or positive, not -1 kg"),
+        ("joints.elbow=2", "joints.elbow is a mapping; set one of its keys: name, type, dh, link, damping"),
+        ("position.end.5=1", "position.end has no '5'; valid: base, shoulder, elbow or 0 to 2"),
         (
-            "joints.elbow.link.mass",
-            "expected PATH=VALUE, e.g. joints.*.link.mass=2.5, found 'joints.elbow.link.mass'",
+            "position.type=via",
+            "the type cannot be changed alone, since each type has other keys; give the whole ",
         ),
-        ("gravity=[1, 2", "gravity: not valid YAML: "),
+        ("joints.elbow.link.mass", "expected PATH=VALUE, e.g. joints.*.link.mass=2.5"),
+        ("gravity=[1, 2", "not valid YAML: "),
     ],
 )
 def test_a_change_that_cannot_be_made(vsacli: Any, motion: Path, change: str, message: str) -> None:
     done = vsacli("check-feasibility", ROBOT, motion, "--set", change)
     assert (done.code, done.out) == (2, "")
-    assert done.err.startswith(f"--set: {message}")
+    assert done.err.startswith(f"--set {change}: {message}")
 
 
 def test_joints_that_take_no_stiffness_get_none(vsacli: Any) -> None:
@@ -192,7 +202,7 @@ def test_joints_that_take_no_stiffness_get_none(vsacli: Any) -> None:
     refused = vsacli(*run, "stiffness.end.base=900")
     assert (refused.code, refused.err.partition(": no value goes there: ")[0]) == (
         2,
-        "--set: stiffness.end.base",
+        "--set stiffness.end.base=900",
     )
 
 
@@ -226,8 +236,8 @@ def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None
             "--rate: duration 4 s times rate 1e+09 Hz gives 4e+09 samples; at most 1e+09 are possible; "
             "lower rate or duration",
         ),
-        (["--set", "rate=-5"], "--set: rate: must be positive, not -5"),
-        (["--rate", "5", "--set", "duration=-1"], "--set: duration: must be positive, not -1"),
+        (["--set", "rate=-5"], "--set rate=-5: must be positive, not -5 1/s"),
+        (["--rate", "5", "--set", "duration=-1"], "--set duration=-1: must be positive, not -1 s"),
     ],
 )
 def test_an_impossible_rate_is_one_problem_of_its_option(

@@ -189,7 +189,10 @@ def test_a_rigid_joint_among_others_is_refused_by_name(vsacli, tmp_path):
 @pytest.mark.parametrize(
     ("wrench", "message"),
     [
-        ("{frame: base, type: constant, value: [1, 2, 3, 4, 5]}", "expected 6 numbers, found 5"),
+        (
+            "{frame: base, type: constant, value: [1, 2, 3, 4, 5]}",
+            "expected 6 numbers in N (forces), N m (mom",
+        ),
         (
             "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [1, 0, 0, 0, 0, 0]}",
             "degree: must be odd, from 3 to 15",

@@ -125,7 +125,7 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
             "the gears of all joints were given already",
         ),
         (["--catalog", "absent.csv"], "absent.csv: no such file"),
-        (["--catalog", str(ARM)], "is a robot, but --catalog must be a motor catalog"),
+        (["--catalog", str(ARM)], "is a robot, but --catalog must be a motor catalog (CSV)"),
     ],
 )
 @pytest.mark.usefixtures("motors")
@@ -142,7 +142,7 @@ def test_what_is_refused(vsacli, arguments, message):
             "m,1e-4,,,,,,,",
             "motor 'm' has no torque limit; give continuous_torque, max_torque,",
         ),
-        ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001"),
+        ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001 kg m^2"),
         ("m,1e-4,1,,,,0.5,,", "resistance: needs torque_constant, too"),
         ("m,1e-4,1,,,0.1,,,24", "max_voltage: needs resistance, too"),
         ("m,1e-4,1,2,,,,,,", "expected 9 values"),

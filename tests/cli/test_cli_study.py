@@ -204,4 +204,4 @@ def test_implausible_values_are_reported_once(vsacli: Any, tmp_path: Path) -> No
     edited(ROBOT, tmp_path / "arm.yaml", ("com: [0, 0, 0] ", "com: [0, 0, 150] "))
     done = vsacli("study", str(path), "--processes", "1")
     assert done.err.count("warning: ") == 1
-    assert "joints.base.link.com.2 = 150 m is " in done.err
+    assert "joints.base.link.com.2 (z) = 150 m is " in done.err

@@ -203,15 +203,15 @@ SPRING = "joints.*.actuator.spring.k"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.0.actuator.spring has no 'kx'"),
-        (f"vary: {{{SPRING}: [400, -1]}}", f"study.yaml:5: {SPRING}: must be positive, not -1\n"),
+        (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.base.actuator.spring has no 'kx'"),
+        (f"vary: {{{SPRING}: [400, -1]}}", f"study.yaml:5: {SPRING}: must be positive, not -1 N m/rad\n"),
         (f"method: random\nsamples: 2\nvary: {{{SPRING}: {{normal: 300 %}}}}", "must be at most 100 %, not"),
         (f"vary: {{{SPRING}: []}}", f"study.yaml:5: {SPRING}: expected a list of values, "),
         (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
         (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
         (f"vary: {{{SPRING}: {{normal: 5 %}}}}", f"study.yaml:5: {SPRING}: has a distribution, which"),
         ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has 'foo'"),
-        ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
+        ("vary: {name: [a, b]}", "study.yaml:5: name: the name of a file cannot be changed here"),
         ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies independently"),
         ("method: random\nvary: {duration: [1]}", "missing key 'samples': the number of runs that the"),
         ("method: random\nsamples: 3", "missing key 'vary': the values that the method random draws"),
@@ -240,7 +240,10 @@ def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
     )
     assert "expected K/N with K from 1 to N" in vsacli("study", grid_study, "--shard", "4/3").err
     assert "--merge needs -o FILE" in vsacli("study", "--merge", grid_study).err
-    assert "is not an HDF5 file" in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
+    assert (
+        "is a study, but STUDY must be a study table (HDF5)"
+        in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
+    )
 
 
 def test_no_file_is_replaced_or_read_for_nothing(vsacli: Any, own_folder: Path) -> None:

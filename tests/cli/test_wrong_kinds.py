@@ -22,9 +22,18 @@ def _files(vsacli, own_folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("move.yaml", "arm.yaml"), "move.yaml: is a trajectory, but ROBOT must be a robot; are ROBOT "),
-        (("arm.yaml", "arm.yaml"), "arm.yaml: is a robot, but TRAJECTORY must be a trajectory or a CSV"),
-        (("run.h5", "move.yaml"), "run.h5: is a result, but ROBOT must be a robot; vsacli info FILE"),
+        (
+            ("move.yaml", "arm.yaml"),
+            "move.yaml: is a trajectory, but ROBOT must be a robot file (YAML); the order is ROBOT ",
+        ),
+        (
+            ("arm.yaml", "arm.yaml"),
+            "arm.yaml: is a robot, but TRAJECTORY must be a trajectory (YAML) or a CSV table; the order is ",
+        ),
+        (
+            ("run.h5", "move.yaml"),
+            "run.h5: is a result, but ROBOT must be a robot file (YAML); vsacli info run.h5 --extract ",
+        ),
         (("samples.csv", "move.yaml"), "samples.csv: is a CSV table, but ROBOT must be a robot"),
         (("robot/arm.yaml", "move.yaml"), "robot/arm.yaml: no such file; did you mean 'robots/arm.yaml'?"),
         (("ARM.yaml", "move.yaml"), "ARM.yaml: no such file; did you mean 'arm.yaml'?"),
@@ -38,6 +47,84 @@ def test_the_error_says_what_a_file_is(vsacli, arguments, message):
         outcome = vsacli(command, *arguments)
         assert outcome.code == 2
         assert message in outcome.err
+
+
+_STORED = "a result, a simulation or a study table (HDF5)"
+_DRAWN = (
+    "FILE must be a robot file, a trajectory (YAML), a result, a simulation, a study table (HDF5) "
+    "or a CSV table"
+)
+_RESULT = "RESULT must be a result or a simulation (HDF5)"
+_COMPUTE = "to compute a result: vsacli invdyn arm.yaml TRAJECTORY"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "identify arm.yaml run.h5",
+            "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
+        ),
+        (
+            "compare run.h5 run.h5",
+            "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
+        ),
+        (
+            "compare run.h5 arm.yaml",
+            "is a robot, but RECORDING must be a CSV table; the order is RESULT RECORDING",
+        ),
+        ("compare arm.yaml samples.csv", f"is a robot, but {_RESULT}; {_COMPUTE}"),
+        ("plot study.yaml", f"is a study, but {_DRAWN}; run it with vsacli study study.yaml"),
+        ("plot motors.csv", f"is a motor catalog, but {_DRAWN}; give it to size as --catalog motors.csv"),
+        (
+            "info samples.csv --robot move.yaml",
+            "is a trajectory, but --robot must be a robot file (YAML)\n",
+        ),
+        ("size arm.yaml move.yaml --catalog samples.csv", "samples.csv:1: missing columns 'name' ("),
+        ("compare move.yaml samples.csv", f"{_RESULT}; to compute a result: vsacli invdyn ROBOT move.yaml"),
+        ("info arm.yaml --extract x", f"is a robot, but FILE must be {_STORED}; {_COMPUTE}"),
+        (
+            "size arm.yaml move.yaml --catalog arm.yaml",
+            "is a robot, but --catalog must be a motor catalog (CSV)",
+        ),
+        (
+            "size arm.yaml arm.yaml",
+            "is a robot, but TRAJECTORY must be a trajectory (YAML) or a CSV table; the order is",
+        ),
+        (
+            "identify arm.yaml samples.csv --columns arm.yaml",
+            "is a robot, but --columns must be a columns file (YAML)",
+        ),
+        ("import-urdf samples.csv", "is a CSV table, but URDF must be a URDF file"),
+        ("study arm.yaml -o s.h5", f"is a robot, but STUDY must be a study file (YAML); {_COMPUTE}"),
+        ("study --merge arm.yaml -o s.h5", "is a robot, but STUDY must be a study table (HDF5)"),
+        (
+            "invdyn arm.yaml photo.csv",
+            "is a PNG image, but TRAJECTORY must be a trajectory (YAML) or a CSV table",
+        ),
+        ("invdyn plan.zip move.yaml", "is a ZIP archive, but ROBOT must be a robot file (YAML)"),
+        ("plot photo.csv", f"is a PNG image, but {_DRAWN}"),
+        ("info photo.csv", "is a PNG image; expected text"),
+        ("invdyn robots move.yaml", "robots: is a folder; give the name of a file in it"),
+        (
+            "sensitivity arm.yaml move.yaml --tolerances arm.yaml",
+            "is a robot, but --tolerances must be a tolerances file (YAML)",
+        ),
+        (
+            "simulate arm.yaml move.yaml --controller feedback-linearization --poles move.yaml",
+            "is a trajectory, but --poles must be a poles file (YAML)",
+        ),
+    ],
+)
+def test_every_argument_says_what_a_file_is(vsacli, own_folder, arguments, message):
+    (own_folder / "photo.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR")
+    (own_folder / "study.yaml").write_text("format: vsacli-study/1\n")
+    (own_folder / "motors.csv").write_text("name,inertia\nm,1e-4\n")
+    (own_folder / "plan.zip").write_bytes(b"PK\x03\x04\x14\x00")
+    outcome = vsacli(*arguments.split())
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert outcome.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

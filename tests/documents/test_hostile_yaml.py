@@ -43,7 +43,7 @@ def test_a_missing_folder():
 
 
 def test_a_directory():
-    assert only_problem(".") == ".: is a directory, expected a file"
+    assert only_problem(".") == ".: is a folder; give the name of a file in it"
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
@@ -74,11 +74,14 @@ def test_a_path_with_a_nul():
 @pytest.mark.parametrize("content", ["", " \n\n"])
 def test_an_empty_file(content):
     Path("empty.yaml").write_text(content)
-    assert only_problem("empty.yaml") == "empty.yaml: the file is empty"
+    assert only_problem("empty.yaml") == (
+        "empty.yaml: is empty; expected a YAML file that begins with `format: vsacli-robot/1`"
+    )
 
 
 def test_200_megabytes_are_refused_by_their_size():
     with open("noise.yaml", "wb") as file:
+        file.write(b"#" * 4096)
         file.truncate(200_000_000)
     expected = "noise.yaml: the file has 200,000,000 bytes, more than the 1,000,000 allowed here"
     assert only_problem("noise.yaml") == expected
@@ -109,7 +112,7 @@ def test_a_file_that_grows_while_it_is_read(monkeypatch):
 
 def test_bytes_that_are_no_text():
     Path("latin.yaml").write_bytes("name: x\ndescription: Gerät".encode("latin-1"))
-    message = "the file is not UTF-8 text (byte 0xe4 at offset 24); save it as UTF-8"
+    message = "byte 0xe4 is not valid UTF-8; save the file as UTF-8"
     assert only_problem("latin.yaml") == f"latin.yaml:2: {message}"
 
 
@@ -127,7 +130,7 @@ def test_bytes_that_are_no_text():
         ),
         ("[" + "1, " * 300_000 + "]", "more than 100,000 keys"),
         ("a: " + "'" * 900_001, "scanning a quoted scalar"),
-        ("a" * 900_000, "expected a mapping that begins with"),
+        ("a" * 900_000, "expected a YAML file that begins with"),
         ("\x7fELF\x02\x01", "the character U+007F is not allowed in YAML; is this a text file?"),
     ],
     ids=lambda value: value[:12],

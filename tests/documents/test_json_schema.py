@@ -20,9 +20,10 @@ from samples.studies import DRAWN, GRID, HEAD
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANGLE, MASS, POSITION
 from vsacli.documents import fields
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import Check, Kind, OwnKind, declared
 from vsacli.documents.json_schema import json_schema
+from vsacli.documents.number import evaluate
 from vsacli.documents.tree import Node, Scope
 from vsacli.files.file_kinds import DOCUMENTS, FileKind
 from vsacli.robot.file import load_robot

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 
 
 @pytest.mark.parametrize(
@@ -57,10 +58,34 @@ def test_a_right_angle_is_half_of_pi():
 
 @pytest.mark.parametrize("unit", ["m", "N m/rad", "1", "kg m^2"])
 def test_degrees_elsewhere_are_refused(unit):
-    with pytest.raises(
-        ExpressionError, match=f"degrees are for angles only, and the unit here is {re.escape(unit)}"
-    ):
+    expected = (
+        "has a unit; write the number alone" if unit == "1" else f"is an angle; expected a number in {unit}"
+    )
+    with pytest.raises(ExpressionError, match=f"^'90 deg' {re.escape(expected)}$"):
         evaluate("90 deg", unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "problem"),
+    [
+        ("9.0478 kg", "kg", "has a unit; write the number alone, in kg: 9.0478"),
+        ("5e3 g", "kg", "has a unit; write the number alone, in kg: 5"),
+        ("50mm", "m", "has a unit; write the number alone, in m: 0.05"),
+        ("1 kHz", "1/s", "has a unit; write the number alone, in 1/s: 1000"),
+        ("1 rev", "rad", "has a unit; write the number alone, in rad: 6.283185307"),
+        ("3 s", "kg", "is a time; expected a number in kg"),
+        ("3 N/V", "kg", "is in another unit; expected a number in kg"),
+        ("3 kg", "SI units", "has a unit; write the number alone, in SI units"),
+        (
+            "3 N",
+            "N (forces), N m (moments)",
+            "has a unit; write the number alone, in N (forces), N m (moments)",
+        ),
+    ],
+)
+def test_a_unit_behind_a_number_is_named_and_converted(text, unit, problem):
+    with pytest.raises(ExpressionError, match=f"^'{text}' {re.escape(problem)}$"):
+        evaluate(text, unit)
 
 
 @pytest.mark.parametrize("text", ["deg", "90/2 deg", "1 + 2 deg", "pi deg", "90 deg deg", "90 deg + 1 deg"])
@@ -72,10 +97,10 @@ def test_degrees_of_an_ambiguous_expression_are_refused(text):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("on", "takes this word for a boolean"),
-        ("Yes", "takes this word for a boolean"),
-        ("n", "takes this word for a boolean"),
-        ("false", "takes this word for a boolean"),
+        ("on", "reads this word as a boolean"),
+        ("Yes", "reads this word as a boolean"),
+        ("n", "reads this word as a boolean"),
+        ("false", "reads this word as a boolean"),
         ("1:30", "base 60"),
         ("-1:30:15.5", "base 60"),
         ("010", "leading zero"),
@@ -95,23 +120,23 @@ def test_degrees_of_an_ambiguous_expression_are_refused(text):
         ("1e400", "too large"),
         ("1e308*10", "too large"),
         ("1e308*10 - 1e308*10", "too large"),
-        ("", "write a number, or an expression"),
-        ("2 +", "write a number, or an expression"),
-        ("1 2", "write a number, or an expression"),
-        ("(1", "write a number, or an expression"),
-        ("1)+(2", "write a number, or an expression"),
-        ("2pi", "write a number, or an expression"),
-        ("2**3", "write a number, or an expression with [+] - [*] /, parentheses"),
-        ("7//2", "write a number, or an expression with [+] - [*] /, parentheses"),
-        ("pi(2)", "write a number, or an expression with [+] - [*] /, parentheses"),
-        ("ten", "unknown word 'ten'; write a number, or .* pi"),
-        ("1j", "expected an operator, found 'j'"),
-        ("1 if 2 else 3", "expected an operator, found 'if'"),
-        ("__import__('os')", "unexpected character"),
-        ("5 # comment", "unexpected character '#'; write a number"),
-        ("1; 2", "unexpected character ';'"),
-        ("90°", "unexpected character '°'; degrees are written as in `90 deg`"),
-        ("٣", "unexpected character '٣'"),
+        ("", "an expression may have [+] - [*] /, parentheses and pi .error at character"),
+        ("2 +", "ends after an operator; write e.g. pi/2"),
+        ("1 2", "an expression may have [+] - [*] /, parentheses and pi .error at character"),
+        ("(1", "an expression may have [+] - [*] /, parentheses and pi .error at character"),
+        ("1)+(2", "an expression may have [+] - [*] /, parentheses and pi .error at character"),
+        ("2pi", "an expression may have [+] - [*] /, parentheses and pi .error at character"),
+        ("2**3", "an expression may have [+] - [*] /, parentheses and pi"),
+        ("7//2", "an expression may have [+] - [*] /, parentheses and pi"),
+        ("pi(2)", "an expression may have [+] - [*] /, parentheses and pi"),
+        ("ten", "^expected a number in rad, found 'ten'$"),
+        ("1j", "error at character 2"),
+        ("1 if 2 else 3", "error at character 3"),
+        ("__import__('os')", "error at character 12"),
+        ("5 # comment", "error at character 3"),
+        ("1; 2", "error at character 2"),
+        ("90°", "degrees are written as in `90 deg`"),
+        ("٣", "error at character 1"),
         ("1" * 201, "longer than 200 characters"),
     ],
 )

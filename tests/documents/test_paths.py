@@ -48,7 +48,7 @@ def test_find(path: str, found: Any) -> None:
     ("path", "message"),
     [
         ("joint", "there is no 'joint'; did you mean 'joints'?"),
-        ("joints.2", "joints has no '2'; valid: a, b, 0, 1"),
+        ("joints.2", "joints has no '2'; valid: a, b or 0 to 1"),
         ("joints.0.y", "joints.0 has no 'y'; valid: name, x"),
         ("joints.*.nam", "joints.0 has no 'nam'; did you mean 'name'?"),
         ("n.0", "n has no '0'; it is a single value"),
@@ -136,7 +136,7 @@ def test_units_follow_the_joint_and_the_gear() -> None:
     robot = load_robot(REPOSITORY / "robots" / "rp_2.yaml")
     names = {joint.type: joint.name for joint in robot.joints}
     assert replace(robot, f"joints.{names['revolute']}.limits.position.1", "90 deg")
-    message = f"joints.{names['prismatic']}.limits.position.1: expected a number in m, found '90 deg'"
+    message = f"joints.{names['prismatic']}.limits.position.1: '90 deg' is an angle; expected a number in m"
     with pytest.raises(InputError, match=f"^{re.escape(message)}"):
         replace(robot, f"joints.{names['prismatic']}.limits.position.1", "90 deg")
 
@@ -155,7 +155,7 @@ def test_values_per_joint() -> None:
     assert replace(MOVE, "points.*.right", 3, MEMBERS).points == ((0, 3), (1, 3), (2, 3))
     assert replace(MOVE, "points.0", {"left": 7, "right": 8}, MEMBERS).points[0] == (7, 8)
     assert replace(MOVE, "times.2", 4).times == (0, 1, 4)
-    with pytest.raises(InputError, match=r"^points\.1\.right: expected a number in m, found '180 deg'"):
+    with pytest.raises(InputError, match=r"^points\.1\.right: '180 deg' is an angle; expected a number in m"):
         replace(MOVE, "points.1.right", "180 deg", MEMBERS)
 
 
@@ -164,10 +164,10 @@ def test_values_per_joint() -> None:
     [
         ("joint", 1, "there is no 'joint'; did you mean 'joints'?"),
         ("joints.elbw.damping", 1, "joints has no 'elbw'; did you mean 'elbow'?"),
-        ("joints.3", 1, "joints has no '3'; valid: base, shoulder, elbow, 0, 1, 2"),
+        ("joints.3", 1, "joints has no '3'; valid: base, shoulder, elbow or 0 to 2"),
         ("joints.elbow.link.mas", 1, "joints.elbow.link has no 'mas'; did you mean 'mass'?"),
         ("joints.elbow.link.mass.0", 1, "joints.elbow.link.mass has no '0'; it is a single value"),
-        ("gravity.z", 1, "gravity has no 'z'; valid: 0, 1, 2"),
+        ("gravity.z", 1, "gravity has no 'z'; valid: 0 to 2"),
         (
             "joints.elbow.actuator.spring.kc",
             1,
@@ -176,32 +176,34 @@ def test_values_per_joint() -> None:
         (
             "joints.elbow.actuator.type",
             "rigid",
-            "joints.elbow.actuator.type: determines the other keys; replace joints.elbow.actuator as a whole",
+            "joints.elbow.actuator.type: the type cannot be changed alone, since each type has other keys; "
+            "give the whole mapping, 'joints.elbow.actuator={type: rigid, ...}'",
         ),
-        ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1"),
+        ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1 kg"),
         ("joints.elbow.link.mass", "x", "joints.elbow.link.mass: expected a number in kg, found 'x'"),
         ("joints.elbow.link.mass", None, "joints.elbow.link.mass: expected a number in kg, found nothing"),
         ("joints.elbow.link.mass", True, "joints.elbow.link.mass: expected a number in kg, found 'true'"),
         ("joints.elbow.link.mass", math.inf, "joints.elbow.link.mass: expected a number in kg, found 'inf'"),
+        ("joints.elbow.link", 1, "joints.elbow.link is a mapping; set one of its keys: mass, com, inertia"),
         ("joints.elbow.name", "a b", "joints.elbow.name: must be made of letters"),
-        ("joints.elbow.name", "base", "joints.2.name: 'base' is taken by another entry; each needs its own"),
-        ("joints.0.actuator.branch", "up", "joints.0.actuator.branch: unknown word 'up'; valid: positive"),
+        ("joints.elbow.name", "base", "joints.2.name: 'base' is already used by entry 0; choose another one"),
+        ("joints.0.actuator.branch", "up", "joints.base.actuator.branch: unknown word 'up'; valid: positive"),
         (
             "joints.0.actuator.spring",
             {"type": "cubic", "k": 1, "kc": 2},
-            "joints.0.actuator.spring: unknown key 'kc'; did you mean 'k_c'?",
+            "joints.base.actuator.spring: unknown key 'kc'; did you mean 'k_c'?",
         ),
         (
             "joints.0.actuator.spring.*.k_c",
             0,
-            "joints.0.actuator.spring.k_c: must be positive, not 0",
+            "joints.base.actuator.spring.k_c: must be positive, not 0 N m/rad^3",
         ),
         (
             "joints.0.limits.position",
             [1, -1],
-            "joints.0.limits.position: the lower bound 1 exceeds",
+            "joints.base.limits.position: the lower limit 1 rad exceeds the upper limit -1 rad; swap them",
         ),
-        ("joints.*.link.inertia.xy", 9, "joints.0.link.inertia: the tensor has the negative eigenvalue"),
+        ("joints.*.link.inertia.xy", 9, "joints.base.link.inertia: the tensor has the negative eigenvalue"),
     ],
 )
 def test_what_cannot_be_replaced(path: str, value: Any, message: str) -> None:
@@ -215,5 +217,7 @@ def test_nothing_is_found_in_what_is_not_there() -> None:
 
 
 def test_every_problem_of_a_value_is_told() -> None:
-    with pytest.raises(InputError, match=r"(?s)^joints\.0\.link: com: expected.*joints\.0\.link: mass: must"):
+    with pytest.raises(
+        InputError, match=r"(?s)^joints\.base\.link: com: expected.*joints\.base\.link: mass: must"
+    ):
         replace(ROBOT, "joints.0.link", {"mass": -1, "com": [1, 2], "inertia": {"xx": 1, "yy": 1, "zz": 1}})

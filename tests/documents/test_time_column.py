@@ -122,8 +122,12 @@ def test_a_table_of_times_alone(tmp_path: Path) -> None:
             "2024-05-01T22:30:02,2",
             r"log.csv:3: expected a time as in the rows above, found '2024",
         ),
-        ("22:30:01,1", "22:30:02", r"log.csv:3: expected 2 values as in the header, found 1"),
-        ("22:30:01,x", "22:30:02,1", r"log.csv:2: column 'b': expected a finite number, found 'x'"),
+        (
+            "22:30:01,1",
+            "22:30:02",
+            r"log.csv:3: expected 2 values, one for each column of the header, found 1",
+        ),
+        ("22:30:01,x", "22:30:02,1", r"log.csv:2: column 'b': expected a number, found 'x'"),
     ],
 )
 def test_what_is_wrong_with_them_is_told_with_its_line(

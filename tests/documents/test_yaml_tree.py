@@ -63,8 +63,8 @@ def test_windows_line_ends_and_byte_order_mark_free_text():
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("a: 1\nb: 2\na: 3\n", "file.yaml:3: duplicate key 'a'; it stands on line 1 already"),
-        ("a: 1\n'a': 3\n", "file.yaml:2: duplicate key 'a'; it stands on line 1 already"),
+        ("a: 1\nb: 2\na: 3\n", "file.yaml:3: duplicate key 'a'; it is already on line 1"),
+        ("a: 1\n'a': 3\n", "file.yaml:2: duplicate key 'a'; it is already on line 1"),
         (
             "x: &d {a: 1}\ny:\n  <<: *d\n",
             "file.yaml:3: merge keys (<<) are not allowed; write the entries out",
@@ -79,10 +79,14 @@ def test_windows_line_ends_and_byte_order_mark_free_text():
             "file.yaml:1: the tag '!!python/object/apply:os.system'",
         ),
         ("a: 1\n---\nb: 2\n", "file.yaml:2: a second document begins here; a file holds exactly one"),
-        ("a: *x\n", "file.yaml:1: the alias *x has no complete anchor &x before it"),
-        ("a: &x [1, *x]\n", "file.yaml:1: the alias *x has no complete anchor &x before it"),
+        ("a: *x\n", "file.yaml:1: the alias *x has no anchor; write &x before a value above"),
+        (
+            "a: &spring 1\nb: *sprng\n",
+            "file.yaml:2: the alias *sprng has no anchor; did you mean *spring (line 1)?",
+        ),
+        ("a: &x [1, *x]\n", "file.yaml:1: the alias *x is inside the value of its own anchor &x"),
         ("a: 1\n? [b, c]\n: 2\n", "file.yaml:2: a key must be a word, found a list of 2"),
-        ("# only\n# comments\n", "file.yaml:1: the file holds no values, only comments"),
+        ("# only\n# comments\n", "file.yaml:1: has only comments, no values"),
         ("a: [1, 2\n\nb: 3\n", "file.yaml:3: not valid YAML at column 2: "),
         ("a: [1, 2\nc, 3\n\n", "file.yaml:2: not valid YAML: did not find expected ',' or ']'"),
         ("a: b: c\n", "file.yaml:1: not valid YAML at column 5: mapping values are not allowed"),

@@ -155,9 +155,9 @@ def test_more_columns_than_are_read_at_a_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("stamp,a\n0,1\n1,2,3\n", "log.csv:3: expected 2 values as in the header, found 3"),
-        ("stamp,a\n", "there are no rows below the header"),
-        ("", "found nothing"),
+        ("stamp,a\n0,1\n1,2,3\n", "log.csv:3: expected 2 values, one for each column of the header, found 3"),
+        ("stamp,a\n", "has a header but no rows of values"),
+        ("", "log.csv: is empty; expected a header line with column names such as time, base.q"),
     ],
 )
 def test_what_is_no_table(vsacli: Command, tmp_path: Path, content: str, sentence: str) -> None:

@@ -163,7 +163,7 @@ def test_a_trajectory_fits_one_of_the_robots_or_none(vsacli: Any, tmp_path: Path
     edited(REST_TO_REST, tmp_path / "move.yaml", ("end: [", "end: [0, "))
     done = vsacli("validate", ROBOT, slide, "move.yaml")
     assert done.code == 2
-    assert "end: expected 3 numbers, one for each joint, found a list of 4" in done.out
+    assert "end: expected 3 values, one for each joint (base, shoulder, elbow), found 4" in done.out
     assert f"move.yaml: fits none of the 2 robots; the problems above are those with {ROBOT}\n" in done.out
 
 
@@ -259,7 +259,10 @@ def test_a_placeholder_has_the_joints_of_a_table(tmp_path: Path) -> None:
 
 
 def test_what_does_not_fit_any_robot_is_found_without_one(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"end: expected 3 numbers, one for each joint, found a list of 2"):
+    with pytest.raises(
+        InputError,
+        match=r"end: expected 3 values, one for each joint .*, found 2; is the file for another robot",
+    ):
         joints_of(
             "position: {type: polynomial, degree: 7, start: [1, 2, 3], end: [1, 2]}", tmp_path / "m.yaml"
         )
@@ -274,7 +277,7 @@ def test_a_catalog_is_recognized_by_its_columns(vsacli: Any, tmp_path: Path) -> 
     assert recognize("motors.csv") is FileKind.CATALOG
     assert vsacli("validate", "motors.csv").out == "motors.csv: ok, catalog of 2 motors\n"
     (tmp_path / "bad.csv").write_text("name,inertia,max_torque\na,0,2\n")
-    assert vsacli("validate", "bad.csv").out == "bad.csv:2: inertia: must be positive, not 0\n"
+    assert vsacli("validate", "bad.csv").out == "bad.csv:2: inertia: must be positive, not 0 kg m^2\n"
     refused = vsacli("invdyn", ROBOT, "motors.csv")
     assert (refused.code, refused.err.startswith("motors.csv: is a motor catalog, but TRAJECTORY")) == (
         2,

@@ -138,8 +138,14 @@ A_RIGID = "its actuator is rigid and has no stiffness"
         ),
         ("[null, null, null]", ["value: expected a number in N m/rad, found nothing"]),
         ("{b: null}", ["value: no value for c; each joint needs one"]),
-        ("[900]", ["value: expected 3 numbers, one for each joint, found a list of 1"]),
-        ("[null, null, -900]", ["value of joint c: must be positive, not -900"]),
+        (
+            "[900]",
+            [
+                "value: expected 3 values, one for each joint (a, b, c), found 1; "
+                "is the file for another robot?"
+            ],
+        ),
+        ("[null, null, -900]", ["value of joint c: must be positive, not -900 N m/rad"]),
     ],
 )
 def test_other_joints_take_none(value: str, expected: list[str]) -> None:

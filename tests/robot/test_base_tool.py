@@ -165,9 +165,9 @@ def test_without_them_they_are_the_identity(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("line", "problem"),
     [
-        ("base: {rpy: [1, 2]}", "3: rpy: expected 3 numbers, found 2"),
-        ("tool: {xyz: [1, 2, 3, 4]}", "3: xyz: expected 3 numbers, found 4"),
-        ("tool: {xyz: [90 deg, 0, 0]}", "3: xyz: expected a number in m, found '90 deg'"),
+        ("base: {rpy: [1, 2]}", "3: rpy: expected 3 numbers in rad, found 2"),
+        ("tool: {xyz: [1, 2, 3, 4]}", "3: xyz: expected 3 numbers in m, found 4"),
+        ("tool: {xyz: [90 deg, 0, 0]}", "3: xyz: '90 deg' is an angle; expected a number in m"),
         ("base: {rpy: [1, 2, .inf]}", "3: rpy: expected a number in rad, found '.inf'"),
         ("base: {rpi: [1, 2, 3]}", "3: unknown key 'rpi'; did you mean 'rpy'?"),
         ("tool: 3", "3: tool: expected a mapping, found '3'"),

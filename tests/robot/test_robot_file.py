@@ -135,13 +135,17 @@ def test_a_spring_shared_by_an_alias(load):
         (
             "      mass: 2\n",
             "      mass: 2\n      mass: 3\n",
-            "10: duplicate key 'mass'; it stands on line 9",
+            "10: duplicate key 'mass'; it is already on line 9",
         ),
         # words
         ("name: rig", "name: on", "2: name: expected a text, found 'on', a boolean in YAML"),
         ("name: rig", "name:", "2: name: expected a text, found nothing"),
         ("name: slide", "name: a b", "18: name: must be made of letters, digits, _ and -"),
-        ("name: slide", "name: swing", "18: joints.name: 'swing' is taken by another entry"),
+        (
+            "name: slide",
+            "name: swing",
+            "18: joints.name: 'swing' is already used in line 5; choose another one",
+        ),
         ("type: revolute", "type: rotary", "6: type: unknown word 'rotary'; valid: revolute, prismatic"),
         ("branch: negative", "branch: {}", "26: branch: expected one of positive, negative"),
         (
@@ -151,31 +155,43 @@ def test_a_spring_shared_by_an_alias(load):
         ),
         ("type: cubic, k: 400", "type: cubik, k: 400", "16: spring.type: unknown word 'cubik'; did you mean"),
         # numbers
-        ("mass: 2", "mass: on", "9: mass: expected a number in kg, found 'on': YAML takes this"),
+        ("mass: 2", "mass: on", "9: mass: expected a number in kg, found 'on'; YAML reads this"),
         ("mass: 2", "mass: 'on'", "9: mass: expected a number in kg, found 'on'"),
         ("mass: 2", "mass:", "9: mass: expected a number in kg, found nothing"),
-        ("mass: 2", "mass: .nan", "9: mass: expected a number in kg, found '.nan': only finite"),
-        ("mass: 2", "mass: .inf", "9: mass: expected a number in kg, found '.inf': only finite"),
-        ("mass: 2", "mass: 1:30", "9: mass: expected a number in kg, found '1:30': base 60 is not read"),
-        ("mass: 2", "mass: 010", "9: mass: expected a number in kg, found '010': a leading zero"),
+        ("mass: 2", "mass: .nan", "9: mass: expected a number in kg, found '.nan'; only finite"),
+        ("mass: 2", "mass: .inf", "9: mass: expected a number in kg, found '.inf'; only finite"),
+        ("mass: 2", "mass: 1:30", "9: mass: expected a number in kg, found '1:30'; base 60 is not read"),
+        (
+            "mass: 2",
+            "mass: 010",
+            "9: mass: expected a number in kg, found '010'; write the number without a leading zero",
+        ),
         ("mass: 2", "mass: [2]", "9: mass: expected a number in kg, found a list of 1"),
         ("mass: 2", "mass: -2", "9: mass: must be zero or positive, not -2"),
         ("inertia: 3.2", "inertia: 0", "15: inertia: must be positive, not 0"),
         ("k: 400", "k: -400", "16: k: must be positive, not -400"),
         ("k: 400", "k: 1e300", "16: k: must be at most 1e+30 in size, not 1e+300"),
         ("inertia: 3.2", "inertia: 1e-40", "15: inertia: must be at least 1e-30 in size, not 1e-40"),
-        ("a: 0.2", "a: 10 deg", "7: a: expected a number in m, found '10 deg': degrees are"),
+        ("a: 0.2", "a: 10 deg", "7: a: '10 deg' is an angle; expected a number in m"),
         # vectors, tensors, intervals
-        ("[0.1, 0, 0]", "[0.1, 0]", "10: com: expected 3 numbers, found 2"),
-        ("[0.1, 0, 0]", "0.1", "10: com: expected a list of 3 numbers, found '0.1'"),
+        ("[0.1, 0, 0]", "[0.1, 0]", "10: com: expected 3 numbers in m, found 2"),
+        ("[0.1, 0, 0]", "0.1", "10: com: expected a list of 3 numbers in m, found '0.1'"),
         ("yy: 0.2", "yy: -0.2", "11: inertia: the tensor has the negative eigenvalue -0.2 kg m^2"),
         ("yz: -0.01", "yz: -0.2", "21: inertia: the tensor has the negative eigenvalue -0.1 kg m^2"),
-        ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower bound 1.5708 exceeds"),
+        ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower limit 1.5708 rad exceeds"),
         ("[-pi, 90 deg]", "[-pi, 1e31]", "17: position: must be at most 1e+30 in size, not 1e+31"),
         ("[-pi, 90 deg]", "[1, 2, 3]", "17: position: expected [lower, upper] or one number"),
-        ("velocity: 3", "velocity: -3", "17: velocity: the lower bound 3 exceeds the upper bound -3"),
+        (
+            "velocity: 3",
+            "velocity: -3",
+            "17: velocity: the lower limit 3 rad/s exceeds the upper limit -3 rad/s",
+        ),
         # nesting
-        ("link: {mass: 1,", "link: 3\n    links: {mass: 1,", "21: link: expected a mapping, found '3'"),
+        (
+            "link: {mass: 1,",
+            "link: 3\n    links: {mass: 1,",
+            "21: link: expected a mapping with the keys mass, com, inertia, found '3'",
+        ),
         (
             "motor: [{inertia: 10}, ",
             "motor: [{inertia: 10}, {inertia: 10}, ",
@@ -202,13 +218,15 @@ def test_one_mistake_is_one_line(problems):
 
 @pytest.mark.parametrize("joints", ["", " []", " {a: 1}", " 3"])
 def test_joints_are_a_list_of_one_or_more(load, joints):
-    with pytest.raises(InputError, match=r"^rig.yaml:2: joints: expected a list of one or more, found"):
+    with pytest.raises(
+        InputError, match=r"^rig.yaml:2: joints: expected a list with at least one entry, found"
+    ):
         load("format: vsacli-robot/1\njoints:" + joints + "\nname: rig\n")
 
 
 @pytest.mark.parametrize("text", ["[1, 2]", "word"])
 def test_a_document_is_a_mapping(load, text):
-    with pytest.raises(InputError, match=r"^rig.yaml:1: expected a mapping that begins with `format: "):
+    with pytest.raises(InputError, match=r"^rig.yaml:1: expected a YAML file that begins with `format: "):
         load(text)
 
 
@@ -218,7 +236,7 @@ def test_degrees_follow_the_type_of_the_joint(load, field, value):
     revolute = TEXT[: TEXT.index("    limits")] + limits
     assert getattr(load(revolute).joints[0].limits, field) == (-math.pi / 2, math.pi / 2)
     with pytest.raises(
-        InputError, match=rf"^rig.yaml:27: {field}: expected a number in m.*degrees are for angles only"
+        InputError, match=rf"^rig.yaml:27: {field}: '90 deg' is an angle; expected a number in m"
     ):
         load(TEXT + limits)
 
@@ -242,7 +260,7 @@ def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
     text = TEXT.replace("spring: {type: cubic, k: 400", "spring: &s {type: cubic, k: 0")
     with pytest.raises(InputError) as caught:
         load(re.sub(r"spring: \[.*\]", "spring: *s", text))
-    assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0"
+    assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0 N m/rad"
 
 
 def test_implausible_physics_is_a_warning(load):

@@ -157,11 +157,14 @@ TABLES = {
         rows().replace("\n", ",1\n").replace("torque,1", "torque,extra"),
         "1: expected the header deflection,torque",
     ),
-    "no header": ("\n".join(ROWS), "1: expected a header line with the names of the columns, found numbers"),
-    "no rows": ("deflection,torque\n", ": there are no rows below the header"),
-    "text": (rows(row_3="-0.2,low"), "5: column 'torque': expected a finite number, found 'low'"),
-    "ragged": (rows(row_3="-0.2"), "5: expected 2 values as in the header, found 1"),
-    "NaN": (rows(row_3="-0.2,nan"), "5: column 'torque': expected a finite number, found 'nan'"),
+    "no header": (
+        "\n".join(ROWS),
+        "1: expected a header line with column names such as time, base.q, found numbers",
+    ),
+    "no rows": ("deflection,torque\n", ": has a header but no rows of values"),
+    "text": (rows(row_3="-0.2,low"), "5: column 'torque': expected a number, found 'low'"),
+    "ragged": (rows(row_3="-0.2"), "5: expected 2 values, one for each column of the header, found 1"),
+    "NaN": (rows(row_3="-0.2,nan"), "5: column 'torque': expected a number, found 'nan'"),
 }
 
 

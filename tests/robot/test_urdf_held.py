@@ -121,9 +121,9 @@ def test_a_joint_whose_leader_is_missing_stands_as_if_that_stood_at_zero(urdf):
         ({"wrist": 0}, "'wrist' belongs to the chain, where it moves"),
         ({"bend": 0}, "'bend' follows 'left' (<mimic>); hold that one"),
         ({"drawer": 0}, "'drawer' is neither outside the chain nor below its base, so that it has no effect"),
-        ({"left": "1 deg"}, "expected a number in m, found '1 deg': degrees are for angles only"),
-        ({"left": "a"}, "expected a number in m, found 'a': unknown word 'a'"),
-        ({"left": math.nan}, "expected a number in m, found 'nan': only finite numbers can be used"),
+        ({"left": "1 deg"}, "'1 deg' is an angle; expected a number in m"),
+        ({"left": "a"}, "expected a number in m, found 'a'"),
+        ({"left": math.nan}, "expected a number in m, found 'nan'; only finite numbers can be used"),
         ({"left": True}, "expected a number in m, found 'True'"),
     ],
 )

@@ -31,7 +31,7 @@ FILES = {
     "not closed": ("<robot>\n<link>", ["2: not valid XML at column 7: no element found"]),
     "binary": ("\0\1\2\3", ["1: not valid XML at column 1: not well-formed (invalid token)"]),
     "text": ("hello", ["1: not valid XML at column 1: syntax error"]),
-    "YAML": ("format: vsacli-robot/1", [": is a YAML file, expected a URDF (XML)"]),
+    "YAML": ("format: vsacli-robot/1", [": is a robot, but URDF must be a URDF file"]),
     "other XML": ("<mujoco/>", ["1: expected a URDF, which begins with <robot>, found <mujoco>"]),
     "xacro": (
         '<robot>\n<xacro:arm name="x"/></robot>',
@@ -165,7 +165,7 @@ def test_a_huge_file_is_refused_without_being_read(vsacli, tmp_path):
 
 def test_what_is_not_utf8(vsacli, tmp_path):
     (tmp_path / "arm.urdf").write_bytes(b'<?xml version="1.0" encoding="latin-1"?>\n<robot name="\xe9"/>')
-    refused(vsacli("import-urdf", "arm.urdf"), ["2: the file is not UTF-8 text"])
+    refused(vsacli("import-urdf", "arm.urdf"), ["2: byte 0xe9 is not valid UTF-8"])
 
 
 @pytest.mark.parametrize(

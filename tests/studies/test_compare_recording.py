@@ -309,7 +309,7 @@ BAD = {
         [],
     ),
     "has 1 row; a recording needs at least 2": ("time,base.q\n0,1\n", []),
-    "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
+    "[N] is a force, expected an angle in rad, deg or rev": ("time,base.q [N]\n0,1\n1,2\n", []),
     "columns 'base.q' and 'q1' are the same signal; keep one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
     "matches the result at no time offset; is it the recording of this motion": (STILL, []),
     "and does anything move?": (WILD, []),

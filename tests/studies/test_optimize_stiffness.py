@@ -190,7 +190,7 @@ def test_implausible_values_are_reported(vsacli):
         "optimize", ROBOT, REST_TO_REST, "--set", "joints.*.actuator.motor.max_torque=5", *implausible
     )
     assert done.code == 3
-    assert "\nwarning: joints.elbow.link.com.2 = 150 m is " in done.out
+    assert "\nwarning: joints.elbow.link.com.2 (z) = 150 m is " in done.out
 
 
 @pytest.mark.slow

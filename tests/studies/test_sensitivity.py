@@ -284,5 +284,5 @@ def test_steps_that_cannot_be_done_do_not_count(vsacli, tmp_path):
 def test_implausible_values_are_reported(vsacli, tmp_path):
     rest_to_rest(tmp_path / "coarse.yaml")
     done = vsacli("sensitivity", ROBOT, "coarse.yaml", "--set", "joints.elbow.link.com=[0,0,150]")
-    warning = "joints.elbow.link.com.2 = 150 m is "
+    warning = "joints.elbow.link.com.2 (z) = 150 m is "
     assert f"\nwarning: {warning}" in done.out

@@ -81,7 +81,7 @@ def test_durations_before_and_after(vsacli: Any, own_folder: Path) -> None:
     [
         ("optimize: {minimize: torqe}", "minimize: unknown word 'torqe'; did you mean 'torque'?"),
         ("optimize: {min_margin: 300 %}", "min_margin: must be above 0 and below 1"),
-        ("optimize: {min_margin: 3 N m}", "min_margin: expected a number, found '3 N m'"),
+        ("optimize: {min_margin: 3 N m}", "min_margin: '3 N m' has a unit; write the number alone"),
         ("optimize: {minimize: time, vary: stiffness}", "it is `timing` or `both` that varies"),
         ("optimize: torque", "optimize: expected a mapping"),
     ],

@@ -29,8 +29,14 @@ def robot(tmp_path: Path) -> Path:
     ("replaced", "message"),
     [
         (("[1, 5]", "[-1, 5]"), "range: must be [lower, upper] with 0 <= lower, such as [0, 5]"),
-        (("[1, 5]", "-5"), "range: the lower bound 0 exceeds the upper bound -5"),
-        (("[1, 5]", "[6, 5]"), "range: the lower bound 6 exceeds the upper bound 5"),
+        (
+            ("[1, 5]", "-5"),
+            "range: the lower limit 0 N m s/rad exceeds the upper limit -5 N m s/rad; swap them",
+        ),
+        (
+            ("[1, 5]", "[6, 5]"),
+            "range: the lower limit 6 N m s/rad exceeds the upper limit 5 N m s/rad; swap them",
+        ),
         (("location: link", "location: tip"), "location: unknown word 'tip'; valid: link"),
     ],
 )
@@ -63,7 +69,7 @@ def test_a_rigid_joint_has_no_damper(tmp_path: Path, vsacli: Callable[..., Any])
         ("{type: constant, value: {base: 2}}", "value: no value for shoulder; each joint needs one"),
         (
             "{type: polynomial, degree: 4, start: 1, end: 2}",
-            "the damping must be twice differentiable, so its rate must vanish at the ends",
+            "degree: must be odd, from 3 to 15 (its rate must vanish at both ends), not 4",
         ),
     ],
 )

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("own_folder")
 CASES = {
     "a point of another length": (
         LASTING + VIA.replace("[1, 0.1]", "[1, 0.1, 2]") + FIRM,
-        "8: points: expected 2 numbers, one for each joint, found a list of 3",
+        "8: points: expected 2 values, one for each joint (arm, slide), found 3; is the file for another",
     ),
     "an unknown joint": (
         LASTING + VIA.replace("slide", "slid") + FIRM,
@@ -37,7 +37,7 @@ CASES = {
     ),
     "degrees for a length": (
         LASTING + VIA.replace("slide: 0.2", "slide: 2 deg") + FIRM,
-        "8: points: expected a number in m, found '2 deg'",
+        "8: points: '2 deg' is an angle; expected a number in m",
     ),
     "no list of points": (
         LASTING + VIA.replace("[0, {", "{").replace(", [1, 0.1]]", "") + FIRM,
@@ -106,7 +106,7 @@ CASES = {
     "no amplitudes": (LASTING + SINUSOIDS + FIRM, "5: position: missing key 'sine' or 'cosine' (amplitudes)"),
     "amplitudes that are no list": (
         LASTING + SINUSOIDS + "  sine: 1\n" + FIRM,
-        "9: sine: expected a list of one or more, found '1'",
+        "9: sine: expected a list with at least one entry, found '1'",
     ),
     "no frequency": (
         LASTING + SINUSOIDS.replace("0.5", "0") + "  sine: [1]\n" + FIRM,
@@ -172,7 +172,7 @@ CASES = {
     ),
     "no parts": (
         HEAD + "position: {type: sequence, parts: []}\n" + FIRM,
-        "3: parts: expected a list of one or more",
+        "3: parts: expected a list with at least one entry",
     ),
     "a part without duration": (
         HEAD + SEQUENCE + GO + "  - {type: via, degree: 9, points: [[1, 0.2], 0]}\n" + FIRM,
@@ -228,7 +228,7 @@ CASES = {
     ),
     "a wrench of other than six numbers": (
         LASTING + STANDING + FIRM + PUSH.replace(", 6]", "]") + "  times: [1]\n  transition: 1\n",
-        "11: levels: expected 6 numbers, found 5",
+        "11: levels: expected 6 numbers in N (forces), N m (moments), found 5",
     ),
     "a polynomial of no duration": (
         HEAD + "duration: 1e-300\nposition: {type: polynomial, degree: 7, start: 0, end: 1}\n" + FIRM,

@@ -83,7 +83,7 @@ PROBLEMS = {
     "unknown target": (
         "time,a,b",
         "{shoulder.q: a, elbw.q: b}",
-        ["motion.yaml:6: columns: 'elbw.q' is not known here; did you mean 'elbow.q'?"],
+        ["motion.yaml:6: columns: unknown name 'elbw.q'; did you mean 'elbow.q'?"],
     ),
     "repeated": (
         "time,a,a",
@@ -93,7 +93,7 @@ PROBLEMS = {
     "taken": (
         "time,a,b",
         "{shoulder.q: a, elbow.q: a}",
-        ["columns: 'a' stands for shoulder.q already"],
+        ["columns: 'a' is already mapped to shoulder.q"],
     ),
     "its own": (
         "time,shoulder.q,a,elbow.q",
@@ -119,7 +119,7 @@ PROBLEMS = {
     "wrong unit": (
         "time,a,b",
         "{shoulder.q: {column: a, unit: mm}, elbow.q: b}",
-        ["log.csv:1: column 'shoulder.q': the unit [mm] is one of something else"],
+        ["log.csv:1: column 'shoulder.q': [mm] is a length, expected an angle in rad, deg or rev"],
     ),
     "no header": (
         "0,1,2",
@@ -175,7 +175,9 @@ def test_rows_with_another_number_of_cells_are_refused_though_columns_are_left_o
     rows = [f"{i / 100},x,0.1,{i / 10}" for i in range(20)]
     rows[5], rows[6] = "0.05,x,y,0.1,0.5", "0.06,0.1,0.6"  # as many separators in all as there should be
     columns = "{time: t, shoulder.q: a, elbow.q: b}"
-    with pytest.raises(InputError, match=r"log.csv:7: expected 4 values as in the header, found 5"):
+    with pytest.raises(
+        InputError, match=r"log.csv:7: expected 4 values, one for each column of the header, found 5"
+    ):
         loaded(tmp_path, "t,note,a,b\n" + "\n".join(rows), columns, "rest")
 
 
@@ -197,7 +199,9 @@ stiffness:
         load_trajectory(path, ROBOT).block(3, 4).of_joints["stiffness"], [[90.3, 100]]
     )
     path.write_text(text % "time: a, ")
-    with pytest.raises(InputError, match=r"motion.yaml:7: columns: time is another column of the same file"):
+    with pytest.raises(
+        InputError, match=r"motion.yaml:7: columns: time is mapped to another column of the same file"
+    ):
         load_trajectory(path, ROBOT)
 
 

@@ -43,8 +43,9 @@ def loaded(tmp_path):
 def named(slip: Slip, problem: Problem) -> bool:
     """Whether a warning is the one of the rule, on the field."""
     words = re.split(r"\{\w+\}", RULES[slip.rule].finding)
+    component = "( .(x|y|z|lower|upper).)?" if re.search(r"\.\d$", slip.field) else ""
     found = ".*".join(map(re.escape, words))
-    return bool(re.search(rf"^\S*{slip.field}( = .*)? {found}; ", problem.message))
+    return bool(re.search(rf"^\S*{slip.field}{component}( = .*)? {found}; ", problem.message))
 
 
 @pytest.mark.parametrize("slip", EVERY, ids=lambda slip: slip.what)

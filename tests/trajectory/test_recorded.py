@@ -255,4 +255,6 @@ def test_files_with_different_numbers_of_rows_are_refused(csv):
 def test_problems_of_the_table_come_through(tmp_path):
     path = Path(tmp_path / "motion.csv")
     path.write_text("time,base.q,elbow.q\n0,1,2\n1,nan,2\n")
-    assert problems(path) == [(3, "column 'base.q': expected a finite number, found 'nan'")]
+    assert problems(path) == [
+        (3, "column 'base.q': expected a number, found 'nan'; delete the row, or fill in the value")
+    ]

@@ -95,16 +95,25 @@ def test_all_units_that_do_not_fit_are_named_with_the_line():
     with pytest.raises(InputError) as caught:
         recorded_trajectory("m.csv", JOINTS)
     found = [str(problem) for problem in caught.value.problems]
-    assert found[0].startswith(
-        "m.csv:1: column 'time': the unit [h] is not understood; expected s or the like"
-    )
-    assert found[1:3] == [
-        "m.csv:1: column 'arm.q': the unit [m] is one of something else; expected rad or the like",
-        "m.csv:1: column 'arm.stiffness': the unit [N/m] is one of something else;"
-        " expected N m/rad or the like",
+    assert found == [
+        "m.csv:1: column 'time': unknown unit [h]; expected a time in s, ms, us, ns or min",
+        "m.csv:1: column 'arm.q': [m] is a length, expected an angle in rad, deg or rev",
+        "m.csv:1: column 'arm.stiffness': [N/m] is a linear stiffness, expected a rotational stiffness in "
+        "N m/rad",
+        "m.csv:1: column 'slide.stiffness': unknown unit []; expected a linear stiffness in N/m",
     ]
-    assert found[3].startswith("m.csv:1: column 'slide.stiffness': the unit [] is not understood")
-    assert len(found) == 4
+
+
+def test_columns_with_the_same_wrong_unit_share_a_message():
+    header = ["time", "arm.q[V]", "slide.q", "arm.stiffness[V]", "slide.stiffness[A]"]
+    write("m.csv", header, TIME, motion(), stiffness())
+    with pytest.raises(InputError) as caught:
+        recorded_trajectory("m.csv", JOINTS)
+    assert [str(problem) for problem in caught.value.problems] == [
+        "m.csv:1: column 'arm.q': [V] is a voltage, expected an angle in rad, deg or rev",
+        "m.csv:1: column 'arm.stiffness': [V] is a voltage, expected a rotational stiffness in N m/rad",
+        "m.csv:1: column 'slide.stiffness': [A] is a current, expected a linear stiffness in N/m",
+    ]
 
 
 def test_a_column_with_two_units_appears_twice():

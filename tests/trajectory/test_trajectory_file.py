@@ -194,18 +194,26 @@ def test_a_bare_table_without_stiffness(robot):
         (
             "start: 0\n",
             "start: 90 deg\n",
-            "8: start: expected a number in m, found '90 deg': degrees are for",
+            "8: start: '90 deg' is an angle; expected a number in m",
         ),
         (
             "{slide: 0.2, arm: 60 deg}",
             "{slide: 60 deg, arm: 0}",
-            "9: end: expected a number in m, found '60 deg'",
+            "9: end: '60 deg' is an angle; expected a number in m",
         ),
         ("{slide: 0.2, arm: 60 deg}", "{slide: 0.2}", "9: end: no value for arm; each joint needs one"),
         ("slide: 0.2", "slid: 0.2", "9: end: no joint is called 'slid'; did you mean 'slide'?"),
-        ("[900, 9000]", "[900]", "13: start: expected 2 numbers, one for each joint, found a list of 1"),
-        ("[900, 9000]", "[900, 9000, 1]", "13: start: expected 2 numbers, one for each joint, found a list"),
-        ("[900, 9000]", "[900, -9000]", "13: start of joint slide: must be positive, not -9000"),
+        (
+            "[900, 9000]",
+            "[900]",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 1; is the file for",
+        ),
+        (
+            "[900, 9000]",
+            "[900, 9000, 1]",
+            "13: start: expected 2 values, one for each joint (arm, slide), found 3; is the file for",
+        ),
+        ("[900, 9000]", "[900, -9000]", "13: start of joint slide: must be positive, not -9000 N/m"),
         ("[900, 9000]", "{arm: 0, slide: 9000}", "13: start of joint arm: must be positive, not 0"),
     ],
 )

@@ -116,11 +116,11 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
     [
         (
             "{frame: base, type: constant, value: [1, 2, 3]}",
-            "move.yaml:7: value: expected 6 numbers, found 3",
+            "move.yaml:7: value: expected 6 numbers in N (forces), N m (moments), found 3",
         ),
         (
             "{frame: base, type: constant, value: 5}",
-            "move.yaml:7: value: expected a list of 6 numbers, found '5'",
+            "move.yaml:7: value: expected a list of 6 numbers in N (forces), N m (moments), found '5'",
         ),
         (
             "{frame: base, type: constant, value: [a, 0, 0, 0, 0, 0]}",
@@ -144,7 +144,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
         ),
         (
             "{frame: base, type: polynomial, degree: 3, start: [0, 0], end: [0, 0, 0, 0, 0, 0]}",
-            "move.yaml:7: start: expected 6 numbers, found 2",
+            "move.yaml:7: start: expected 6 numbers in N (forces), N m (moments), found 2",
         ),
         (
             "[1, 2, 3, 4, 5, 6]",

@@ -124,6 +124,17 @@ def now_called(word: str, valid: Iterable[str]) -> str:
     return "" if new is None else f"; it is now {new!r}"
 
 
+def refuse_old_names(cls: type, base: type) -> None:
+    """Refuse a subclass that overrides an attribute by its name before, which would have no effect.
+
+    Raises:
+        TypeError: with the present name.
+    """
+    for each in RENAMINGS:
+        if each.kind == "Python name" and each.old in vars(cls) and base.__name__ in each.place:
+            raise TypeError(f"{cls.__name__}.{each.old} has no effect; it is now {each.new!r}")
+
+
 def _replaced(renaming: Renaming, word: str) -> str | None:
     """Return a word with its new name, e.g. of the column `elbow.tau_motor_actual_1`; None without one."""
     if word == renaming.old:

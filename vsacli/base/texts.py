@@ -53,6 +53,22 @@ def sentence(clause: str) -> str:
     return clause if clause.endswith(("?", ".")) else f"{clause}."
 
 
+def on_one_line(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    match value:
+        case Mapping():
+            return f"{{{', '.join(f'{key}: {on_one_line(entry)}' for key, entry in value.items())}}}"
+        case list() | tuple():
+            return f"[{', '.join(map(on_one_line, value))}]"
+        case bool():
+            return "true" if value else "false"
+        case None:
+            return "null"
+        case float():
+            return f"{value:.10g}"
+    return str(value)
+
+
 def counted(number: int, noun: str, several: str = "") -> str:
     """Return a number with its noun, in the plural unless it is 1; regular plurals need not be given."""
     return f"{number} {noun if number == 1 else several or noun + 's'}"

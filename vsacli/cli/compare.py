@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,13 +81,13 @@ def compare(
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         stem = f"{Path(result).stem}-{Path(recording).stem}"
         page = figures and figures.page(f"{stem}-comparison", outputs)
-        with ExitStack() as stack:
-            stack.enter_context(naming_kind("--columns", columns, ("columns",)))
-            stack.enter_context(naming_kind("RECORDING", recording, ("table",)))
-            with naming_kind("RESULT", result, ("result", "simulation")):
-                stored = stack.enter_context(open_stored(result))
+        with naming_kind("RESULT", result, ("result", "simulation")), open_stored(result) as stored:
             talk.detail(result_line(stored))
-            comparison = compared(stored, recording, time_offset, columns)
+            with (
+                naming_kind("RECORDING", recording, ("table",)),
+                naming_kind("--columns", columns, ("columns",)),
+            ):
+                comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
                 page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
         if page is None and figures is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -150,10 +149,10 @@ def identify(
         page = figures and figures.page(f"{Path(robot).stem}-identification", outputs)
         with naming_option("--fit"):
             check_fit(loaded, fit or WORDS, WORDS)
-        with ExitStack() as stack:
-            stack.enter_context(naming_kind("--columns", columns, ("columns",)))
-            for path in recordings:
-                stack.enter_context(naming_kind("RECORDING", path, ("table",)))
+        with (
+            naming_kind("RECORDING", recordings, ("table",)),
+            naming_kind("--columns", columns, ("columns",)),
+        ):
             progress = partial(talk.progress, shown_from=0, label="identifying")
             found = identified(loaded, recordings, fit or WORDS, bandwidth, columns, progress=progress)
         if file is not None:

@@ -13,7 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
-from vsacli.cli.input_errors import naming_kind
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import RATE
 
 
@@ -82,7 +82,7 @@ def info(
     else:
         from vsacli.files.info import describe_file
 
-        with naming_kind("--robot", robot, ("robot",)):
+        with naming_kind("--robot", robot, ("robot",)), naming_option("--rate"):
             description = describe_file(file, robot, talk.looking, rate)
         _show(description, as_json, field)
 
@@ -114,7 +114,8 @@ def _extract(file: str, folder: str, talk: Talk) -> None:
     from vsacli.documents.reading import written
     from vsacli.files.repetition import extract
 
-    found = extract(file)
+    with naming_kind("FILE", file, ("result", "simulation", "table of a study")):
+        found = extract(file)
     with Outputs(inputs=[file]) as outputs:
         for place, content in found.files.items():
             target = Path(folder) / place

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
 
-DRAWN = ("robot", "result", "simulation", "table of a study", "table")
+DRAWN = ("robot", "trajectory", "result", "simulation", "table of a study", "table")
 """Kinds of files of which figures are drawn, as in `FileKind`."""
 
 
@@ -120,7 +120,8 @@ def plot(
     shown = _Shown(joints or (), _span(start, end), variables)
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise click.UsageError(f"{twice} is given twice; give each result once")
-    with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
+    inputs = [*files, *filter(None, [robot])]
+    with naming_kind("FILE", files, DRAWN), Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         target = _Target(figures, outputs)
         if any(map(is_robot, files)):
             _check_robot(files, shown, robot, figures.file_format)
@@ -133,10 +134,7 @@ def plot(
                 "--robot is only for recordings; leave it out, results contain their robot"
             )
         else:
-            with ExitStack() as stack:
-                for file in files:
-                    stack.enter_context(naming_kind("FILE", file, DRAWN))
-                _draw_computed([Path(file) for file in files], shown, target, talk)
+            _draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
 
 

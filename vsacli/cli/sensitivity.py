@@ -26,7 +26,7 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
-from vsacli.cli.input_errors import naming_option
+from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SHARE, Whole
 
 if TYPE_CHECKING:
@@ -142,6 +142,7 @@ def _analyzed(
         steps = inputs.trajectory.samples + runs
         progress = stack.enter_context(talk.progress(steps, shown_from=SHOWN_FROM))
         stack.enter_context(naming_option("--tolerances"))  # all else has been checked
+        stack.enter_context(naming_kind("--tolerances", tolerances, ("tolerances",)))
         found = analyzed(
             run,
             tolerances,

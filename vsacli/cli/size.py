@@ -100,10 +100,8 @@ def size(
         if output is not None:
             outputs.check(output)
         samples = sum(motion.samples for motion in motions)
-        with (
-            naming_kind("--catalog", catalog, ("motor catalog",)),
-            talk.progress(samples) as progress,
-        ):
+        kind = naming_kind("--catalog", catalog, ("motor catalog",))
+        with kind, talk.progress(samples) as progress:
             found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
         if output is not None and found.lacking:
             talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")

@@ -129,7 +129,8 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
 
     if output is None:
         raise click.UsageError("--merge needs -o FILE, the table to write")
-    with Outputs(overwrite=overwrite, inputs=files) as outputs:
+    kinds = naming_kind("STUDY", files, ("table of a study",))
+    with kinds, Outputs(overwrite=overwrite, inputs=files) as outputs:
         merge(files, outputs.file(output), command_line=_command_line())
     with StoredStudy(output) as table:
         return _shown(table, as_json, talk)

@@ -136,7 +136,9 @@ class ColumnMapping:
             mine = self.columns.get(name, source)
             if dataclasses.replace(mine, place=source.place) != source:
                 file, line = source.place
-                raise InputError.one(f"columns: {name} is another column of the same file above", file, line)
+                raise InputError.one(
+                    f"columns: {name} is mapped to another column of the same file above", file, line
+                )
         rest = REST in (self.ignore, other.ignore)
         ignore = REST if rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
         return ColumnMapping({**self.columns, **other.columns}, ignore, self.rate or other.rate)
@@ -186,7 +188,7 @@ class _Choice:
         taken: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
             if self._known is not None and name not in self._known:
-                self._note(source, f"{name!r} is not known here{did_you_mean(name, self._known)}")
+                self._note(source, f"unknown name {name!r}{did_you_mean(name, self._known)}")
                 continue
             place = self._place(source.column, source)
             if place is None:
@@ -194,7 +196,7 @@ class _Choice:
             own = self._header.columns[place]
             unit = source.doubt(own)
             if place in taken:
-                self._note(source, f"{own or source.column!r} stands for {taken[place]} already")
+                self._note(source, f"{own or source.column!r} is already mapped to {taken[place]}")
             elif unit is not None:
                 self._note(source, _unit_advice(name, own, unit))
             else:

@@ -16,10 +16,11 @@ from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.units import DIMENSIONLESS, RATE
 from vsacli.documents import tree
 from vsacli.documents.column_mapping import AS_NAMED, REST, ColumnMapping, MappedColumn
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
 from vsacli.documents.field_kinds import Check, OwnKind, Refer, Schema, Text
 from vsacli.documents.fields import LARGEST, NON_ZERO, POSITIVE, check_fields, number, text, value
 from vsacli.documents.nested import read_record
+from vsacli.documents.number import evaluate
 from vsacli.documents.reading import read_document
 from vsacli.documents.time_column import TIME
 from vsacli.documents.tree import INVALID, Node, Scope

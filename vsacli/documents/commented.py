@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
+from vsacli.base.texts import on_one_line
 from vsacli.base.units import DIMENSIONLESS
 from vsacli.documents.field_kinds import (
     REQUIRED,
@@ -16,7 +17,6 @@ from vsacli.documents.field_kinds import (
     Interval,
     Kind,
     declared,
-    on_one_line,
     variant_inside,
 )
 from vsacli.documents.nested import Items, OneOf, Pair, Record

@@ -22,7 +22,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.storage import place_of
-from vsacli.documents.source import check_input_file
+from vsacli.base.texts import counted
+from vsacli.documents.source import check_input_file, recognizing_other_formats
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -49,6 +50,12 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _INDEX = re.compile(r"\d+")
 """Index in brackets, as in `position[2]`, which is not a unit."""
+HEADER = "expected a header line with column names such as time, base.q"
+"""Beginning of messages about a header."""
+
+_KEY = re.compile(r"format: +\S")
+"""Beginning of a YAML file of this program."""
+
 _QUOTED = re.compile(r'"[^"]*"')
 
 
@@ -83,7 +90,7 @@ def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> H
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with open(place_of(name), "rb") as content:
+        with recognizing_other_formats(name), open(place_of(name), "rb") as content:
             return header_of(content, name, strict=False, numbered=numbered)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
@@ -115,7 +122,7 @@ def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Se
     numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
     if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
         return Header(0, separator, ("",) * len(columns))
-    number = number if line else 1
+    number = number if line else 0
     found = _header_problems(line, columns, comment, strict)
     problems = [Problem(name, number, message) for message in found]
     if problems:
@@ -137,16 +144,20 @@ def is_number(cell: str) -> bool:
 
 
 def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: bool) -> Iterator[str]:
-    if not line.strip():
-        yield "expected a header line with the names of the columns, found nothing"
+    if not line:
+        yield f"is empty; {HEADER}"
+    elif not line.strip():
+        yield f"{HEADER}, found blanks"
     elif NOT_UTF8 in line or "\0" in line:
-        yield "expected a header line in UTF-8, found other bytes"
+        yield f"{HEADER} in UTF-8, found other bytes"
     elif len(line) == MAX_HEADER:
-        yield f"expected a header line, found more than {MAX_HEADER} characters without a line break"
+        yield f"{HEADER}, found more than {MAX_HEADER} characters without a line break"
     elif all(is_number(column) for column in columns):
-        yield f"expected a header line with the names of the columns, found numbers{_advice(comment)}"
+        yield f"{HEADER}, found numbers{_advice(comment)}"
+    elif _KEY.match(line):
+        yield f"{HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
     elif len(columns) == 1 and len(line.partition("[")[0].split()) > 1:
-        yield "expected commas, semicolons or tabs between the columns, found blanks"
+        yield "expected commas, semicolons or tabs between columns, found spaces"
     elif strict:
         yield from (f"column {i} has no name" for i, column in enumerate(columns, 1) if not column)
         repeated = Counter(column for column in columns if column)
@@ -193,14 +204,32 @@ class Rows(NamedTuple):
         for number, line in self.lines():
             cells = cells_of(line, self.header.separator)
             if len(cells) != count:
-                message = f"expected {count} values as in the header, found {len(cells)}"
-                raise InputError.one(message, self.path, number)
+                raise InputError.one(wrong_count(count, len(cells)), self.path, number)
             yield number, cells
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield number and content of each line below the header that is not empty."""
         with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
             yield from filled_lines(file, self.header.line)
+
+
+def wrong_count(expected: int, found: int) -> str:
+    """Return the problem of a row with another number of values than the header."""
+    return f"expected {counted(expected, 'value')}, one for each column of the header, found {found}"
+
+
+def of_columns(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield each problem once, after the names of all columns that have it.
+
+    Args:
+        problems: pairs of column and problem.
+    """
+    columns: dict[str, list[str]] = {}
+    for column, problem in problems:
+        columns.setdefault(problem, []).append(column)
+    for problem, names in columns.items():
+        where = f"column {names[0]!r}" if len(names) == 1 else f"columns {', '.join(names)}"
+        yield f"{where}: {problem}"
 
 
 def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:
@@ -332,7 +361,7 @@ def _row_problems(rows: Rows) -> list[Problem]:
         if len(alike) > MAX_KINDS or any(len(found) >= MAX_ALIKE for found in alike.values()):
             break
     if empty:
-        return [Problem(rows.path, 0, "there are no rows below the header")]
+        return [Problem(rows.path, 0, "has a header but no rows of values")]
     problems = [_summary(found) for found in list(alike.values())[:MAX_KINDS]]
     if len(alike) > MAX_KINDS:
         problems.append(
@@ -356,7 +385,7 @@ def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> I
     if len(cells) != count:
         doubled = separator == "," and len(cells) == 2 * count
         hint = "; with decimal commas, semicolons or tabs stand between the columns" if doubled else ""
-        yield "count", f"expected {count} values as in the header, found {len(cells)}{hint}"
+        yield "count", f"{wrong_count(count, len(cells))}{hint}"
         return
     for place in rows.used:
         name, cell = rows.name(place), cells[place]
@@ -368,6 +397,6 @@ def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> I
             number, hint = "", "; the decimal sign is a comma in some cells and a point in others"
             hint = hint if separator != "," and _DECIMAL_COMMA.fullmatch(cell.replace(".", ",")) else ""
         else:
-            hint = ""
+            hint = "; delete the row, or fill in the value" if cell.strip().lower() in NOTHING else ""
         if not is_number(number):
-            yield name, f"column {name}: expected a finite number, found {cell.strip()[:40]!r}{hint}"
+            yield name, f"column {name}: expected a number, found {cell.strip()[:40]!r}{hint}"

@@ -1,8 +1,8 @@
-"""Expressions in documents: one grammar for formulas, for numbers such as `90 deg`, and for units.
+"""Expressions in documents: one grammar for formulas, for numbers such as `pi/2`, and for units.
 
 The reader of a document defines the vocabulary. Texts are never evaluated by Python, and length and nesting
-are limited, so that malicious input cannot exhaust memory or stack. A number is a decimal, an expression with
-`pi`, or an angle in degrees. Units occur in headers of tables, e.g. `deg/s^2` or `N m/(rad s)`.
+are limited, so that malicious input cannot exhaust memory or stack. Units occur in headers of tables, e.g.
+`deg/s^2` or `N m/(rad s)`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import re
 from collections.abc import Callable, Collection, Hashable, Mapping
 from typing import Any, NamedTuple, NoReturn
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError
-from vsacli.base.units import ANY_SI_UNIT
+from vsacli.base.texts import joined
 
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 """Regular expression of a decimal number without sign."""
@@ -259,79 +259,6 @@ class _Parser:
         raise ExpressionError(f"expected {expected}, found {repr(text) if text else 'the end'}", place)
 
 
-MAX_LENGTH = 200
-ANGLES = ("rad", "rad/s", str(ANY_SI_UNIT))
-"""Units in which numbers such as `90 deg` are allowed."""
-
-BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
-"""Words that are booleans in YAML 1.1, in lower case."""
-
-_NUMBERS = Grammar(names=("pi",), functions=(), powers=False, max_length=MAX_LENGTH)
-_DECIMAL = re.compile(rf"[+-]?(?!0\d){NUMBER}", re.ASCII)
-_DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{NUMBER}|\(.*\))\s*deg", re.ASCII)
-
-_REFUSED_FORMS = {
-    r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
-    r"[+-]?\d+(:\d+)+(\.\d*)?": "base 60 is not read; write the number in decimal",
-    r"[+-]?0[xob]\w*": "write the number in decimal",
-    r"[+-]?\d+(_\d+)+(\.\d*)?": "write the number without underscores",
-    r"[+-]?\d+,\d+": "write a decimal point, not a comma",
-    r".*°": "unexpected character '°'; degrees are written as in `90 deg`",
-}
-"""Advice on number formats that are not expressions."""
-
-
-def evaluate(text: str, unit: str) -> float:
-    """Return the value of a text.
-
-    Args:
-        text: number or expression, e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.
-        unit: unit of the value; degrees, converted to radians, are allowed for ANGLES only.
-
-    Raises:
-        ExpressionError: the text is not an expression, or its value is not finite.
-    """
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"longer than {MAX_LENGTH} characters")
-    text = text.strip()
-    if text.lower() in BOOLEANS:
-        raise ExpressionError("YAML takes this word for a boolean")
-    try:
-        value = _degrees(text, unit) if text.endswith("deg") else _expression(text)
-    except ExpressionError:
-        for form, advice in _REFUSED_FORMS.items():
-            if re.fullmatch(form, text, re.IGNORECASE):
-                raise ExpressionError(advice) from None
-        raise
-    if not math.isfinite(value):
-        raise ExpressionError("the value is too large for a floating-point number")
-    return value
-
-
-def _degrees(text: str, unit: str) -> float:
-    if unit not in ANGLES:
-        raise ExpressionError(f"degrees are for angles only, and the unit here is {unit}")
-    parts = _DEGREES.fullmatch(text)
-    if not parts:
-        raise ExpressionError(
-            "before `deg`, write one number, or an expression in parentheses as in `(90/2) deg`"
-        )
-    inner = parts["value"].removeprefix("(").removesuffix(")")
-    return math.radians(float(parts["sign"] + "1") * _expression(inner))
-
-
-def _expression(text: str) -> float:
-    if _DECIMAL.fullmatch(text):
-        return float(text)
-    try:
-        return float(parse(text, _NUMBERS).value({"pi": math.pi}, {}))
-    except ExpressionError as error:
-        advice = "; write a number, or an expression with + - * /, parentheses and pi"
-        raise ExpressionError(error.reason, advice=advice) from None
-    except ZeroDivisionError:
-        raise ExpressionError("division by zero") from None
-
-
 BASES: dict[str, tuple[float, dict[str, int]]] = {
     "rad": (1.0, {"rad": 1}),
     "deg": (math.pi / 180, {"rad": 1}),
@@ -346,6 +273,8 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
     "us": (1e-6, {"s": 1}),
     "ns": (1e-9, {"s": 1}),
     "min": (60.0, {"s": 1}),
+    "Hz": (1.0, {"s": -1}),
+    "kHz": (1e3, {"s": -1}),
     "N": (1.0, {"N": 1}),
     "mN": (1e-3, {"N": 1}),
     "kN": (1e3, {"N": 1}),
@@ -366,6 +295,29 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
 """Size in SI units and dimensions of each symbol; an angle counts as a dimension, so that N m is not N
 m/rad."""
 
+_QUANTITIES = {
+    "rad": "an angle",
+    "rad/s": "an angular velocity",
+    "rad/s^2": "an angular acceleration",
+    "m": "a length",
+    "m/s": "a velocity",
+    "m/s^2": "an acceleration",
+    "s": "a time",
+    "Hz": "a frequency",
+    "N": "a force",
+    "N m": "a torque",
+    "N m/rad": "a rotational stiffness",
+    "N/m": "a linear stiffness",
+    "kg": "a mass",
+    "kg m^2": "a moment of inertia",
+    "W": "a power",
+    "A": "a current",
+    "V": "a voltage",
+    "ohm": "a resistance",
+    "N m/A": "a torque constant",
+}
+"""Kinds of quantities by their SI unit, for messages."""
+
 _SPELLINGS = str.maketrans(
     {
         "·": "*",
@@ -383,28 +335,28 @@ _SPELLINGS = str.maketrans(
 _UNITS = Grammar(BASES, (), powers=False, max_length=40, of_units=True)
 
 
-class _Unit:
+class Unit:
     """A unit: its size in SI units, and its dimensions without zero exponents."""
 
     def __init__(self, size: float, dimensions: Mapping[str, int]) -> None:
         self.size = size
         self.dimensions = {name: exponent for name, exponent in dimensions.items() if exponent}
 
-    def __mul__(self, other: _Unit) -> _Unit:
+    def __mul__(self, other: Unit) -> Unit:
         return self._times(other, 1)
 
-    def __truediv__(self, other: _Unit) -> _Unit:
+    def __truediv__(self, other: Unit) -> Unit:
         return self._times(other, -1)
 
-    def __pow__(self, exponent: int) -> _Unit:
-        return _Unit(1.0, {})._times(self, exponent)
+    def __pow__(self, exponent: int) -> Unit:
+        return Unit(1.0, {})._times(self, exponent)
 
-    def _times(self, other: _Unit, power: int) -> _Unit:
+    def _times(self, other: Unit, power: int) -> Unit:
         names = {**self.dimensions, **other.dimensions}
         dimensions = {
             name: self.dimensions.get(name, 0) + power * other.dimensions.get(name, 0) for name in names
         }
-        return _Unit(self.size * other.size**power, dimensions)
+        return Unit(self.size * other.size**power, dimensions)
 
 
 def conversion_factor(text: str, expected: str) -> float:
@@ -418,19 +370,56 @@ def conversion_factor(text: str, expected: str) -> float:
         InputError: the unit is not understood, or has other dimensions.
     """
     wanted = _parsed(expected)
-    try:
-        found = _parsed(text)
-    except ExpressionError:
-        unknown = f"the unit [{text[: _UNITS.max_length]}] is not understood"
-        understood = f"{', '.join(BASES)} with * / ^ and parentheses"
-        message = f"{unknown}; expected {expected} or the like, made of {understood}"
-        raise InputError.one(message) from None
+    found = size_of_unit(text)
+    if found is None:
+        near = nearest(text, _similar_to(wanted))
+        advice = f"did you mean [{near}]?" if near else _expected(expected)
+        raise InputError.one(f"unknown unit [{text[: _UNITS.max_length]}]; {advice}")
     if found.dimensions != wanted.dimensions:
-        raise InputError.one(f"the unit [{text}] is one of something else; expected {expected} or the like")
+        raise InputError.one(_other_kind(text, expected))
     return found.size / wanted.size
 
 
-def _parsed(text: str) -> _Unit:
+def size_of_unit(text: str) -> Unit | None:
+    """Return the unit of a text; None if it is not understood."""
+    try:
+        return _parsed(text)
+    except ExpressionError:
+        return None
+
+
+def kind_of_unit(text: str) -> str:
+    """Return the kind of quantity that a unit measures, e.g. `a length`; empty if it has no common name."""
+    dimensions = _parsed(text).dimensions
+    return next((kind for unit, kind in _QUANTITIES.items() if _parsed(unit).dimensions == dimensions), "")
+
+
+def _parsed(text: str) -> Unit:
     expression = parse(text.translate(_SPELLINGS), _UNITS)
-    unit: _Unit = expression.value({name: _Unit(*BASES[name]) for name in expression.names}, {}, int)
+    unit: Unit = expression.value({name: Unit(*BASES[name]) for name in expression.names}, {}, int)
     return unit
+
+
+def _similar_to(unit: Unit) -> list[str]:
+    """Return the symbols of units of the same dimensions."""
+    return [symbol for symbol, (_, dimensions) in BASES.items() if dimensions == unit.dimensions]
+
+
+def _expected(unit: str) -> str:
+    """Return a clause with the kind of quantity, and the units in which it can be given."""
+    kind, units = kind_of_unit(unit), joined(dict.fromkeys((unit, *_similar_to(_parsed(unit)))), "or")
+    return f"expected {kind} in {units}" if kind else f"expected {units}"
+
+
+def _other_kind(text: str, expected: str) -> str:
+    """Return the problem of a unit with other dimensions than the expected one."""
+    product = text.replace("/", " ")  # g/cm^2 for g cm^2
+    found = size_of_unit(product)
+    if found is not None and found.dimensions == _parsed(expected).dimensions:
+        return f"[{text}] is not {kind_of_unit(expected) or 'of this kind'}; did you mean [{product}]?"
+    kind = kind_of_unit(text)
+    return (
+        f"[{text}] is {kind}, {_expected(expected)}"
+        if kind
+        else f"[{text}] does not fit; {_expected(expected)}"
+    )

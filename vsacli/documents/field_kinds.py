@@ -28,7 +28,8 @@ from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
 from vsacli.documents import tree
-from vsacli.documents.expression import BOOLEANS, ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import BOOLEANS, evaluate, expected_number
 from vsacli.documents.tree import INVALID, Node, Scalar, Scope, all_valid, quoted
 
 REQUIRED = dataclasses.MISSING
@@ -71,6 +72,7 @@ class Check(NamedTuple):
         return None
 
 
+_WITHOUT_UNIT = {str(DIMENSIONLESS), str(ANY_SI_UNIT)}
 _ANY = Check(lambda _: True, "any number")
 
 
@@ -103,14 +105,24 @@ class Kind(ABC):
         """Yield the problems of a value at a path; its numbers must meet the condition."""
         fault = self.fault(content)
         if fault is not None:
-            yield FieldProblem(path, fault)
+            yield self._problem(path, fault)
         elif isinstance(content, tuple):
             for index, entry in enumerate(content):
                 yield from (self.item or self).problems((*path, index), check, entry)
         elif content is not None and (check or (self.unit and isinstance(content, float | int))):
             problem = (check or _ANY).problem(content)
             if problem:
-                yield FieldProblem(path, problem)
+                yield self._problem(path, f"{problem} {{}}" if self._has_unit else problem)
+
+    @property
+    def _has_unit(self) -> bool:
+        """Whether numbers have a unit to show after them, at joints of any type."""
+        return self.unit is not None and _WITHOUT_UNIT.isdisjoint((self.unit.revolute, self.unit.prismatic))
+
+    def _problem(self, path: FieldPath, message: str) -> FieldProblem:
+        """Return a problem; each `{}` in the message stands for the unit."""
+        quantities = (self.unit,) * message.count("{}") if self.unit is not None else ()
+        return FieldProblem(path, message, quantities=quantities)
 
 
 class OwnKind(Kind):
@@ -125,22 +137,6 @@ class OwnKind(Kind):
     def json_value(self, content: Any, _of_record: Callable[[Any], Any]) -> Any:
         """Return a value in a form that JSON can hold."""
         return content
-
-
-def on_one_line(value: Any) -> str:
-    """Return a value as YAML on one line."""
-    match value:
-        case Mapping():
-            return f"{{{', '.join(f'{key}: {on_one_line(entry)}' for key, entry in value.items())}}}"
-        case list() | tuple():
-            return f"[{', '.join(map(on_one_line, value))}]"
-        case bool():
-            return "true" if value else "false"
-        case None:
-            return "null"
-        case float():
-            return f"{value:.10g}"
-    return str(value)
 
 
 class Field(NamedTuple):
@@ -224,13 +220,13 @@ class Number(Kind):
 
 def read_number(node: Node, unit: str, label: str, scope: Scope) -> Any:
     """Return the number of a node in a unit; see `Kind.read`."""
-    expected = "a number" if unit == str(DIMENSIONLESS) else f"a number in {unit}"
     if not isinstance(node, Scalar) or node.is_null:
-        return scope.unexpected(node, expected, label)
+        return scope.unexpected(node, expected_number(unit), label)
     try:
         return evaluate(node.text, unit)
     except ExpressionError as error:
-        return scope.unexpected(node, expected, label, f": {error}")
+        scope.problems.add(node.line, f"{label}: {error}")
+        return INVALID
 
 
 class Share(Number):
@@ -365,8 +361,7 @@ class TableFile(Kind):
         try:
             table = read_table(Path(scope.problems.file).parent / name)
             if table.columns != self.columns:
-                expected, found = ",".join(self.columns), ",".join(table.columns)
-                message = f"expected the header {expected}, found {found}"
+                message = f"expected the header {','.join(self.columns)}, found {','.join(table.columns)}"
                 raise InputError.one(message, table.source.path, 1)
         except InputError as error:
             scope.problems.include(error)
@@ -386,13 +381,13 @@ class Vector(Kind):
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return the numbers; `fault` checks how many there are."""
         if not isinstance(node, tree.Sequence):
-            return scope.unexpected(node, f"a list of {self.length} numbers", label)
+            return scope.unexpected(node, f"a list of {self.length} numbers in {self.unit}", label)
         return all_valid(self.item.read(item, label, scope) for item in node.items)
 
     def fault(self, content: Any) -> str | None:
         """See `Kind.fault`."""
-        right = len(content) == self.length
-        return None if right else f"expected {self.length} numbers, found {len(content)}"
+        found = len(content)
+        return None if found == self.length else f"expected {self.length} numbers in {{}}, found {found}"
 
 
 class Interval(Kind):
@@ -417,7 +412,8 @@ class Interval(Kind):
         """See `Kind.fault`."""
         if content[0] <= content[1]:
             return None
-        return f"the lower bound {content[0]:g} exceeds the upper bound {content[1]:g}"
+        unit = " {}" if self._has_unit else ""
+        return f"the lower limit {content[0]:g}{unit} exceeds the upper limit {content[1]:g}{unit}; swap them"
 
 
 class NamedNumbers(Kind):

@@ -13,7 +13,6 @@ from typing import Any
 
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
-from vsacli.documents.expression import ANGLES, MAX_LENGTH
 from vsacli.documents.field_kinds import (
     IDENTIFIER,
     LARGEST,
@@ -36,6 +35,7 @@ from vsacli.documents.field_kinds import (
     declared,
 )
 from vsacli.documents.nested import Items, OneOf, OneOrMore, Pair, PerJoint, Record
+from vsacli.documents.number import ANGLES, MAX_LENGTH
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -6,11 +6,12 @@ problems of a file are reported together.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
+from vsacli.base.texts import counted
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.field_kinds import (
@@ -40,7 +41,7 @@ class Items(Kind):
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return the entries, all different."""
         if not isinstance(node, tree.Sequence) or not node.items:
-            return scope.unexpected(node, "a list of one or more", label)
+            return scope.unexpected(node, "a list with at least one entry", label)
         values = all_valid([self.item.read(item, label, scope) for item in node.items])
         return INVALID if self._note_repeated(node, label, scope) else values
 
@@ -49,8 +50,9 @@ class Items(Kind):
             return False
         keys = [_scalar_entry(item, self.unique) for item in node.items]
         found = list(_repeated(key.text if key else None for key in keys))
-        for index, message in found:
-            line = line_of((index, self.unique), node, scope)
+        for index, first in found:
+            line, before = (line_of((place, self.unique), node, scope) for place in (index, first))
+            message = _taken(keys[index].text, f"in line {before}")  # type: ignore[union-attr]
             scope.problems.add(line, f"{label}.{self.unique}: {message}")
         return bool(found)
 
@@ -59,18 +61,22 @@ class Items(Kind):
         if self.unique is None:
             yield from super().problems(path, check, tuple(content))
         else:
-            for index, message in _repeated(getattr(item, self.unique) for item in content):
+            words = [getattr(item, self.unique) for item in content]
+            for index, first in _repeated(words):
+                message = _taken(words[index], f"by entry {first}")
                 yield FieldProblem((*path, index, self.unique), message)
 
 
-def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
-    """Yield index and message of each word that occurred before; None is not counted."""
-    seen: set[str] = set()
+def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, int]]:
+    """Yield the index of each word that occurred before, and that of its first occurrence; skip None."""
+    seen: dict[str, int] = {}
     for index, word in enumerate(words):
-        if word is not None and word in seen:
-            yield index, f"{quoted(word)} is taken by another entry; each needs its own"
-        elif word is not None:
-            seen.add(word)
+        if word is not None and seen.setdefault(word, index) != index:
+            yield index, seen[word]
+
+
+def _taken(word: str, where: str) -> str:
+    return f"{quoted(word)} is already used {where}; choose another one"
 
 
 def _scalar_entry(node: Node, key: str) -> tree.Scalar | None:
@@ -171,7 +177,9 @@ def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -
         case tree.Scalar():
             return {name: node for name in names if name not in exempt}
         case tree.Sequence(items=items) if len(items) != len(names):
-            scope.unexpected(node, f"{len(names)} numbers, one for each joint", label)
+            expected = f"{counted(len(names), 'value')}, one for each joint ({', '.join(names)})"
+            found = f"found {len(items)}; is the file for another robot?"
+            scope.problems.add(node.line, f"{label}: expected {expected}, {found}")
             return None
         case tree.Sequence(items=items):
             return dict(zip(names, items, strict=True))
@@ -204,7 +212,13 @@ class Record(Kind):
         """Return an instance of the class."""
         if isinstance(node, tree.Mapping):
             return read_record(self.cls, node, label, scope)
-        return scope.unexpected(node, "a mapping", label)
+        return scope.unexpected(node, f"a mapping{_with_keys(self.cls)}", label)
+
+
+def _with_keys(cls: type) -> str:
+    """Return the keys that a mapping must have, as the end of `a mapping`; empty if it needs none."""
+    keys = [name for name, (_, default) in declared(cls).items() if default is REQUIRED]
+    return f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
 
 
 class OneOf(Kind):
@@ -227,7 +241,7 @@ class OneOf(Kind):
         if selector is None:
             scope.problems.add(node.line, f"{label}: missing key 'type', one of {', '.join(self.records)}")
             return INVALID
-        if not isinstance(selector, tree.Scalar):
+        if not isinstance(selector, tree.Scalar) or selector.is_null:
             return scope.unexpected(selector, f"one of {', '.join(self.records)}", f"{label}.type")
         if selector.text not in self.records:
             reason = unknown_word(selector.text, self.records, self.not_yet)
@@ -254,7 +268,8 @@ def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside:
     except InvalidRecordError as error:
         for problem in error.fields:
             message = problem.in_units(scope.variant).in_file(list(scope.members))
-            scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}")
+            fault = f"{prefix}{problem.path} {problem.joint} {problem.message}"
+            scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}", fault)
         return INVALID
     except InputError as error:
         scope.problems.include(error)
@@ -282,16 +297,37 @@ def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], 
 def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> Any:
     content = node.entries.get(name)
     if content is None:
-        scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc})")
+        example = f", e.g. {name}: {{type: constant, value: ...}}" if "constant" in field.kind.records else ""
+        scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
         return INVALID
     value = field.kind.read(content, name, scope)
     if value is INVALID:
         return INVALID
     problems = list(field.problems(name, value))
-    for problem in problems:
-        place = f" of joint {list(scope.members)[int(problem.path[-1])]}" if field.kind.per_joint else ""
-        scope.problems.add(line_of(problem.path, node, scope), f"{name}{place}: {problem.message}")
+    _note(problems, name, field.kind.per_joint, node, scope)
     return INVALID if problems else value
+
+
+def _note(
+    problems: Iterable[FieldProblem], name: str, of_joints: bool, node: tree.Mapping, scope: Scope
+) -> None:
+    """Note the problems of a field; joints with the same problem share a message."""
+    alike: dict[tuple[int, str, str], list[str]] = {}
+    for problem in problems:
+        joint = list(scope.members)[int(problem.path[-1])] if of_joints else ""
+        message = problem.in_units(scope.members[joint] if of_joints else scope.variant).message
+        fault = "" if of_joints else f"{name}: {problem.message}"
+        alike.setdefault((line_of(problem.path, node, scope), message, fault), []).append(joint)
+    for (line, message, fault), joints in alike.items():
+        place = _of_joints(joints, scope) if of_joints else ""
+        scope.problems.add(line, f"{name}{place}: {message}", fault)
+
+
+def _of_joints(joints: Sequence[str], scope: Scope) -> str:
+    """Return the joints that share a problem, after the name of a field; empty if all joints do."""
+    if len(joints) > 1 and len(joints) == len(scope.members):
+        return ""
+    return f" of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}"
 
 
 def line_of(path: FieldPath, node: Node, scope: Scope) -> int:

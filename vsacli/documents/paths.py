@@ -10,10 +10,11 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
+from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
-from vsacli.documents.field_kinds import Kind, declared, on_one_line
+from vsacli.documents.field_kinds import Kind, declared
 from vsacli.documents.nested import Items, Pair, scope_inside
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
@@ -67,11 +68,26 @@ def _indices(names: Iterable[str]) -> dict[str, int]:
     return named | {str(index): index for index, _ in numbered}
 
 
+class ReplacementError(InputError):
+    """A value that cannot be replaced, with the path to it."""
+
+    def __init__(self, problems: Iterable[Problem], path: str) -> None:
+        super().__init__(problems)
+        self.path = path
+
+
 def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
     """Return the error for a word that is not among the valid words at a place."""
     words = list(there)
     where = f"{_joined(place)} has" if place else "there is"
-    hint = did_you_mean(word, words) if words else "; it is a single value"
+    names = [each for each in words if not each.isdecimal()]
+    if not words:
+        hint = "; it is a single value"
+    elif len(words) == len(names) or nearest(word, names):
+        hint = did_you_mean(word, names)
+    else:  # entries of a list, by index and perhaps by name
+        last = len(words) - len(names) - 1
+        hint = f"; valid: {', '.join(names)}{' or ' if names else ''}0{f' to {last}' if last else ''}"
     return InputError.one(f"{where} no {word!r}{hint}")
 
 
@@ -133,6 +149,9 @@ def replace_all(
 
     Values that are refused are tried again after the others: keys that need each other, such as `gear_ratio`
     and `side` of a motor, may be given in any order.
+
+    Raises:
+        ReplacementError: the first value that is refused, though the others are replaced.
     """
     refused: dict[str, Any] = {}
     first = None
@@ -140,7 +159,7 @@ def replace_all(
         try:
             record = replace(record, path, value, members, exempt, file)
         except InputError as error:
-            first = first or error
+            first = first or ReplacementError(error.problems, path)
             refused[path] = value
     if first is None:
         return record
@@ -201,14 +220,18 @@ class _Replacement(NamedTuple):
         if kind.item is not None:
             return self._in_list(kind, kind.item, content, words, place)
         if words == ["type"] and "" not in kind.records:
-            reason = f"determines the other keys; replace {_joined(place)} as a whole"
-            raise InputError.one(f"{_joined(place)}.type: {reason}")
+            reason = "the type cannot be changed alone, since each type has other keys"
+            example = f"'{_joined(place)}={{type: {tree.plain(self.node)}, ...}}'"
+            raise InputError.one(f"{_joined(place)}.type: {reason}; give the whole mapping, {example}")
         if kind.records:
             return self.in_record(content, words, place)
         raise _nowhere(words[0], (), place)
 
     def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
         label, problems = _joined(place), Problems(self.scope.problems.file)
+        if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.Scalar):
+            keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
+            raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
         content = kind.read(self.node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
@@ -243,7 +266,7 @@ class _Replacement(NamedTuple):
         there = [index for index, entry in enumerate(entries) if entry is not None]
         for index in there if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))
-            here = (*place, str(index) if word == ALL else word)
+            here = (*place, names[index] or str(index))
             entries[index] = inside.in_value(each, content[index], rest, here)
         return tuple(entries)
 

@@ -18,12 +18,19 @@ import numpy as np
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents import tree
-from vsacli.documents.expression import ANGLES, ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import ANGLES, evaluate
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import parse_yaml
 
 _Subject = TypeVar("_Subject")
+_COMPONENTS = {
+    **dict.fromkeys(("com", "xyz"), ("x", "y", "z")),
+    **dict.fromkeys(("limits", "range"), ("lower", "upper")),
+}
+"""Names of the components of fields that are lists."""
+
 _EXPRESSION_OF_ANGLE = re.compile("deg|pi")
 
 
@@ -121,7 +128,16 @@ class Rule(NamedTuple, Generic[_Subject]):
         advice = self.advice
         if other is not None:
             advice = _guess(measured, other) if known else f"is it in {other.unit}?"
-        return f"{'.'.join(map(str, path))}{value} {found}; {advice}"
+        return f"{'.'.join(map(str, path))}{_component(path)}{value} {found}; {advice}"
+
+
+def _component(path: NumberPath) -> str:
+    """Return the name of a component that a path gives by its index only; empty if it has none."""
+    if len(path) < 3 or not isinstance(path[-1], Entry) or path[-1].name:
+        return ""
+    field = "limits" if path[-3] == "limits" else path[-2]
+    words = _COMPONENTS.get(str(field), ())
+    return f" ({words[path[-1].number]})" if path[-1].number < len(words) else ""
 
 
 def _guess(measured: Measured, other: OtherUnit) -> str:

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Any, TypeAlias, TypeVar
 
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.nested import read_record
 from vsacli.documents.source import Problems, Source, read_source, recognizing_other_formats
-from vsacli.documents.tree import Scope, parse_yaml
+from vsacli.documents.tree import Scope, parse_yaml, quoted
 
 _Document = TypeVar("_Document")
 
@@ -47,12 +47,12 @@ def read_document(
         InputError: with every problem of the file, each with its line.
     """
     with recognizing_other_formats(path):
-        source, text = read_source(path)
+        expected = f"expected a YAML file that begins with `format: {format_name}`"
+        source, text = read_source(path, expected=expected)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)
         if not isinstance(root, tree.Mapping):
-            beginning = f"`format: {format_name}`"
-            problems.fail(root.line, f"expected a mapping that begins with {beginning}, found {root}")
+            problems.fail(root.line, f"{expected}, found {root}")
         _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
     problems.check()
@@ -91,22 +91,37 @@ def _check_format(root: tree.Mapping, expected: str, problems: Problems) -> None
 
 
 class ChangeError(InputError):
-    """A change that cannot be applied, as opposed to a fault of the file."""
+    """A change that cannot be applied, as opposed to a fault of the file.
+
+    Attributes:
+        change: the change as in `--set PATH=VALUE`.
+    """
+
+    def __init__(self, problems: Iterable[Problem], change: str = "") -> None:
+        super().__init__(problems)
+        self.change = change
+
+    @classmethod
+    def of(cls, change: str, message: str) -> ChangeError:
+        """Return the error of a change, with a single problem."""
+        return cls([Problem("", 0, message)], change)
 
 
 def read_changes(texts: Iterable[str]) -> dict[str, Any]:
-    """Return changes from texts such as `joints.elbow.link.mass=2.5`; the last change of a path wins.
+    """Return changes from texts such as `joints.elbow.link.mass=2.5`.
 
     Raises:
-        ChangeError: a text has no `=`, or a value is not YAML.
+        ChangeError: a text has no `=`, a value is not YAML, or a path is changed twice.
     """
     changes: dict[str, Any] = {}
+    given: dict[str, str] = {}
     for text in texts:
         path, equals, written = (part.strip() for part in text.partition("="))
         if not (path and equals and written):
-            raise ChangeError.one(f"expected PATH=VALUE, e.g. joints.*.link.mass=2.5, found {text!r}")
-        changes.pop(path, None)
-        changes[path] = _value(path, written)
+            raise ChangeError.of(text, "expected PATH=VALUE, e.g. joints.*.link.mass=2.5")
+        if path in given:
+            raise ChangeError.of(text, f"{path} is also set to {quoted(given[path])}; set it once")
+        given[path], changes[path] = written, _value(text, written)
     return changes
 
 
@@ -120,24 +135,24 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else _NUMBER.sub(r"\1", json.dumps(value))
 
 
-def _value(path: str, text: str) -> Any:
+def _value(change: str, text: str) -> Any:
     problems = Problems("")
     try:
         node = parse_yaml(text, problems)
         problems.check()
     except InputError as error:
-        raise ChangeError.one(f"{path}: {error.problems[0].message}") from None
+        raise ChangeError.of(change, error.problems[0].message) from None
     return tree.plain(node)
 
 
-def check_path_of_change(path: str) -> None:
-    """Refuse a path to a key that changes must not touch.
+def check_path_of_change(path: str, change: str = "") -> None:
+    """Refuse a path to a key that changes must not touch; `change` is as in `ChangeError`.
 
     Raises:
         ChangeError: the path leads to such a key.
     """
-    if path.partition(".")[0] in KEPT:
-        raise ChangeError.one(f"{path} says what the file is and stays; change the file itself")
+    if (key := path.partition(".")[0]) in KEPT:
+        raise ChangeError.of(change, f"the {key} of a file cannot be changed here; edit the file")
 
 
 def changed(
@@ -159,12 +174,13 @@ def changed(
     Raises:
         ChangeError: the first change that cannot be applied.
     """
-    from vsacli.documents.paths import replace_all
+    from vsacli.documents.paths import ReplacementError, replace_all
 
-    for path in changes:
-        check_path_of_change(path)
+    for path, change in zip(changes, written(changes), strict=True):
+        check_path_of_change(path, change)
     try:
         document = replace_all(document, changes, members, exempt, source.path)
-    except InputError as error:
-        raise ChangeError(error.problems) from None
+    except ReplacementError as error:
+        (change,) = written({error.path: changes[error.path]})
+        raise ChangeError(error.problems, change) from None
     return document, source._replace(changes=json.dumps(changes)) if changes else source

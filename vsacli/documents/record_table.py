@@ -11,7 +11,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
 from vsacli.documents import tree
-from vsacli.documents.csv_file import Header, cells_of, filled_lines, header_of, split_heading
+from vsacli.documents.csv_file import (
+    HEADER,
+    Header,
+    cells_of,
+    filled_lines,
+    header_of,
+    split_heading,
+    wrong_count,
+)
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.fields import REQUIRED, Kind, Number, declared
 from vsacli.documents.nested import read_record
@@ -47,12 +55,14 @@ class _Columns(NamedTuple):
         width: number of columns.
         places: index of the column of each field that has one.
         factors: factors that convert the numbers of a field to SI units.
+        units: units of the numbers of a field, as written and SI, where they differ.
         others: names of columns without a field.
     """
 
     width: int
     places: dict[str, int]
     factors: dict[str, float]
+    units: dict[str, tuple[str, str]]
     others: list[str]
 
 
@@ -71,7 +81,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     Raises:
         InputError: with file and line of every problem.
     """
-    source, text = read_source(path, MAX_BYTES)
+    source, text = read_source(path, MAX_BYTES, HEADER)
     problems = Problems(source.path)
     header = header_of(BytesIO(text.encode()), source.path)
     columns = _columns(header, cls, problems)
@@ -87,17 +97,17 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
             records[number] = record
             key = getattr(record, unique)
             if first.setdefault(key, number) != number:
-                problems.add(number, f"{unique} {tree.quoted(key)} stands in line {first[key]} already")
+                problems.add(number, f"the {unique} {tree.quoted(key)} is already used in line {first[key]}")
     problems.check()
     if not records:
-        raise InputError.one("there are no rows below the header", source.path)
+        raise InputError.one("has a header but no rows of values", source.path)
     return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
 
 
 def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
     """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
     fields = declared(cls)
-    columns = _Columns(len(header.columns), {}, {}, [])
+    columns = _Columns(len(header.columns), {}, {}, {}, [])
     meant = set()
     for index, (name, unit) in enumerate(map(split_heading, header.columns)):
         if name in columns.places:
@@ -105,15 +115,23 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
         elif name in fields:
             columns.places[name] = index
             columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
+            if columns.factors[name] != 1 and unit is not None:
+                columns.units[name] = unit, Scope(problems, {}, {}).unit(fields[name][0].quantity)
         else:
             columns.others.append(name)
             near = nearest(name, fields)
             if near is not None:
                 problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
                 meant.add(near)
-    for name, (field, default) in fields.items():
-        if default is REQUIRED and name not in columns.places and name not in meant:
-            problems.add(header.line, f"there is no column {name!r} ({field.doc})")
+    missing = [
+        f"{name!r} ({field.doc})"
+        for name, (field, default) in fields.items()
+        if default is REQUIRED and name not in columns.places and name not in meant
+    ]
+    if missing:
+        problems.add(
+            header.line, f"missing {'column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
+        )
     return columns
 
 
@@ -136,9 +154,7 @@ def _record(
     """Return the record of a row; None if its problems were noted."""
     if len(cells) != columns.width:
         hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
-        scope.problems.add(
-            line, f"expected {columns.width} values as in the header, found {len(cells)}{hint}"
-        )
+        scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
     given = {
         field: tree.Scalar(line, _in_si(cells[index], columns.factors[field]), plain=False)
@@ -152,8 +168,25 @@ def _record(
         scope.problems.add(line, f"column {name!r} is empty")
     if missing:
         return None
-    record = read_record(cls, tree.Mapping(line, given, dict.fromkeys(given, line)), "", scope)
+    problems = Problems(scope.problems.file)
+    mapping = tree.Mapping(line, given, dict.fromkeys(given, line))
+    record = read_record(cls, mapping, "", scope._replace(problems=problems))
+    try:
+        problems.check()
+    except InputError as error:
+        for problem in error.problems:
+            scope.problems.add(line, _as_written(problem.message, cells, columns))
     return None if record is INVALID else record
+
+
+def _as_written(message: str, cells: Sequence[str], columns: _Columns) -> str:
+    """Return a message about a converted number with the number and unit of the file."""
+    field = message.partition(":")[0]
+    if field not in columns.units:
+        return message
+    cell, (written, expected) = cells[columns.places[field]], columns.units[field]
+    converted = f"{float(_in_si(cell, columns.factors[field])):g} {expected}"
+    return message.replace(converted, f"{cell} {written}")
 
 
 def _in_si(cell: str, factor: float) -> str:

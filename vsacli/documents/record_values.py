@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from vsacli.base.texts import on_one_line
 from vsacli.base.units import ANY_SI_UNIT, Quantity
 from vsacli.documents import field_kinds
 from vsacli.documents.field_kinds import (
@@ -18,7 +19,6 @@ from vsacli.documents.field_kinds import (
     TableFile,
     Text,
     declared,
-    on_one_line,
     variant_inside,
 )
 from vsacli.documents.nested import Items, OneOf, Pair, PerJoint, Record

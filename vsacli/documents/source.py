@@ -50,12 +50,15 @@ class Source(NamedTuple):
     changes: str = ""
 
 
-def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTES) -> tuple[Source, str]:
+def read_source(
+    path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTES, expected: str = ""
+) -> tuple[Source, str]:
     """Read a complete text document.
 
     Args:
         path: path of the file, repeated in errors as given.
         max_bytes: size above which the file is refused without being read.
+        expected: clause of the error of an empty file, `expected ...`.
 
     Returns:
         The source, and its text without a byte order mark.
@@ -70,7 +73,7 @@ def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTE
     if len(content) > max_bytes:  # the file grew after its size was checked
         raise _too_large(name, len(content), max_bytes)
     if not content.strip():
-        raise InputError.one("the file is empty", name)
+        raise InputError.one("is empty" + (f"; {expected}" if expected else ""), name)
     text = decode_utf8(content, name)
     return Source(name, hashlib.sha256(content).hexdigest(), text), text
 
@@ -99,7 +102,7 @@ def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize)
     with _refusing(name):
         status = os.stat(place_of(name))
     if stat.S_ISDIR(status.st_mode):
-        raise InputError.one("is a directory, expected a file", name)
+        raise InputError.one("is a folder; give the name of a file in it", name)
     if not stat.S_ISREG(status.st_mode):
         raise InputError.one("is no regular file (a device, pipe or socket)", name)
     if status.st_size > max_bytes:
@@ -121,7 +124,7 @@ def decode_utf8(content: bytes, name: str) -> str:
     except UnicodeDecodeError as error:
         byte = content[error.start]
         line = content.count(b"\n", 0, error.start) + 1
-        problem = f"the file is not UTF-8 text (byte 0x{byte:02x} at offset {error.start}); save it as UTF-8"
+        problem = f"byte 0x{byte:02x} is not valid UTF-8; save the file as UTF-8"
         raise InputError.one(problem, name, line) from None
 
 
@@ -162,13 +165,23 @@ class Problems:
     def __init__(self, file: str) -> None:
         self.file = file
         self._found: list[Problem] = []
+        self._faults: set[tuple[int, str]] = set()
 
-    def add(self, line: int, message: str) -> None:
+    def add(self, line: int, message: str, fault: str = "") -> None:
         """Note a problem.
+
+        Args:
+            line: line number from 1, or 0.
+            message: as in `Problem`.
+            fault: message without units. A value that an alias repeats at joints of several types is noted
+                once.
 
         Raises:
             InputError: there are more than MAX_PROBLEMS.
         """
+        if fault and (line, fault) in self._faults:
+            return
+        self._faults.add((line, fault))
         if len(self._found) == MAX_PROBLEMS:
             self._found.append(
                 Problem(self.file, line, f"more than {MAX_PROBLEMS} problems; reading stopped here")
@@ -199,6 +212,9 @@ class Problems:
         )
 
 
+UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+"""First bytes of texts in UTF-16, whose error says that UTF-8 is expected."""
+
 BEGINNING_BYTES = 4096
 """Bytes to read to find the first tag after an XML declaration and a license."""
 
@@ -206,6 +222,11 @@ _ROOT_TAG = re.compile(r"<\s*([A-Za-z][\w.-]*)")
 _COMMENT = re.compile(r"<!--.*?(-->|\Z)", re.DOTALL)
 
 SIGNATURES = {
+    b"\x89PNG\r\n": "png",
+    b"\xff\xd8\xff": "jpeg",
+    b"%PDF-": "pdf",
+    b"\x1f\x8b": "gzip",
+    b"PK\x03\x04": "zip",
     b"MATLAB ": "mat",
     b"#ROSBAG": "bag",
     b"\x89MCAP": "mcap",
@@ -237,6 +258,16 @@ SENTENCES = {
 
 SENTENCES["db3"] = SENTENCES["mcap"]
 
+UNREADABLE = {
+    "png": "PNG image",
+    "jpeg": "JPEG image",
+    "pdf": "PDF document",
+    "gzip": "gzip archive",
+    "zip": "ZIP archive",
+    "binary": "binary file",
+}
+"""Nouns for foreign formats that cannot be converted either."""
+
 
 @contextmanager
 def recognizing_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
@@ -259,6 +290,8 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
         InputError: with the format of the file, and the command for it.
     """
     name = os.fspath(path)
+    if noun := unreadable(name):
+        raise InputError.one(f"is a {noun}; expected text", name) from None
     sentence = SENTENCES.get(_format(name))
     if sentence is None:
         return
@@ -275,6 +308,11 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
     raise InputError.one(message, name) from None
 
 
+def unreadable(path: str | os.PathLike[str]) -> str:
+    """Return what a file is that no command reads, such as `PNG image`; empty for other files."""
+    return UNREADABLE.get(_format(os.fspath(path)), "")
+
+
 def _format(name: str) -> str:
     """Return the format by the content, or else by the ending; empty if unknown."""
     ending = PurePath(name).suffix.lower().removeprefix(".")
@@ -286,13 +324,22 @@ def _format(name: str) -> str:
             beginning = file.read(BEGINNING_BYTES)
     except (OSError, ValueError):
         return ""  # reported before
-    for signature, known in SIGNATURES.items():
-        if beginning.startswith(signature):
-            return known
+    found = next((known for signature, known in SIGNATURES.items() if beginning.startswith(signature)), "")
+    by_name = ENDINGS.get(ending, ending)
+    if found:  # spreadsheets and the like are ZIP archives
+        return by_name if found == "zip" and by_name in SENTENCES else found
     text = beginning.decode("latin-1").lstrip("\ufeffï»¿ \t\r\n")
     if text.startswith("<"):
         return _of_xml(text, ending)
-    return ENDINGS.get(ending, ending) if b"\0" in beginning else ""
+    if by_name in SENTENCES:
+        return by_name if b"\0" in beginning else ""
+    return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary(beginning)
+
+
+def _binary(beginning: bytes) -> str:
+    """Return `binary` for a first line with many NUL bytes; other lines of a damaged table may have some."""
+    first = beginning.partition(b"\n")[0]
+    return "binary" if len(first) <= 3 * first.count(0) > 0 else ""
 
 
 def _of_xml(text: str, ending: str) -> str:

@@ -14,6 +14,8 @@ from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
 
 import yaml
 
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.texts import counted
 from vsacli.base.units import Quantity
 from vsacli.documents.source import Problems
 
@@ -35,11 +37,19 @@ def quoted(text: str) -> str:
 
 
 class Scalar(NamedTuple):
-    """A text as written; `plain` means without quotes."""
+    """A text as written.
+
+    Attributes:
+        line: line number from 1.
+        text: content.
+        plain: whether it stands without quotes.
+        noted: whether it stands for a value whose problem was noted while parsing, an undefined alias.
+    """
 
     line: int
     text: str
     plain: bool
+    noted: bool = False
 
     def __str__(self) -> str:
         return "nothing" if self.is_null else quoted(self.text)
@@ -57,7 +67,7 @@ class Sequence(NamedTuple):
     items: tuple[Node, ...]
 
     def __str__(self) -> str:
-        return f"a list of {len(self.items)}"
+        return f"a list of {counted(len(self.items), 'value')}" if self.items else "an empty list"
 
 
 class Mapping(NamedTuple):
@@ -118,7 +128,9 @@ class Scope(NamedTuple):
         return self._replace(variant=self.members.get(name, self.variant))
 
     def unexpected(self, node: Node, expected: str, label: str, reason: str = "") -> Any:
-        """Note that something else than expected was found, and return INVALID."""
+        """Note that something else than expected was found, unless noted before, and return INVALID."""
+        if isinstance(node, Scalar) and node.noted:
+            return INVALID
         self.problems.add(node.line, f"{label}: expected {expected}, found {node}{reason}")
         return INVALID
 
@@ -154,7 +166,7 @@ def parse_yaml(text: str, problems: Problems) -> Node:
     except yaml.MarkedYAMLError as error:
         _fail_with_syntax(error, text, problems)
     if builder.root is None:
-        problems.fail(1, "the file holds no values, only comments")
+        problems.fail(1, "has only comments, no values")
     return builder.root
 
 
@@ -226,7 +238,7 @@ class _OpenMapping:
         if key.plain and key.text == "<<":
             return "merge keys (<<) are not allowed; write the entries out, or alias the whole value"
         if key.text in self._key_lines:
-            return f"duplicate key {key}; it stands on line {self._key_lines[key.text]} already"
+            return f"duplicate key {key}; it is already on line {self._key_lines[key.text]}"
         return None
 
     def close(self) -> Node:
@@ -275,10 +287,16 @@ class _Builder:
             self._problems.add(line, f"the tag {tag!r} is not allowed; write the plain value without a tag")
 
     def _resolve(self, name: str, line: int) -> _Anchored:
-        if name not in self._anchors:
-            self._problems.add(line, f"the alias *{name} has no complete anchor &{name} before it")
-            return _Anchored(Scalar(line, "", plain=True), 1, 0)
-        return self._anchors[name]
+        if name in self._anchors:
+            return self._anchors[name]
+        if any(each.anchor == name for each in self._open):
+            self._problems.add(line, f"the alias *{name} is inside the value of its own anchor &{name}")
+        else:
+            near = nearest(name, self._anchors)
+            known = f" (line {self._anchors[near].node.line})" if near else ""
+            hint = f"; did you mean *{near}{known}?" if near else f"; write &{name} before a value above"
+            self._problems.add(line, f"the alias *{name} has no anchor{hint}")
+        return _Anchored(Scalar(line, "", plain=True, noted=True), 1, 0)
 
     def _begin(self, event: yaml.CollectionStartEvent, line: int) -> None:
         line = self._open[-1].child_line(line) if self._open else line

@@ -16,7 +16,7 @@ from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.commented import WIDTH, commented_document
-from vsacli.documents.expression import BOOLEANS
+from vsacli.documents.number import BOOLEANS
 from vsacli.dynamics.forward import mass_matrix
 from vsacli.files.data_sheets import SOURCES
 from vsacli.files.info.robot_info import static_load, stiffness_ranges

@@ -9,7 +9,7 @@ from vsacli.base.did_you_mean import MOST_NEAR, did_you_mean, nearest
 from vsacli.base.texts import listed
 from vsacli.documents.fields import declared
 from vsacli.documents.paths import declared_paths
-from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change
+from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change, written
 from vsacli.robot.file import RobotFile
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
@@ -31,12 +31,12 @@ def divided(changes: Changes) -> Divided:
     """
     robot, trajectory = declared(RobotFile), declared(OF_ANY_ROBOT)
     found = Divided({}, {})
-    for path, value in changes.items():
-        check_path_of_change(path)
+    for (path, value), change in zip(changes.items(), written(changes), strict=True):
+        check_path_of_change(path, change)
         first = path.partition(".")[0]
         if first not in robot and first not in trajectory:
             hint = _hint(path, [key for key in (*robot, *trajectory) if key not in KEPT])
-            raise ChangeError.one(f"neither robot nor trajectory has {first!r} at the top level{hint}")
+            raise ChangeError.of(change, f"neither robot nor trajectory has {first!r} at the top level{hint}")
         of = found.robot if first in robot else found.trajectory
         of[path] = value  # type: ignore[index]
     return found

@@ -17,7 +17,7 @@ from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
-from vsacli.documents.reading import ChangeError, Changes, changed, read_document
+from vsacli.documents.reading import ChangeError, Changes, changed, read_document, written
 from vsacli.documents.record_values import numbers
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -244,14 +244,11 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
     """Return the sample rate, 1/s, that changes give to a table; nothing else of a table can be changed.
 
     Raises:
-        InputError: something else is changed.
-        ChangeError: the rate is not valid.
+        ChangeError: something else is changed, or the rate is not valid.
     """
-    if changes.keys() - {"rate"}:
-        reason = (
-            "is a table, of which only the rate can be set; name it in a YAML trajectory and set its keys"
-        )
-        raise InputError.one(reason, os.fspath(path))
+    if others := {key: value for key, value in changes.items() if key != "rate"}:
+        reason = f"{os.fspath(path)} is a CSV table, whose rate alone can be set"
+        raise ChangeError.of(written(others)[0], f"{reason}; name it in a YAML trajectory and set its keys")
     if not changes:
         return None
     from vsacli.documents.columns_file import checked_rate
@@ -268,7 +265,8 @@ def _blaming(changes: Changes, path: str) -> Iterator[None]:
     except InputError as error:
         if path not in changes:
             raise
-        raise ChangeError(each._replace(file="", line=0) for each in error.problems) from None
+        problems = [each._replace(file="", line=0) for each in error.problems]
+        raise ChangeError(problems, written({path: changes[path]})[0]) from None
 
 
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:

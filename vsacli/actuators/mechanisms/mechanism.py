@@ -178,6 +178,14 @@ class Mechanism(ABC):
 
     joint_types: ClassVar[tuple[str, ...]] = ("revolute", "prismatic")
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Refuse attributes of a class of users that have other names now."""
+        super().__init_subclass__(**options)
+        if not cls.__module__.startswith("vsacli."):
+            from vsacli.base.renamed import refuse_old_names  # not needed for the mechanisms of this package
+
+            refuse_old_names(cls, Mechanism)
+
     def __post_init__(self) -> None:
         check_fields(self)
 

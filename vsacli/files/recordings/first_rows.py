@@ -145,7 +145,7 @@ def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
     rows = islice(Rows(name, header, (), empty_cells=True).texts(), FIRST_ROWS)
     cells = [[cell.replace(",", point) for cell in row] for _, row in rows]
     if not cells:
-        raise InputError.one("there are no rows below the header", name)
+        raise InputError.one("has a header but no rows of values", name)
     return FirstRows(name, header, cells)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.column_mapping import REST, MappedColumn
-from vsacli.documents.expression import BOOLEANS
+from vsacli.documents.number import BOOLEANS
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import TimeColumn
 from vsacli.files.recordings.guesses import TAKEN, Guess

@@ -13,7 +13,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import (
@@ -127,8 +128,7 @@ def _given(
     try:
         return evaluate(str(value), unit)
     except ExpressionError as error:
-        found = quoted(str(value))
-        problems.add(0, f"{option}: expected a number in {unit}, found {found}: {error}")
+        problems.add(0, f"{option}: {error}")
         return 0.0
 
 

@@ -17,7 +17,7 @@ from vsacli.base.simulation_variables import COMMANDS, measured
 from vsacli.base.texts import counted
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.documents.column_mapping import ColumnMapping
-from vsacli.documents.csv_file import split_heading
+from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
@@ -138,12 +138,14 @@ def read_recording(
         for text in _unusable(names, table.others, places, stranger)
     ]
     factors: dict[int, float] = {}
+    refused: list[tuple[str, str]] = []
     for index, (name, unit) in enumerate(headings):
         if name == TIME or name in places:
             try:
                 factors[index] = _factor(unit, "s" if name == TIME else places[name].unit)
             except InputError as error:
-                problems.append(Problem(table.source.path, table.header_line, f"column {name!r}: {error}"))
+                refused.append((name, str(error)))
+    problems += [Problem(table.source.path, table.header_line, text) for text in of_columns(refused)]
     if problems:
         raise InputError(problems)
     order = {name: number for number, name in enumerate(places)}

@@ -20,7 +20,8 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANY_SI_UNIT
 from vsacli.documents import tree
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 from vsacli.documents.reading import ChangeError, changed
 from vsacli.documents.record_values import Entry, NumberPath, numbers
 from vsacli.documents.record_values import Number as NumberAt
@@ -195,9 +196,7 @@ def _number(text: str, unit: str) -> float:
     try:
         number = float(evaluate(text, unit or str(ANY_SI_UNIT)))
     except ExpressionError as error:
-        raise InputError.one(
-            f"expected a number{f' in {unit}' if unit else ''}, found {text!r}: {error}"
-        ) from None
+        raise InputError.one(str(error)) from None
     return number
 
 

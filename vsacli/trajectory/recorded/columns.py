@@ -13,7 +13,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.documents.csv_file import split_heading
+from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -189,14 +189,16 @@ def _measured(
     for quantity, columns in naming.items():
         for index, column in columns.items():
             expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, types)
+    refused: list[tuple[str, str]] = []
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         if name in expected:
             try:
                 factor = 1.0 if unit is None else conversion_factor(unit, expected[name])
             except InputError as error:
-                problems.append(f"column {name!r}: {error}")
+                refused.append((name, str(error)))
             else:
                 yield name, Column(place, name, factor)
+    problems.extend(of_columns(refused))
 
 
 def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:

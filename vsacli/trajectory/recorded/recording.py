@@ -276,7 +276,7 @@ def recorded_trajectory(
     try:
         times = recording.times_at(rate, "")
     except InputError as error:
-        raise ChangeError(error.problems) from None
+        raise ChangeError(error.problems, f"rate={rate}") from None
     return Trajectory(
         times,
         profiles[POSITION.key],
