@@ -34,6 +34,10 @@ def test_of_many_words_with_one_beginning_the_most_similar_is_proposed() -> None
     assert nearest("tau", ["tau_e", "tau_motor", "tau_damper", "tau_transmission"]) == "tau_e"
 
 
+def test_a_valid_word_is_its_own_nearest_though_others_begin_with_it() -> None:
+    assert nearest("k", ["k_c", "k", "kind"]) == "k"
+
+
 @pytest.mark.parametrize(("name", "near"), [("foo", "; valid: time, q, dq"), ("thta_std", "'theta_std'")])
 def test_standard_deviations_are_proposed_only_for_one(name: str, near: str) -> None:
     with pytest.raises(InputError) as caught:

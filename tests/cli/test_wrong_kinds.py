@@ -108,7 +108,7 @@ _COMPUTE = "to compute a result: vsacli invdyn arm.yaml TRAJECTORY"
         ("invdyn robots move.yaml", "robots: is a folder; give the name of a file in it"),
         (
             "sensitivity arm.yaml move.yaml --tolerances arm.yaml",
-            "is a robot, but --tolerances must be a tolerances file (YAML)",
+            "is a robot, but --tolerances must be a tolerances file (YAML, e.g. joints.*.link.mass: {",
         ),
         (
             "simulate arm.yaml move.yaml --controller feedback-linearization --poles move.yaml",

@@ -144,13 +144,16 @@ def test_json_has_every_number(vsacli, tmp_path):
 BAD = {
     "no parameter of the robot matches 'joints.*.max'": ["--parameters", "joints.*.max"],
     "t.yaml: no such file": ["--tolerances", "t.yaml"],
-    "must be positive, not -3%": ["--tolerances", "-3%"],
-    "must be at most 1e+30, not 1e300%": ["--tolerances", "1e300%"],
-    "must be at most 100 %, not 300%": ["--tolerances", "300%"],
+    "'-3%': expected a share from 0 % to 100 %, e.g. 2% or 0.02": ["--tolerances", "-3%"],
+    "'1e300%': expected a share from 0 % to 100 %, e.g. 2% or 0.02": ["--tolerances", "1e300%"],
+    "'300%': expected a share from 0 % to 100 %, e.g. 2% or 0.02": ["--tolerances", "300%"],
     "none of 2 drawn robots is valid; choose smaller": ["--tolerances", "wide.yaml", "--monte-carlo", "2"],
-    "'x%' is not a tolerance": ["--tolerances", "x%"],
+    "'x%': expected a share from 0 % to 100 %, e.g. 2% or 0.02": ["--tolerances", "x%"],
     "'5' has no unit; write 5% for all parameters, or name a YAML file": ["--tolerances", "5"],
-    "coarse.yaml: is a trajectory; expected a tolerances file, which": ["--tolerances", "coarse.yaml"],
+    "coarse.yaml: is a trajectory, but --tolerances must be a tolerances file (YAML, e.g. joints": [
+        "--tolerances",
+        "coarse.yaml",
+    ],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
     "bad.yaml:2: no parameter of the robot matches": ["--tolerances", "bad.yaml"],
@@ -234,10 +237,12 @@ def test_plot_draws_the_ranking_of_a_file(vsacli, tmp_path):
     (figure,) = (tmp_path / "again").iterdir()
     assert figure.name == "s-ranking.png"
     assert figure.read_bytes() == (tmp_path / "figures" / "vsa_3r-coarse-ranking.png").read_bytes()
+    (tmp_path / "copy.h5").write_bytes((tmp_path / "s.h5").read_bytes())
     for options, part in (
-        (["s.h5"], "one at a time"),
+        (["s.h5"], "s.h5 is given twice"),
+        (["copy.h5"], "one at a time"),
         (["--format", "html"], "for results, simulations and studies"),
-        (["--joints", "elbow"], "not of sensitivity analyses"),
+        (["--joints", "elbow"], "--joints cannot be used with sensitivity files"),
     ):
         refused = vsacli("plot", "s.h5", *options, "-o", "other")
         assert refused.code == 2

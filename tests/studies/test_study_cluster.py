@@ -183,7 +183,10 @@ def test_a_worker_reads_the_study_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("address", "message"),
     [
-        ("nonsense", "; expected the address of a Dask scheduler such as tcp://host:8786, or local\n"),
+        (
+            "nonsense",
+            "expected the address of a scheduler such as tcp://host:8786, or local, found 'nonsense'\n",
+        ),
         ("", "is empty; is a shell variable in the command unset?"),
     ],
 )

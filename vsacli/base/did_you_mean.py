@@ -66,9 +66,11 @@ def _similar(missing: Path) -> Path | None:
 
 
 def _near(word: str, options: list[str]) -> list[str]:
-    """Return the few words that begin with this one, or else the most similar word."""
+    """Return the word itself, or the few words that begin with it, or else the most similar word."""
     import difflib  # loaded for error messages only
 
+    if word in options:
+        return [word]
     longer = [option for option in options if word and option.startswith(word)]
     if 0 < len(longer) <= MOST_NEAR:
         return longer

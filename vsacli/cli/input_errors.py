@@ -84,7 +84,9 @@ _KINDS = {
     "motor catalog": _Words(
         "a motor catalog", "a motor catalog", "CSV", "give it to size as --catalog {file}"
     ),
-    "tolerances": _Words("a tolerances file", "a tolerances file", "YAML"),
+    "tolerances": _Words(
+        "a tolerances file", "a tolerances file", "YAML, e.g. joints.*.link.mass: {normal: 2 %}"
+    ),
 }
 """Words by kind; tolerances have no key `format`, so that they are not recognized."""
 
