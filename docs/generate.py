@@ -167,7 +167,7 @@ def study_columns() -> str:
 
 
 def robot_rules() -> str:
-    """What numbers of a robot are held against."""
+    """Table of the plausibility rules of robots."""
     return _rules(ROBOT_RULES)
 
 
@@ -178,7 +178,7 @@ def trajectory_rules() -> str:
 
 def _rules(rules: Iterable[Rule[Any]]) -> str:
     return table(
-        ("what", "keys", "size", "passes", "since"),
+        ("value", "keys", "size", "passes", "reason"),
         ((rule.name, rule.fields, rule.size, _bounds(rule.low, rule.high), rule.reason) for rule in rules),
     )
 
