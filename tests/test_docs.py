@@ -154,12 +154,20 @@ def test_internal_links_resolve(page: Path) -> None:
 def test_the_first_page_lists_every_page() -> None:
     """Its lists are the contents of the site."""
     docs = REPOSITORY / "docs"
-    listed = re.findall(
-        r"^- \[[^\]]+\]\((\S+\.md)\)", (docs / "index.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    index = (docs / "index.md").read_text(encoding="utf-8")
+    groups = re.findall(r"^## (.*)$", index, re.MULTILINE)
+    assert groups == ["Tutorials", "How-to guides", "Reference", "Explanation", "Contributing"]
+    listed = re.findall(r"^- \[[^\]]+\]\((\S+\.md)\)", index, re.MULTILINE)
     assert sorted(listed) == sorted(
         page.relative_to(docs).as_posix() for page in docs.rglob("*.md") if page.name != "index.md"
     )
+
+
+def test_exit_codes_are_listed_once() -> None:
+    """Other pages link to the table."""
+    assert [
+        page.name for page in PAGES if re.search(r"^\|.*exit code.*\|\n\| ---", page.read_text(), re.M)
+    ] == ["cli.md"]
 
 
 def anchors(page: Path) -> set[str]:
