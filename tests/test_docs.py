@@ -31,11 +31,12 @@ from vsacli.documents.tree import MAX_LEVELS, MAX_NODES
 REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
+TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*.md"))
 
 LONG = (
     *("cli.md", "codegen.md", "damping.md", "energy.md", "engines.md", "figures.md", "file-formats.md"),
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
-    *("models.md", "optimization.md", "pages.md", "plausibility.md", "python.md", "quickstart.md"),
+    *("models.md", "optimization.md", "pages.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
@@ -139,7 +140,7 @@ def test_every_command_explains_itself(name: str) -> None:
     assert any(line.startswith(f"vsacli {name} ") for line in shown), f"no example for {name}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
+@pytest.mark.parametrize("page", [*PAGES, *TUTORIALS], ids=named)
 def test_internal_links_resolve(page: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
@@ -153,12 +154,20 @@ def test_internal_links_resolve(page: Path) -> None:
 def test_the_first_page_lists_every_page() -> None:
     """Its lists are the contents of the site."""
     docs = REPOSITORY / "docs"
-    listed = re.findall(
-        r"^- \[[^\]]+\]\((\S+\.md)\)", (docs / "index.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    index = (docs / "index.md").read_text(encoding="utf-8")
+    groups = re.findall(r"^## (.*)$", index, re.MULTILINE)
+    assert groups == ["Tutorials", "How-to guides", "Reference", "Explanation", "Contributing"]
+    listed = re.findall(r"^- \[[^\]]+\]\((\S+\.md)\)", index, re.MULTILINE)
     assert sorted(listed) == sorted(
         page.relative_to(docs).as_posix() for page in docs.rglob("*.md") if page.name != "index.md"
     )
+
+
+def test_exit_codes_are_listed_once() -> None:
+    """Other pages link to the table."""
+    assert [
+        page.name for page in PAGES if re.search(r"^\|.*exit code.*\|\n\| ---", page.read_text(), re.M)
+    ] == ["cli.md"]
 
 
 def anchors(page: Path) -> set[str]:
@@ -234,7 +243,8 @@ def test_every_extra_package_has_its_reason() -> None:
         assert re.search(rf"^\| .*`{name[0]}`.* \| \w.* \|$", table, re.MULTILINE), requirement
 
 
-def test_the_changelog_begins_with_what_is_not_released_and_this_version() -> None:
+def test_the_changelog_begins_with_this_version() -> None:
     changelog = (REPOSITORY / "docs" / "changelog.md").read_text(encoding="utf-8")
-    assert re.findall(r"^## (.*)$", changelog, re.MULTILINE)[:2] == ["Unreleased", vsacli.__version__]
+    newest = re.findall(r"^## (.*)$", changelog, re.MULTILINE)[0]
+    assert re.fullmatch(rf"{re.escape(vsacli.__version__)} \((unreleased|\d{{4}}-\d\d-\d\d)\)", newest)
     assert importlib.metadata.version("vsacli") == vsacli.__version__

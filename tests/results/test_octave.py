@@ -1,4 +1,4 @@
-"""GNU Octave reads the variables of a result that are named to it, as the quickstart says."""
+"""GNU Octave reads the variables of a result that are named to it, as docs/file-formats.md says."""
 
 from __future__ import annotations
 

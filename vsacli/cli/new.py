@@ -104,7 +104,7 @@ class _JointType(_ActuatorType):
     short_help="Write a robot file with given joints.",
     epilog=example(
         "vsacli new robot --joints RRP -o arm.yaml",
-        "vsacli new robot --joint base:rigid --joint elbow:serial:lever -o arm.yaml",
+        "vsacli new robot --joint base:rigid --joint elbow:serial:lever -o mixed.yaml",
     ),
 )
 @click.option(
