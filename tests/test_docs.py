@@ -33,11 +33,11 @@ README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
-    *("cli.md", "codegen.md", "damping.md", "energy.md", "engines.md", "figures.md", "file-formats.md"),
+    *("cli.md", "codegen.md", "damping.md", "energy.md", "figures.md", "file-formats.md"),
     *("friction.md", "gallery.md", "identification.md", "index.md", "measured.md", "mending-a-motion.md"),
-    *("models.md", "optimization.md", "pages.md", "plausibility.md", "python.md", "quickstart.md"),
-    *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
-    *("simulation.md", "sizing.md", "studies.md", "suggestions.md", "urdf.md"),
+    *("models.md", "optimization.md", "pages.md", "performance.md", "plausibility.md", "python.md"),
+    *("quickstart.md", "reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md"),
+    *("serial.md", "simulation.md", "sizing.md", "studies.md", "suggestions.md", "urdf.md"),
 )
 """Pages whose examples take more than half a second."""
 
