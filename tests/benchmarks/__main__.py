@@ -1,7 +1,7 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
-Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts what was
-found into docs/performance.md, docs/performance-notes.md and docs/codegen.md, each part as soon as it is there;
+Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts each
+part, as soon as it is there, into docs/performance.md, docs/performance-notes.md or docs/codegen.md;
 `--only growth,startup` measures parts.
 """
 
