@@ -195,8 +195,8 @@ def variables() -> str:
 
 
 def simulation_variables() -> str:
-    """Variables of a simulation file."""
-    return _variables(SIMULATION_VARIABLES)
+    """Variables of a simulation file that a result does not have."""
+    return _variables({name: each for name, each in SIMULATION_VARIABLES.items() if name not in VARIABLES})
 
 
 def _variables(declared: Mapping[str, Variable]) -> str:
