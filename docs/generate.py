@@ -254,8 +254,8 @@ def _link(path: Path) -> str:
 
 
 def _origin(example: Example) -> str:
-    """The comment of its file, without what all files say of their units."""
-    comment = re.sub(r" ?Numbers are SI;[^.]*\.", "", opening_comment(example.path))
+    """The comment of its file, without the sentences that are the same in many files."""
+    comment = re.sub(r" ?(Numbers are SI;|Mechanism and law are)[^.]*\.", "", opening_comment(example.path))
     return textwrap.fill(comment, 118, break_long_words=False, break_on_hyphens=False)
 
 
