@@ -195,8 +195,8 @@ def variables() -> str:
 
 
 def simulation_variables() -> str:
-    """Variables of a simulation file."""
-    return _variables(SIMULATION_VARIABLES)
+    """Variables of a simulation file that a result does not have."""
+    return _variables({name: each for name, each in SIMULATION_VARIABLES.items() if name not in VARIABLES})
 
 
 def _variables(declared: Mapping[str, Variable]) -> str:
@@ -254,8 +254,8 @@ def _link(path: Path) -> str:
 
 
 def _origin(example: Example) -> str:
-    """The comment of its file, without what all files say of their units."""
-    comment = re.sub(r" ?Numbers are SI;[^.]*\.", "", opening_comment(example.path))
+    """The comment of its file, without the sentences that are the same in many files."""
+    comment = re.sub(r" ?(Numbers are SI;|Mechanism and law are)[^.]*\.", "", opening_comment(example.path))
     return textwrap.fill(comment, 118, break_long_words=False, break_on_hyphens=False)
 
 

@@ -34,9 +34,9 @@ PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*.md"))
 
 LONG = (
-    *("cli.md", "codegen.md", "damping.md", "energy.md", "engines.md", "figures.md", "file-formats.md"),
+    *("cli.md", "codegen.md", "damping.md", "energy.md", "figures.md", "file-formats.md"),
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
-    *("models.md", "optimization.md", "pages.md", "plausibility.md", "python.md"),
+    *("models.md", "optimization.md", "pages.md", "performance.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
