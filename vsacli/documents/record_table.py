@@ -185,7 +185,10 @@ def _as_written(message: str, cells: Sequence[str], columns: _Columns) -> str:
     if field not in columns.units:
         return message
     cell, (written, expected) = cells[columns.places[field]], columns.units[field]
-    converted = f"{float(_in_si(cell, columns.factors[field])):g} {expected}"
+    try:
+        converted = f"{float(_in_si(cell, columns.factors[field])):g} {expected}"
+    except ValueError:  # a text, which was not converted
+        return message
     return message.replace(converted, f"{cell} {written}")
 
 
