@@ -21,12 +21,17 @@ from matplotlib.patches import Patch
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.look import current_look
+from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, shortened
+from vsacli.results.plots.styles import new_figure, shortened
 
 LABEL_WIDTH = 0.55
 """Width of the column of names, relative to a view."""
+
+NARROWEST_VIEW, VIEW_HEIGHT = 1.75, 2.1
+"""Smallest width of a view, and its height where one is above the others, at the usual font size, inches."""
 
 NAME_LENGTH, MOST_NAMES = 18, 14
 """Characters in the name of a joint, and number of names that fit into the column."""
@@ -46,6 +51,9 @@ ARROW_SHARE = 0.19
 SHORTEST_ARROW = 0.3
 """Share of its length below which an arrow of a frame, seen from its tip, is left out."""
 
+NAME_SIZE, ARROW_SIZE = 9, 8
+"""Sizes of the names of joints and arrows at the usual font size, points."""
+
 EDGE = 0.7
 """Width of edges, points."""
 
@@ -64,15 +72,30 @@ _ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.
 
 def arm_figure(chart: ArmChart) -> Figure:
     """Draw the views of an arm at one scale; the first one names the joints."""
-    with house_style():
-        widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
-        figure = Figure((PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4), layout="constrained")
-        panels = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
+    widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
+
+    def natural(columns: int) -> tuple[float, float]:
+        if columns == len(widths):
+            return PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4
+        return PANEL_WIDTH * 2, VIEW_HEIGHT * 2 + 1.0
+
+    columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * sum(widths) / len(widths))
+    with new_figure(natural(columns)) as figure:
+        panels = _panels(figure, widths, stacked=columns < len(widths))
         for axes, view in zip(panels, chart.views, strict=True):
             _frame_panel(axes, chart, view, named=view is chart.views[0])
             _draw_arm(axes, chart, view)
         _name_joints(panels[0], chart, chart.views[0])
         return complete(figure, chart.title, _handles(chart))
+
+
+def _panels(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[Axes]:
+    """Return panels of these widths side by side, or the first one above the others."""
+    if not stacked:
+        return list(figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0])
+    places = figure.add_gridspec(2, len(widths) - 1)
+    first = figure.add_subplot(places[0, :])
+    return [first, *(figure.add_subplot(places[1, column]) for column in range(len(widths) - 1))]
 
 
 def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> None:
@@ -192,7 +215,7 @@ def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, na
         return
     axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
     x, y = tail + 1.25 * (tip - tail)
-    axes.text(x, y, name, fontsize=8, ha="center", va="center", zorder=5)
+    axes.text(x, y, name, fontsize=current_look().points(ARROW_SIZE), ha="center", va="center", zorder=5)
 
 
 def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
@@ -202,11 +225,11 @@ def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
     names = [shortened(joint.name, NAME_LENGTH) for joint in chart.joints[::every]]
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     column = left + (right - left) / (1 + LABEL_WIDTH)
-    gap = (top - bottom) / (MOST_NAMES + 1)
+    gap, size = (top - bottom) / (MOST_NAMES + 1), current_look().points(NAME_SIZE)
     heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
     for (x, y), height, name in zip(places, heights, names, strict=True):
         axes.plot([x, column, column + gap / 2], [y, height, height], **_LEADER, zorder=1)
-        axes.text(column + 0.7 * gap, height, name, fontsize=9, va="center", parse_math=False)
+        axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
 
 
 def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.results.charts.chart import ATTAINABLE, UNCERTAIN, Chart, Failures, Limit, Line
+from vsacli.results.charts.look import current_look
 from vsacli.results.charts.reduction import Curve, marked_spans
 from vsacli.results.plots.styles import LineStyle, line_style, shortened
 
@@ -48,11 +49,12 @@ MARK_DEPTH = 0.03
 STRIP = 0.03
 """Height of the strip that marks failures of one of several joints, relative to the panel."""
 
+SMALL = 8.33
+"""Font size of notes inside a panel, points at the usual font size."""
+
 NOTE_LENGTH = 24
 """Longest line of a note inside a panel, characters."""
 
-_SMALL: dict[str, Any] = {"fontsize": "small", "color": "0.35"}
-_NOTE: dict[str, Any] = {**_SMALL, "ha": "center", "va": "center"}
 _MARK: dict[str, Any] = {"markersize": 6, "linestyle": ""}
 _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5}
 
@@ -88,9 +90,15 @@ def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
 
 def _write_note(axes: Axes, note: str, *, empty: bool) -> None:
     """Write a note into the middle of a panel, and remove the ticks of values if it is empty."""
-    axes.text(0.5, 0.5, textwrap.fill(note, NOTE_LENGTH), **_NOTE, transform=axes.transAxes)
+    _write_inside(axes, (0.5, 0.5), textwrap.fill(note, NOTE_LENGTH), ha="center", va="center")
     if empty:
         axes.set_yticks([])
+
+
+def _write_inside(axes: Axes, place: tuple[float, float], text: str, *, ha: str, va: str) -> None:
+    """Write small gray text at a place relative to the panel."""
+    size = current_look().points(SMALL)
+    axes.text(*place, text, ha=ha, va=va, fontsize=size, color="0.35", transform=axes.transAxes)
 
 
 def add_title(axes: Axes, title: str) -> None:
@@ -174,7 +182,7 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     if distant:
         words = "limits" if len(distant) > 1 else "limit"
         text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
-        axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, **_SMALL)
+        _write_inside(axes, (0.98, 0.97), text, ha="right", va="top")
     return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
 
 
@@ -293,7 +301,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: fl
         textcoords="offset points",
         ha="right" if at_right else "left",
         va="top" if sign > 0 else "bottom",
-        fontsize="small",
+        fontsize=current_look().points(SMALL),
         color=farthest.color,
         bbox=_BACKGROUND,
     )

@@ -15,13 +15,14 @@ from matplotlib.patches import Patch
 
 from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, folding
 from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import ZERO, add_title, draw_curve
 from vsacli.results.plots.sheets import AxesGrid, complete, share_time
-from vsacli.results.plots.styles import LineStyle, house_style, line_handle, line_style
+from vsacli.results.plots.styles import LineStyle, line_handle, line_style, new_figure
 
 COLUMNS, MOST_ROWS = 4, 14
-ROW_HEIGHT = 1.8
-"""Height of a row of panels, inches."""
+ROW_HEIGHT, LABEL_HEIGHT = 1.8, 0.4
+"""Height of a row of panels, and of the labels below a row, inches."""
 
 LEAST_DENSITY = 1e-12
 """Density, relative to the largest, below which only rounding errors remain and nothing is shown."""
@@ -37,14 +38,11 @@ _FIT = LineStyle(line_style(1).color, "-", "")
 
 def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
     """Draw four panels for each component: samples and spline, their difference, and two spectra."""
-    with house_style():
-        rows, folds = folding(len(curves), MOST_ROWS)
-        figure = Figure((COLUMNS * folds * PANEL_WIDTH, ROW_HEIGHT * rows + 1.2), layout="constrained")
-        grid = figure.add_gridspec(rows, COLUMNS * folds).subplots(squeeze=False)
-        panels = grid.reshape(rows, folds, COLUMNS).swapaxes(0, 1).reshape(-1, COLUMNS)
-        for unused in panels[len(curves) :].flat:
-            unused.remove()
-        _label_axes(panels[: len(curves)], curves, rows)
+    rows, folds = folding(len(curves), MOST_ROWS)
+    across = _panels_across(rows, folds)
+    folds = folds if across == COLUMNS else 1
+    with new_figure(_natural(len(curves), folds, across)) as figure:
+        panels = _panels(figure, curves, folds, across)
         handles: list[Artist] = [Line2D([], [], **_SAMPLES, label="recorded"), line_handle(_FIT, "spline")]
         for curve, (signal, residual, spectrum, highest) in zip(curves, panels, strict=False):
             handles += _draw_signal(signal, curve)
@@ -56,8 +54,40 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
         return complete(figure, title, handles)
 
 
+def _natural(count: int, folds: int, across: int) -> tuple[float, float]:
+    """Return the size of the figure with `across` of the panels of a component side by side, inches."""
+    rows = math.ceil(count / folds)
+    labels = 0.0 if across == COLUMNS else LABEL_HEIGHT
+    return across * folds * PANEL_WIDTH, (ROW_HEIGHT + labels) * rows * COLUMNS / across + 1.2
+
+
+def _panels_across(rows: int, folds: int) -> int:
+    """Return the number of panels of a component side by side: 4, or 2 or 1 where the figure is narrow."""
+    count = rows * folds
+    natural = {4 * folds: (folds, 4), 2: (1, 2), 1: (1, 1)}
+
+    def size(columns: int) -> tuple[float, float]:
+        return _natural(count, *natural.get(columns, (folds, 4)))
+
+    columns = columns_of_panels(COLUMNS * folds, size)
+    return COLUMNS if columns >= COLUMNS else min(columns, 2)
+
+
+def _panels(figure: Figure, curves: Sequence[RecordedCurve], folds: int, across: int) -> AxesGrid:
+    """Return panels with labels of time and frequency, (components, 4)."""
+    rows, parts = math.ceil(len(curves) / folds), COLUMNS // across
+    grid = figure.add_gridspec(rows * parts, folds * across).subplots(squeeze=False)
+    grid = grid.reshape(rows, parts, folds, across).transpose(2, 0, 1, 3)
+    panels: AxesGrid = grid.reshape(-1, COLUMNS)
+    for unused in panels[len(curves) :].flat:
+        unused.remove()
+    # Panels of other axes lie between those of one kind unless all are side by side: each is labeled.
+    _label_axes(panels[: len(curves)], curves, rows if parts == 1 else 1)
+    return panels
+
+
 def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) -> None:
-    """Share the time axis of the panels of a column, and label it below the last."""
+    """Share the time axis of the panels of a column of so many rows, and label it below the last."""
     times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
     span = np.array([min(times), max(times)])
     for first in range(0, len(panels), rows):

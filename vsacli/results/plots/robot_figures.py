@@ -13,20 +13,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.look import current_look
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, TorqueCurve
+from vsacli.results.plots.arrangement import panel_grid
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, line_style, shortened
+from vsacli.results.plots.styles import line_style, shortened
 
 PANEL_HEIGHT = 2.7
 """Height of a panel, inches."""
 
+LEGEND_SIZE = 8
+"""Font size of legends inside a panel, points at the usual font size."""
+
 TITLE_LENGTH = 34
 """Characters in a line of the title of a panel, which has two lines."""
-
-MOST_ROWS = 6
-"""Maximum number of rows of two panels; further panels continue at the right."""
 
 WIDE_RATIO, SMALLEST_SHARE = 50.0, 1e-4
 """Ratio of the largest to the median minimum stiffness from which the axis is logarithmic, and the lowest
@@ -47,8 +48,7 @@ _LIMIT: dict[str, dict[str, Any]] = {
 
 def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the torque over deflection of the springs, a panel for joints with equal actuators."""
-    with house_style():
-        figure, panels = _panels(len(charts))
+    with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
             _name(axes, chart)
@@ -58,25 +58,12 @@ def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
 
 def stiffness_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the attainable stiffness over torque, a panel for joints with equal actuators."""
-    with house_style():
-        figure, panels = _panels(len(charts))
+    with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
             _name(axes, chart)
             handles += _draw_map(axes, chart)
         return complete(figure, f"{title}: attainable stiffness at rest", handles)
-
-
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure with so many panels, row by row."""
-    columns = min(2 * math.ceil(count / (2 * MOST_ROWS)), count)
-    rows = math.ceil(count / columns)
-    size = (max(PANEL_WIDTH * columns, 2 * PANEL_WIDTH), PANEL_HEIGHT * rows + 1.1)
-    figure = Figure(size, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).flatten()
-    for unused in panels[count:]:
-        unused.remove()
-    return figure, list(panels[:count])
 
 
 def _name(axes: Axes, chart: ActuatorChart) -> None:
@@ -116,7 +103,8 @@ def _legend(axes: Axes, chart: ActuatorChart, curves: Sequence[TorqueCurve]) -> 
     mechanism = chart.actuator.spring_elements is None
     title = rf"$\theta_2$ [{chart.unit('theta')}]" if mechanism else None
     if mechanism or len(curves) > 1 or chart.commanded:
-        axes.legend(loc="upper left", fontsize=8, title=title, title_fontsize=8, handlelength=2.2)
+        size = current_look().points(LEGEND_SIZE)
+        axes.legend(loc="upper left", fontsize=size, title=title, title_fontsize=size, handlelength=2.2)
 
 
 def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:

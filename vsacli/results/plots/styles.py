@@ -53,14 +53,18 @@ SETTINGS: dict[RcKeyType, Any] = {
     "svg.hashsalt": "vsacli",
 }
 
-SCALED: tuple[RcKeyType, ...] = (
+TEXTS: tuple[RcKeyType, ...] = (
     "font.size",
     *("axes.titlesize", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize"),
+)
+"""Sizes of texts, which follow the font size of the look but stay legible."""
+
+SCALED: tuple[RcKeyType, ...] = (
     *("lines.linewidth", "lines.markersize", "lines.markeredgewidth", "axes.linewidth", "grid.linewidth"),
     *("xtick.major.size", "ytick.major.size", "xtick.major.width", "ytick.major.width", "patch.linewidth"),
     *("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"),
 )
-"""Settings that follow the font size of the look."""
+"""Other settings that follow the font size of the look."""
 
 LONGEST_LABEL = 36
 """Maximum length of a name in a legend, characters."""
@@ -111,23 +115,26 @@ def shortened(name: str, length: int = LONGEST_LABEL) -> str:
 
 
 @contextmanager
-def house_style(natural: tuple[float, float] | None = None) -> Iterator[None]:
-    """Draw with these settings and the current look alone, regardless of a matplotlibrc on this machine.
-
-    Args:
-        natural: size of the figure at the usual font size, inches, to which the font is fitted.
-    """
-    look = current_look() if natural is None else current_look().fitted(natural)
-    with matplotlib.rc_context(), drawing_with(look):
+def house_style() -> Iterator[None]:
+    """Draw with these settings and the current look alone, regardless of a matplotlibrc on this machine."""
+    look = current_look()
+    with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
+        matplotlib.rcParams.update({name: look.points(matplotlib.rcParams[name]) for name in TEXTS})
         matplotlib.rcParams.update({name: look.scale * matplotlib.rcParams[name] for name in SCALED})
         yield
 
 
-def blank_figure(natural: tuple[float, float]) -> Figure:
-    """Return an empty figure with the current look; `natural` is its size at the usual font size, inches."""
-    return Figure(current_look().size(natural), layout="constrained")
+@contextmanager
+def new_figure(natural: tuple[float, float]) -> Iterator[Figure]:
+    """Yield an empty figure to draw with the settings of `house_style`.
+
+    Args:
+        natural: size of the figure at the usual font size, inches, to which the font is fitted.
+    """
+    with drawing_with(current_look().fitted(natural)), house_style():
+        yield Figure(current_look().size(natural), layout="constrained")
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
