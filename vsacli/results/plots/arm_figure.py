@@ -23,6 +23,7 @@ from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arrangement import columns_of_panels
+from vsacli.results.plots.long_texts import POINTS_PER_INCH
 from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import new_figure, shortened
@@ -30,7 +31,7 @@ from vsacli.results.plots.styles import new_figure, shortened
 LABEL_WIDTH = 0.55
 """Width of the column of names, relative to a view."""
 
-NARROWEST_VIEW, VIEW_HEIGHT = 1.75, 2.1
+NARROWEST_VIEW, VIEW_HEIGHT = 2.0, 2.6
 """Smallest width of a view, and its height where one is above the others, at the usual font size, inches."""
 
 NAME_LENGTH, MOST_NAMES = 18, 14
@@ -53,6 +54,9 @@ SHORTEST_ARROW = 0.3
 
 NAME_SIZE, ARROW_SIZE = 9, 8
 """Sizes of the names of joints and arrows at the usual font size, points."""
+
+NAME_LINE = 1.5
+"""Height of the line of a name relative to its size, where the legend is not yet drawn."""
 
 EDGE = 0.7
 """Width of edges, points."""
@@ -220,16 +224,27 @@ def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, na
 
 def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
     """Write names in a column at the right, each with a line to its joint; of long chains only some."""
-    every = math.ceil(len(chart.joints) / MOST_NAMES)
+    most, size = _names_that_fit(axes), current_look().points(NAME_SIZE)
+    every = math.ceil(len(chart.joints) / most)
     places = view.project(chart.centers)[::every]
     names = [shortened(joint.name, NAME_LENGTH) for joint in chart.joints[::every]]
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     column = left + (right - left) / (1 + LABEL_WIDTH)
-    gap, size = (top - bottom) / (MOST_NAMES + 1), current_look().points(NAME_SIZE)
+    gap = (top - bottom) / (most + 1)
     heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
     for (x, y), height, name in zip(places, heights, names, strict=True):
         axes.plot([x, column, column + gap / 2], [y, height, height], **_LEADER, zorder=1)
         axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
+
+
+def _names_that_fit(axes: Axes) -> int:
+    """Return the number of names that fit into the column, at most `MOST_NAMES`."""
+    look, figure = current_look(), axes.get_figure(root=True)
+    if look.width is None or figure is None:
+        return MOST_NAMES
+    figure.draw_without_rendering()
+    height = axes.get_window_extent().height / figure.dpi * POINTS_PER_INCH
+    return min(MOST_NAMES, max(1, int(height / (NAME_LINE * look.points(NAME_SIZE))) - 1))
 
 
 def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:

@@ -7,10 +7,10 @@ require. Where the height is fixed as well, the arrangement is chosen that permi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -27,11 +27,17 @@ AROUND, BETWEEN = 1.0, 0.4
 """Height of title, legend and labels of the time axis, and of the labels between stacked blocks, at the usual
 font size, inches."""
 
+HIGHEST = 9.5
+"""Height of a page, inches; higher figures of a fixed width have as many panels side by side as fit."""
+
 MOST_ROWS = 6
 """Maximum number of rows of two panels; further panels continue at the right."""
 
 MOST_COLUMNS = 8
 """Maximum number of panels side by side that is tried where width and height are fixed."""
+
+WORTHWHILE = 1.15
+"""Ratio of font sizes from which another arrangement than the declared one is chosen."""
 
 Size: TypeAlias = tuple[float, float]
 """Width and height of a figure at the usual font size, inches."""
@@ -62,9 +68,9 @@ def arranged(sheet: Sheet) -> Arrangement:
     if look.height is None:
         columns = _fitting()
         fits = sum(block.columns for block in sheet.blocks) <= columns
-        return declared if fits else _in_columns(sheet, columns)
+        return declared if fits and look.scale * sheet.size[1] <= HIGHEST else _in_columns(sheet, columns)
     others = (_in_columns(sheet, columns) for columns in range(1, MOST_COLUMNS + 1))
-    return max((declared, *others), key=lambda option: look.fitted(option.natural).font_size)
+    return _largest_font((declared, *others), lambda option: option.natural)
 
 
 def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: float = NARROWEST) -> int:
@@ -80,8 +86,7 @@ def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: 
         return declared
     if look.height is None:
         return min(declared, _fitting(narrowest))
-    options = (declared, *range(1, MOST_COLUMNS + 1))
-    return max(options, key=lambda columns: look.fitted(natural(columns)).font_size)
+    return _largest_font((declared, *range(1, MOST_COLUMNS + 1)), natural)
 
 
 @contextmanager
@@ -98,6 +103,16 @@ def panel_grid(count: int, height: float) -> Iterator[tuple[Figure, list[Axes]]]
         for unused in panels[count:]:
             unused.remove()
         yield figure, list(panels[:count])
+
+
+Option = TypeVar("Option")
+
+
+def _largest_font(options: Sequence[Option], natural: Callable[[Option], Size]) -> Option:
+    """Return the option with the largest font, or the first one if that is not much smaller."""
+    fonts = [current_look().fitted(natural(option)).font_size for option in options]
+    best = fonts.index(max(fonts))
+    return options[best if fonts[best] > WORTHWHILE * fonts[0] else 0]
 
 
 def _fitting(narrowest: float = NARROWEST) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,9 @@ STRIP = 0.03
 
 SMALL = 8.33
 """Font size of notes inside a panel, points at the usual font size."""
+
+NOTE_SIZE = (0.7, 0.2)
+"""Width and height of a note in a corner, relative to the panel."""
 
 NOTE_LENGTH = 24
 """Longest line of a note inside a panel, characters."""
@@ -182,8 +186,24 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     if distant:
         words = "limits" if len(distant) > 1 else "limit"
         text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
-        _write_inside(axes, (0.98, 0.97), text, ha="right", va="top")
+        place, aligned = _free_corner(axes)
+        _write_inside(axes, place, text, **aligned)
     return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
+
+
+def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
+    """Return the corner of a panel with the fewest points of curves, and the alignment of text there."""
+    to_panel = axes.transData + axes.transAxes.inverted()
+    points = [to_panel.transform(line.get_xydata()) for line in axes.lines if len(line.get_xdata()) > 2]
+
+    def occupied(corner: tuple[str, str]) -> int:
+        x, y = (0.5 - NOTE_SIZE[0], 0.5 - NOTE_SIZE[1])
+        signs = np.array([1 if corner[0] == "right" else -1, 1 if corner[1] == "top" else -1])
+        return sum(int(((each - 0.5) * signs > (x, y)).all(axis=1).sum()) for each in points)
+
+    ha, va = min(product(("right", "left"), ("top", "bottom")), key=occupied)
+    place = (0.98 if ha == "right" else 0.02, 0.97 if va == "top" else 0.03)
+    return place, {"ha": ha, "va": va}
 
 
 class _Failing(NamedTuple):

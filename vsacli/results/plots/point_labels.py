@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.look import current_look
+from vsacli.results.plots.long_texts import POINTS_PER_INCH
 
 SIZE = 8
 """Size of the font at the usual font size, points."""
@@ -19,8 +20,6 @@ LETTER, LINE = 0.075, 0.14
 
 GAP = 5.0
 """Distance between a point and its label at the usual font size, points."""
-
-POINTS_PER_INCH = 72.0
 
 
 class _Side(NamedTuple):

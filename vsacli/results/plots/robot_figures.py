@@ -26,6 +26,9 @@ PANEL_HEIGHT = 2.7
 LEGEND_SIZE = 8
 """Font size of legends inside a panel, points at the usual font size."""
 
+LEGEND_ROOM = 0.15
+"""Space above and below the curves of a figure of a fixed width, relative to them."""
+
 TITLE_LENGTH = 34
 """Characters in a line of the title of a panel, which has two lines."""
 
@@ -92,6 +95,8 @@ def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
             axes.axvline(-curve.limit, **_LIMIT[LIMITS["phi"]])
             handles.append(Line2D([], [], **_LIMIT[LIMITS["phi"]], label=LIMITS["phi"]))
     axes.margins(x=0.04)
+    if current_look().width is not None:
+        axes.margins(y=LEGEND_ROOM)  # in narrow panels the legend is above the curves instead
     _legend(axes, chart, curves)
     axes.set_xlabel(f"deflection [{chart.unit('phi')}]")
     axes.set_ylabel(f"{_torque_words(chart)} [{chart.unit('tau_e')}]")

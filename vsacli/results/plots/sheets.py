@@ -20,7 +20,7 @@ from vsacli.results.charts import chart as charts
 from vsacli.results.charts.chart import Block, Sheet
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arrangement import arranged
-from vsacli.results.plots.long_texts import LINE, break_long_texts, broken
+from vsacli.results.plots.long_texts import LINE, broken, fit_texts
 from vsacli.results.plots.panels import draw_chart
 from vsacli.results.plots.styles import line_handle, line_style, make_legible, new_figure, shortened
 
@@ -142,7 +142,7 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
             figure.set_figheight(figure.get_figheight() + LINE * look.scale * more)
     make_legible(figure)
     if look.width is not None:
-        break_long_texts(figure)
+        fit_texts(figure)
     return figure
 
 

@@ -35,8 +35,8 @@ from vsacli.results.store.study_table import StoredStudy
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
 """Names of the figures, whose files are called `<stem>-<name>`."""
 
-PANEL_HEIGHT = 2.4
-"""Height of a panel, inches."""
+PANEL_HEIGHT, LOW_HEIGHT = 2.4, 1.8
+"""Height of a panel, and of each of several rows of parameters, inches."""
 
 MOST_LETTERS = 30
 """Longest line of a label along a panel, characters."""
@@ -118,7 +118,9 @@ def _over_numbers(points: StudyPoints) -> Figure:
     rows = 1 if points.cost is None or points.optimized else 2
 
     def natural(columns: int) -> tuple[float, float]:
-        return PANEL_WIDTH * max(2, columns), PANEL_HEIGHT * rows * math.ceil(len(paths) / columns) + 0.9
+        groups = math.ceil(len(paths) / columns)
+        height = PANEL_HEIGHT if groups == 1 else LOW_HEIGHT
+        return PANEL_WIDTH * max(2, columns), height * rows * groups + 0.9
 
     columns = min(len(paths), columns_of_panels(len(paths), natural))
     handles: list[Artist] = []

@@ -26,13 +26,16 @@ from vsacli.results.charts.look import current_look, drawing_with
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
+TICK_SIZE = 9
+"""Size of the labels of ticks at the usual font size, points."""
+
 SETTINGS: dict[RcKeyType, Any] = {
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.labelsize": 10,
     "legend.fontsize": 9.5,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
     "lines.linewidth": 1.5,
     "lines.markersize": 5,
     "axes.grid": True,
