@@ -93,8 +93,8 @@ def _lines(text: str, length: int, separators: tuple[str, ...]) -> list[str]:
 
 def _keep_inside(figure: Figure) -> None:
     """Leave space at the right for labels of ticks there, which some columns have outside of the layout."""
-    labels = [label for axes in figure.axes for label in axes.get_xticklabels() if label.get_visible()]
-    beyond = max((label.get_window_extent().x1 for label in labels), default=0.0) / figure.bbox.width - 1
+    ends = [label.get_window_extent().x1 for axes in figure.axes for label in _shown_labels(axes)]
+    beyond = max(ends, default=0.0) / figure.bbox.width - 1
     engine = figure.get_layout_engine()
     if beyond > 0 and isinstance(engine, ConstrainedLayoutEngine):
         engine.set(rect=(0.0, 0.0, 1.0 - beyond, 1.0))
@@ -106,12 +106,25 @@ def _thin_ticks(axes: Axes) -> None:
     if not isinstance(locator, MaxNLocator | FixedLocator):
         return
     for bins in range(len(axes.get_xticks()) - 1, 1, -1):
-        labels = [label for label in axes.get_xticklabels() if label.get_text() and label.get_visible()]
+        labels = _shown_labels(axes)
         extents = [label.get_window_extent() for label in labels]
         gap = TICK_GAP * labels[0].get_fontsize() * axes.figure.dpi / POINTS_PER_INCH if labels else 0.0
         if all(right.x0 - left.x1 >= gap for left, right in pairwise(extents)):
             return
         locator.set_params(nbins=bins)
+
+
+def _shown_labels(axes: Axes) -> list[Text]:
+    """Return the labels of the ticks of the horizontal axis that are drawn."""
+    low, high = sorted(axes.get_xlim())
+    room = 1e-6 * (high - low)
+    axes.get_xticklabels()  # places the ticks
+    shown = [
+        tick.label1
+        for tick in axes.xaxis.get_major_ticks()
+        if -room <= tick.get_loc() - low <= high - low + room
+    ]
+    return [label for label in shown if label.get_visible() and label.get_text()]
 
 
 def _longest(text: str) -> int:
