@@ -22,12 +22,13 @@ from matplotlib.patheffects import withStroke
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
-from vsacli.results.charts.look import current_look
+from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.ranking import Ranking
 from vsacli.results.charts.study_points import StudyPoints
 from vsacli.results.plots.arrangement import columns_of_panels
+from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
-from vsacli.results.plots.point_labels import BELOW, label_points
+from vsacli.results.plots.point_labels import BELOW, LETTER, label_points
 from vsacli.results.plots.sheets import AxesGrid, complete
 from vsacli.results.plots.styles import line_handle, line_style, new_figure, shortened
 from vsacli.results.store.study_table import StoredStudy
@@ -348,12 +349,14 @@ def _label(points: StudyPoints, path: str, length: int) -> str:
 def ranking_figure(ranking: Ranking) -> Figure:
     """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
     bars = ranking.bars
-    with new_figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2)) as figure:
+    labels = [_bar_label(bar.label) for bar in bars]
+    lines = max((label.count("\n") + 1 for label in labels), default=1)
+    with new_figure((2 * PANEL_WIDTH, BAR_HEIGHT * lines * len(bars) + 1.2)) as figure:
         axes, size = figure.add_subplot(), current_look().points(LABEL_SIZE)
         joints = list(dict.fromkeys(bar.joint for bar in bars))
         colors = [line_style(joints.index(bar.joint)).color for bar in bars]
         axes.barh(range(len(bars)), [100 * bar.share for bar in bars], color=colors, height=0.7)
-        axes.set_yticks(range(len(bars)), [bar.label for bar in bars], parse_math=False)
+        axes.set_yticks(range(len(bars)), labels, parse_math=False)
         axes.invert_yaxis()
         for place, bar in enumerate(bars):
             text = f" {shortened(bar.joint, LABEL_LENGTH)}"
@@ -362,3 +365,11 @@ def ranking_figure(ranking: Ranking) -> Figure:
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("change of motor torque [% of its peak]")
         return complete(figure, ranking.title, [])
+
+
+def _bar_label(label: str) -> str:
+    """Return the label of a bar, in lines of half the width of the figure if that alone is fixed."""
+    look = current_look()
+    if look.width is None or look.height is not None:
+        return label
+    return broken(label, int(look.width / CM_PER_INCH / 2 / (LETTER * look.scale)))
