@@ -86,7 +86,8 @@ def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: 
         return declared
     if look.height is None:
         return min(declared, _fitting(narrowest))
-    return _largest_font((declared, *range(1, MOST_COLUMNS + 1)), natural)
+    columns: int = _largest_font((declared, *range(1, MOST_COLUMNS + 1)), natural)
+    return columns
 
 
 @contextmanager

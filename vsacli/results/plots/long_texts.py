@@ -51,7 +51,7 @@ def fit_texts(figure: Figure) -> None:
     figure.draw_without_rendering()
     added: dict[int, int] = defaultdict(int)
     for axes in figure.axes:
-        _thin_ticks(axes)
+        _thin_ticks(axes, figure.dpi)
         for text, room, upright in _texts(axes):
             extent = text.get_window_extent()
             taken = extent.height if upright else extent.width
@@ -100,15 +100,14 @@ def _keep_inside(figure: Figure) -> None:
         engine.set(rect=(0.0, 0.0, 1.0 - beyond, 1.0))
 
 
-def _thin_ticks(axes: Axes) -> None:
+def _thin_ticks(axes: Axes, dpi: float) -> None:
     """Reduce the number of ticks of time, speed or torque until their labels are apart."""
     locator = axes.xaxis.get_major_locator()
     if not isinstance(locator, MaxNLocator | FixedLocator):
         return
+    gap = TICK_GAP * current_look().points(TICK_SIZE) * dpi / POINTS_PER_INCH
     for bins in range(len(axes.get_xticks()) - 1, 1, -1):
-        labels = _shown_labels(axes)
-        extents = [label.get_window_extent() for label in labels]
-        gap = TICK_GAP * labels[0].get_fontsize() * axes.figure.dpi / POINTS_PER_INCH if labels else 0.0
+        extents = [label.get_window_extent() for label in _shown_labels(axes)]
         if all(right.x0 - left.x1 >= gap for left, right in pairwise(extents)):
             return
         locator.set_params(nbins=bins)
@@ -135,8 +134,9 @@ def _texts(axes: Axes) -> Iterator[tuple[Text, float, bool]]:
     """Yield titles, labels and notes of a panel, each with its room in pixels and whether it is upright."""
     box = axes.get_window_extent()
     for text in axes.get_children():
-        in_panel = isinstance(text, Text) and not isinstance(text, Annotation)
-        if in_panel and (text not in axes.texts or text.get_transform() == axes.transAxes):
+        if not isinstance(text, Text) or isinstance(text, Annotation):
+            continue
+        if text not in axes.texts or text.get_transform() == axes.transAxes:
             yield text, box.width, False
     yield axes.xaxis.label, OVERHANG * box.width, False
     yield axes.yaxis.label, OVERHANG * box.height, True

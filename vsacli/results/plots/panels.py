@@ -194,7 +194,8 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
 def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
     """Return the corner of a panel with the fewest points of curves, and the alignment of text there."""
     to_panel = axes.transData + axes.transAxes.inverted()
-    points = [to_panel.transform(line.get_xydata()) for line in axes.lines if len(line.get_xdata()) > 2]
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines]
+    points = [to_panel.transform(line) for line in lines if len(line) > 2]
 
     def occupied(corner: tuple[str, str]) -> int:
         x, y = (0.5 - NOTE_SIZE[0], 0.5 - NOTE_SIZE[1])

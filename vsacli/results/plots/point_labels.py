@@ -65,7 +65,7 @@ def label_points(
     figure = axes.get_figure(root=True)
     assert figure is not None, "panels belong to figures"
     axes.autoscale_view()  # else the transformation below has not seen the last curves
-    size = axes.get_position().size * figure.get_size_inches() / _scale()
+    size = np.asarray(axes.get_position().size) * figure.get_size_inches() / _scale()
     points = [axes.transLimits.transform(place) * size for place in places]
     marks = [
         np.array([point - GAP / POINTS_PER_INCH / 2, point + GAP / POINTS_PER_INCH / 2]) for point in points
