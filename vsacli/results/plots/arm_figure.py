@@ -26,7 +26,7 @@ from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import POINTS_PER_INCH
 from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import new_figure, shortened
+from vsacli.results.plots.styles import new_figure, scaled, shortened
 
 LABEL_WIDTH = 0.55
 """Width of the column of names, relative to a view."""
@@ -126,15 +126,16 @@ def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> Non
 def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
     length, arrow, chain = chart.joint_length, ARROW_SHARE * chart.size, chart.chain
-    axes.plot(*view.project(chart.line).T, **_LINK, zorder=2)
+    axes.plot(*view.project(chart.line).T, **scaled(_LINK), zorder=2)
     for origin, center in zip(chain.origins[0], chart.centers, strict=False):  # joints moved along their axes
-        axes.plot(*view.project(np.stack((origin, center))).T, **{**_LINK, "linewidth": 2.5}, zorder=2)
+        moved = view.project(np.stack((origin, center))).T
+        axes.plot(*moved, **scaled({**_LINK, "linewidth": 2.5}), zorder=2)
     solids = sorted(_solids(chart), key=lambda solid: float(solid.middle @ view.toward))
     for rank, solid in enumerate(solids):
         _draw_solid(axes, solid, view, 3 + rank / len(solids))
     for center, axis in zip(chart.centers, chain.axes[0], strict=True):
         ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
-        axes.plot(*view.project(ends).T, **_AXIS, zorder=4.2)
+        axes.plot(*view.project(ends).T, **scaled(_AXIS), zorder=4.2)
     for direction, name in zip(chain.tool[0].T, "xyz", strict=True):
         _draw_arrow(axes, view, chain.origins[0, -1], arrow * direction, name)
     start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
@@ -203,7 +204,7 @@ def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
     )
     for rank, (faces, edges, width) in enumerate(layers):
         look: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
-        axes.add_collection(PolyCollection(faces, **look, zorder=order + 1e-4 * rank))
+        axes.add_collection(PolyCollection(faces, **scaled(look), zorder=order + 1e-4 * rank))
 
 
 def _area(face: FloatArray) -> float:
@@ -233,7 +234,7 @@ def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
     gap = (top - bottom) / (most + 1)
     heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
     for (x, y), height, name in zip(places, heights, names, strict=True):
-        axes.plot([x, column, column + gap / 2], [y, height, height], **_LEADER, zorder=1)
+        axes.plot([x, column, column + gap / 2], [y, height, height], **scaled(_LEADER), zorder=1)
         axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
 
 
@@ -271,7 +272,7 @@ def _handles(chart: ArmChart) -> list[Artist]:
     return [
         *handles,
         Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE, label="motor"),
-        Line2D([], [], **_AXIS, label="joint axis"),
-        Line2D([], [], **_LINK, label="link"),
+        Line2D([], [], **scaled(_AXIS), label="joint axis"),
+        Line2D([], [], **scaled(_LINK), label="link"),
         Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
     ]

@@ -17,7 +17,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.results.charts.chart import ATTAINABLE, UNCERTAIN, Chart, Failures, Limit, Line
 from vsacli.results.charts.look import current_look
 from vsacli.results.charts.reduction import Curve, marked_spans
-from vsacli.results.plots.styles import LineStyle, line_style, shortened
+from vsacli.results.plots.styles import LineStyle, line_style, scaled, shortened
 
 MARKERS_PER_CURVE = 8
 MARKER_STAGGER = 0.37
@@ -66,7 +66,7 @@ _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 
 def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
     """Draw a chart into an empty panel; return the legend entries besides those of its lines."""
     if chart.zero:
-        axes.axhline(0.0, **ZERO)
+        axes.axhline(0.0, **scaled(ZERO))
     corridors = _draw_corridors(axes, chart) if chart.band == ATTAINABLE else None
     handles: list[Artist] = []
     for line in chart.lines:
@@ -167,7 +167,7 @@ def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
         area = np.maximum(low, bottom), np.minimum(high, top)
         axes.fill_between(time, *area, ~np.isnan(low), **_AREA)
         for edge in (low, high):
-            axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **_EDGE)
+            axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **scaled(_EDGE))
     return [Patch(**_AREA, label=ATTAINABLE)] if bands else []
 
 
@@ -178,7 +178,7 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     bounds = sorted({(limit.look, limit.value) for limit in limits})
     seen = [(look, value) for look, value in bounds if low - reach <= value <= high + reach]
     for look, value in seen:
-        axes.axhline(value, color=line_style(look).color, **_LIMIT)
+        axes.axhline(value, color=line_style(look).color, **scaled(_LIMIT))
         low, high = min(low, value - LIMIT_ROOM * reach), max(high, value + LIMIT_ROOM * reach)
     if seen:
         axes.set_ylim(low, high)
@@ -188,7 +188,7 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
         text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
         place, aligned = _free_corner(axes)
         _write_inside(axes, place, text, **aligned)
-    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
+    return [Line2D([], [], color="0.4", **scaled(_LIMIT), label="limit")] if seen else []
 
 
 def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
@@ -293,7 +293,7 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]
         peaks = [peak for line in lines for peak in _peaks(line, sign, end)]
         if peaks:
             _mark(axes, peaks, sign, middle, edge)
-    return [Line2D([], [], marker="^", color="0.4", **_MARK, label="cut off, near-singular")]
+    return [Line2D([], [], marker="^", color="0.4", **scaled(_MARK), label="cut off, near-singular")]
 
 
 def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
@@ -311,7 +311,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: fl
     place = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"
     for peak in peaks:
-        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **_MARK)
+        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **scaled(_MARK))
     farthest = max(peaks, key=lambda peak: sign * peak.value)
     at_right, value = farthest.time > middle, farthest.value
     axes.annotate(

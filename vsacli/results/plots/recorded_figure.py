@@ -18,7 +18,7 @@ from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import ZERO, add_title, draw_curve
 from vsacli.results.plots.sheets import AxesGrid, complete, share_time
-from vsacli.results.plots.styles import LineStyle, line_handle, line_style, new_figure
+from vsacli.results.plots.styles import LineStyle, line_handle, line_style, new_figure, scaled
 
 COLUMNS, MOST_ROWS = 4, 14
 ROW_HEIGHT, LABEL_HEIGHT = 1.8, 0.4
@@ -43,7 +43,10 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
     folds = folds if across == COLUMNS else 1
     with new_figure(_natural(len(curves), folds, across)) as figure:
         panels = _panels(figure, curves, folds, across)
-        handles: list[Artist] = [Line2D([], [], **_SAMPLES, label="recorded"), line_handle(_FIT, "spline")]
+        handles: list[Artist] = [
+            Line2D([], [], **scaled(_SAMPLES), label="recorded"),
+            line_handle(_FIT, "spline"),
+        ]
         for curve, (signal, residual, spectrum, highest) in zip(curves, panels, strict=False):
             handles += _draw_signal(signal, curve)
             handles += _draw_residual(residual, curve)
@@ -99,7 +102,7 @@ def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) ->
 
 
 def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
-    axes.plot(curve.recorded.time, curve.recorded.values, **_SAMPLES)
+    axes.plot(curve.recorded.time, curve.recorded.values, **scaled(_SAMPLES))
     handles = draw_curve(axes, curve.fitted, _FIT)
     if not np.any(curve.spectrum.recorded):  # at rest: rounding errors must not set the scale
         middle = float(np.mean(curve.recorded.values))
@@ -111,11 +114,11 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     """Draw the residual of the spline, the reported noise, and the ends with unreliable derivatives."""
-    axes.axhline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
     handles = draw_curve(axes, curve.residual, line_style(DIFFERENCE))
     if curve.rms > 0:
         for level in (-2 * curve.noise, 2 * curve.noise):
-            axes.axhline(level, **_NOISE)
+            axes.axhline(level, **scaled(_NOISE))
         handles.append(_noise_handle())
     else:
         axes.set_yticks([0.0])
@@ -131,7 +134,7 @@ def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 
 def _noise_handle() -> Artist:
-    return Line2D([], [], **_NOISE, label="reported noise (difference: twice)")
+    return Line2D([], [], **scaled(_NOISE), label="reported noise (difference: twice)")
 
 
 def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> list[Artist]:
@@ -148,10 +151,10 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
     if top == 0:
         return []
     handles: list[Artist] = []
-    axes.loglog(spectrum.frequencies, recorded, **_SAMPLES)
+    axes.loglog(spectrum.frequencies, recorded, **scaled(_SAMPLES))
     axes.loglog(spectrum.frequencies, fitted, **_FIT.words)
     if spectrum.noise > LEAST_DENSITY * float(np.max(spectrum.recorded)):
-        axes.loglog(spectrum.frequencies, noise, **_NOISE)
+        axes.loglog(spectrum.frequencies, noise, **scaled(_NOISE))
         handles.append(_noise_handle())
     axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
     axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
@@ -171,8 +174,8 @@ def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
         axes.axvspan(spectrum.above, end, **_FILTERED)
         handles.append(Patch(**_FILTERED, label="low-pass filtered noise"))
     if end < last:
-        axes.axvline(end, **_CUTOFF)
-        handles.append(Line2D([], [], **_CUTOFF, label="cut-off of the spline"))
+        axes.axvline(end, **scaled(_CUTOFF))
+        handles.append(Line2D([], [], **scaled(_CUTOFF), label="cut-off of the spline"))
     return handles
 
 

@@ -18,7 +18,7 @@ from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessM
 from vsacli.results.plots.arrangement import panel_grid
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import line_style, shortened
+from vsacli.results.plots.styles import line_style, scaled, shortened
 
 PANEL_HEIGHT = 2.7
 """Height of a panel, inches."""
@@ -82,8 +82,8 @@ def _torque_words(chart: ActuatorChart) -> str:
 def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     """Draw the torques of springs into a panel; return the legend entries."""
     handles: list[Artist] = []
-    axes.axhline(0.0, **ZERO)
-    axes.axvline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
+    axes.axvline(0.0, **scaled(ZERO))
     curves = chart.torques
     for look, curve in enumerate(curves):
         style = line_style(look)
@@ -91,9 +91,9 @@ def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
         shown = np.isfinite(curve.torque)
         axes.plot(curve.deflection[shown], curve.torque[shown], **marked, label=curve.label)
         if math.isfinite(curve.limit):
-            axes.axvline(curve.limit, **_LIMIT[LIMITS["phi"]])
-            axes.axvline(-curve.limit, **_LIMIT[LIMITS["phi"]])
-            handles.append(Line2D([], [], **_LIMIT[LIMITS["phi"]], label=LIMITS["phi"]))
+            axes.axvline(curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
+            axes.axvline(-curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
+            handles.append(Line2D([], [], **scaled(_LIMIT[LIMITS["phi"]]), label=LIMITS["phi"]))
     axes.margins(x=0.04)
     if current_look().width is not None:
         axes.margins(y=LEGEND_ROOM)  # in narrow panels the legend is above the curves instead
@@ -123,11 +123,11 @@ def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     else:
         handles += _draw_only(axes, seen)
     for size in (-chart.load, chart.load) if chart.load else ():
-        axes.axvline(size, **_LOAD)
-        handles.append(Line2D([], [], **_LOAD, label="largest torque of gravity"))
+        axes.axvline(size, **scaled(_LOAD))
+        handles.append(Line2D([], [], **scaled(_LOAD), label="largest torque of gravity"))
     for end in chart.limits:
-        axes.axhline(end, **_ALLOWED)
-        handles.append(Line2D([], [], **_ALLOWED, label="stiffness limit of the file"))
+        axes.axhline(end, **scaled(_ALLOWED))
+        handles.append(Line2D([], [], **scaled(_ALLOWED), label="stiffness limit of the file"))
     axes.set_xlim(seen.tau_e[0], seen.tau_e[-1])
     axes.set_ylim(0, seen.top)
     if _is_wide(seen):
@@ -161,7 +161,7 @@ def _draw_limits(axes: Axes, seen: StiffnessMap) -> list[Artist]:
     for words, clearance in seen.clearance.items():
         if not (clearance < 0).any():
             continue
-        look = _LIMIT[words]
+        look = scaled(_LIMIT[words])
         lines = {"colors": look["color"], "linewidths": look["linewidth"], "linestyles": [look["linestyle"]]}
         axes.contour(tau_e, seen.levels, clearance, levels=[0.0], **lines)
         handles.append(Line2D([], [], **look, label=words))
@@ -186,17 +186,17 @@ def _draw_ends(axes: Axes, seen: StiffnessMap) -> list[Artist]:
             there = np.isfinite(end) & (end <= seen.top) & (marks == singular)
             if there.any():
                 joined = there | np.roll(there, 1) & np.isfinite(end)
-                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **look)
-                handles.append(Line2D([], [], **look, label=label))
+                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **scaled(look))
+                handles.append(Line2D([], [], **scaled(look), label=label))
     return handles
 
 
 def _draw_only(axes: Axes, seen: StiffnessMap) -> list[Artist]:
     """Draw the stiffness of springs that no motor adjusts, dotted beyond a limit."""
     within, beyond = seen.within[0], {**_ONLY, "linestyle": (0, (1, 1.5))}
-    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **_ONLY)
-    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **beyond)
-    handles: list[Artist] = [Line2D([], [], **_ONLY, label="stiffness that no motor adjusts")]
+    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **scaled(_ONLY))
+    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **scaled(beyond))
+    handles: list[Artist] = [Line2D([], [], **scaled(_ONLY), label="stiffness that no motor adjusts")]
     if not within.all():
-        handles.append(Line2D([], [], **beyond, label="stiffness beyond a limit"))
+        handles.append(Line2D([], [], **scaled(beyond), label="stiffness beyond a limit"))
     return handles

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from vsacli.base.arrays import FloatArray
 from vsacli.results.plots.arrangement import panel_grid
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import line_style, shortened
+from vsacli.results.plots.styles import line_style, scaled, shortened
 
 PANEL_HEIGHT = 2.3
 """Height of a panel, inches."""
@@ -117,8 +117,8 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
     handles = _draw_bounds(axes, motor.bounds, right, top)
     for name, (velocity, torque) in motor.runs.items():
         _draw_run(axes, velocity, torque, _run_look(names.index(name)))
-    axes.plot(*motor.rms, **RMS_LOOK, zorder=5)
-    handles.append(Line2D([], [], **RMS_LOOK, label="root mean square"))
+    axes.plot(*motor.rms, **scaled(RMS_LOOK), zorder=5)
+    handles.append(Line2D([], [], **scaled(RMS_LOOK), label="root mean square"))
     if any((velocity * torque < 0).any() for velocity, torque in motor.runs.values()):
         handles.append(Line2D([], [], color="black", alpha=BRAKING, label="pale: while it brakes"))
     axes.set_xlim(0, right)
@@ -161,10 +161,10 @@ def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[A
         lasting = np.minimum(edge, bounds.continuous_torque)
         axes.fill_between(speed, np.minimum(lasting, 2 * top), **CONTINUOUS_LOOK, zorder=0.5)
         handles.append(Patch(**CONTINUOUS_LOOK, label="within the continuous limits"))
-    axes.plot(speed, np.minimum(edge, 2 * top), **EDGE)
+    axes.plot(speed, np.minimum(edge, 2 * top), **scaled(EDGE))
     last = speed[np.isfinite(edge)]
     if last.size and last[-1] < right * (1 - 1 / POINTS):
-        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **EDGE)
+        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **scaled(EDGE))
     return handles
 
 

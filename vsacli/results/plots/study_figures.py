@@ -30,7 +30,7 @@ from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.point_labels import BELOW, LETTER, label_points
 from vsacli.results.plots.sheets import AxesGrid, complete
-from vsacli.results.plots.styles import line_handle, line_style, new_figure, shortened
+from vsacli.results.plots.styles import line_handle, line_style, new_figure, scaled, shortened
 from vsacli.results.store.study_table import StoredStudy
 
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
@@ -48,8 +48,8 @@ MOST_PANELS = 6
 MAP_WIDTH = 1.5 * PANEL_WIDTH
 """Width of a map with its color bar, inches."""
 
-BAR_HEIGHT = 0.28
-"""Height of a bar, inches."""
+BAR_HEIGHT, HIGH_BAR = 0.28, 0.37
+"""Height of a bar, and of one whose label has two lines, inches."""
 
 LABEL_LENGTH, LABEL_SIZE, ROOM_FOR_LABELS = 16, 8, 0.35
 """Characters of the name of a joint next to its bar, its size at the usual font size in points, and the space
@@ -182,12 +182,12 @@ def _margins_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Ar
     margin = 100 * points.margin
     yield from _scatter(axes, x, margin, points.feasible, "feasible", _FEASIBLE)
     yield from _scatter(axes, x, margin, ~points.feasible, "infeasible", _INFEASIBLE)
-    axes.axhline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
     worst = points.worst
     if worst.size:
         places = [(float(x[row]), float(margin[row])) for row in worst]
         label_points(axes, places, [str(points.runs[row]) for row in worst])
-        yield Line2D([], [], **_NAMED, label="runs of the smallest margins")
+        yield Line2D([], [], **scaled(_NAMED), label="runs of the smallest margins")
 
 
 def _costs_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
@@ -214,10 +214,10 @@ def _scatter(
 ) -> Iterator[Artist]:
     """Draw the chosen points that have a value; yield their legend entry if there are any."""
     rows = chosen & np.isfinite(y)
-    axes.plot(x[rows], y[rows], **look)
+    axes.plot(x[rows], y[rows], **scaled(look))
     axes.margins(0.08)
     if rows.any():
-        yield Line2D([], [], **{**look, "markersize": 5}, label=label)
+        yield Line2D([], [], **scaled({**look, "markersize": 5}), label=label)
 
 
 def _is_grid(points: StudyPoints) -> bool:
@@ -317,7 +317,7 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: s
             handles.append(line_handle(style, f"{label}: {share:.3g} %{interval}"))
         if any(points.random for points in studies):
             handles.append(Patch(facecolor="0.3", **_INTERVAL, label="95 % interval (random samples)"))
-        axes.axvline(0.0, **ZERO)
+        axes.axvline(0.0, **scaled(ZERO))
         axes.set_xlabel("smallest margin [%]")
         axes.set_ylabel("runs with at least this margin [%]")
         axes.set_ylim(0, 103)
@@ -350,8 +350,8 @@ def ranking_figure(ranking: Ranking) -> Figure:
     """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
     bars = ranking.bars
     labels = [_bar_label(bar.label) for bar in bars]
-    lines = max((label.count("\n") + 1 for label in labels), default=1)
-    with new_figure((2 * PANEL_WIDTH, BAR_HEIGHT * lines * len(bars) + 1.2)) as figure:
+    height = HIGH_BAR if any("\n" in label for label in labels) else BAR_HEIGHT
+    with new_figure((2 * PANEL_WIDTH, height * len(bars) + 1.2)) as figure:
         axes, size = figure.add_subplot(), current_look().points(LABEL_SIZE)
         joints = list(dict.fromkeys(bar.joint for bar in bars))
         colors = [line_style(joints.index(bar.joint)).color for bar in bars]

@@ -7,7 +7,7 @@ font lacks are drawn in a font of this machine, or else as escape codes.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -138,6 +138,16 @@ def new_figure(natural: tuple[float, float]) -> Iterator[Figure]:
     """
     with drawing_with(current_look().fitted(natural)), house_style():
         yield Figure(current_look().size(natural), layout="constrained")
+
+
+SIZES = ("linewidth", "markersize")
+"""Properties of lines in points."""
+
+
+def scaled(look: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a style whose widths of lines and sizes of markers follow the font size of the current look."""
+    scale = current_look().scale
+    return {name: scale * value if name in SIZES else value for name, value in look.items()}
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
