@@ -143,6 +143,7 @@ def test_what_is_refused(vsacli, arguments, message):
             "motor 'm' has no torque limit; give continuous_torque, max_torque,",
         ),
         ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001 kg m^2"),
+        ("m,heavy,1,,,,,,", "inertia: expected a number in kg m^2, found 'heavy'"),
         ("m,1e-4,1,,,,0.5,,", "resistance: needs torque_constant, too"),
         ("m,1e-4,1,,,0.1,,,24", "max_voltage: needs resistance, too"),
         ("m,1e-4,1,2,,,,,,", "expected 9 values"),

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from samples.figure_inputs import PLACE as TIME
+from samples.figure_inputs import joint
 
 from vsacli.results.charts.chart import ATTAINABLE
-from vsacli.results.charts.optimum import JointChange, Moved, change_sheet, pace_sheet
+from vsacli.results.charts.optimum import change_sheet, pace_sheet
 from vsacli.results.plots import drawn
-
-TIME = np.linspace(0.0, 2.0, 50)
-
-
-def moved(stiffness):
-    rows = np.full_like(TIME, stiffness)
-    return Moved(TIME, rows, 0.5 * rows, 2 * rows, np.stack([rows / 10, -rows / 10]))
-
-
-def joint(name, stiffness=900.0, limit=np.inf):
-    return JointChange(name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([-limit, limit]))
 
 
 def texts(figure):

@@ -5,35 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.patches import Patch
+from samples.figure_inputs import FREQUENCIES, TIME, curve
 
-from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.measured import Spectrum
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.plots import recorded_figure
-
-TIME = np.linspace(0, 10, 400)
-FREQUENCIES = np.geomspace(0.5, 100, 50)
-
-
-def curve(
-    name: str = "elbow.q", *, rms: float = 1e-4, cutoff: float = 5.0, above: float = np.nan
-) -> RecordedCurve:
-    """A sine with noise that a spline leaves."""
-    residual = rms * np.cos(900 * TIME)
-    motion = FREQUENCIES**-4.0
-    return RecordedCurve(
-        name=name,
-        unit="rad",
-        fit="smoothed" if rms else "interpolated",
-        knots=65,
-        recorded=Curve(TIME, np.sin(TIME) + residual),
-        fitted=Curve(TIME, np.sin(TIME)),
-        residual=Curve(TIME, residual),
-        rms=rms,
-        noise=1e-4,
-        inside=(0.5, 9.0),
-        spectrum=Spectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff, above),
-        highest=Highest("d4q", "rad/s^4", 4, 0.0123 if rms else np.nan),
-    )
 
 
 def test_each_component_has_four_panels() -> None:

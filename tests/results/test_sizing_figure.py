@@ -2,20 +2,9 @@
 
 from __future__ import annotations
 
-import math
+from samples.figure_inputs import FREE, LIMITED, motor
 
-import numpy as np
-
-from vsacli.results.plots import Bounds, TorqueSpeed, torque_speed_figure
-
-LIMITED = Bounds(5.0, 2.0, 3.0, math.inf, 0.0, 0.0)
-FREE = Bounds(math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
-
-
-def motor(bounds: Bounds) -> TorqueSpeed:
-    time = np.linspace(0, 6, 100)
-    runs = {"fast": (np.sin(time), np.cos(time)), "slow": (np.sin(time) / 2, np.cos(time))}
-    return TorqueSpeed("elbow, motor 1", "joint side", "N m", "rad/s", bounds, runs, (0.7, 0.7))
+from vsacli.results.plots import torque_speed_figure
 
 
 def test_trajectories_differ_without_colors() -> None:

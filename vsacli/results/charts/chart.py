@@ -179,18 +179,28 @@ class Block(NamedTuple):
     Attributes:
         time: range of the time axes, (2 or more,), s, ascending.
         rows: charts from top to bottom, in rows of equal length; None for an empty place.
+        heights: heights of the rows of a group, inches, at the usual font size; stretched to fill a figure.
         most_rows: number of row groups before the next ones continue to the right; None for no limit.
-        heights: relative heights of the rows of a group.
         beside: legends at the right of the rows; empty for none.
         xlabel: label of the time axis.
     """
 
     time: FloatArray
     rows: Sequence[Row]
+    heights: Sequence[float]
     most_rows: int | None = None
-    heights: Sequence[float] = (1.0,)
     beside: Sequence[Legend] = ()
     xlabel: str = f"time [{TIME}]"
+
+    @property
+    def columns(self) -> int:
+        """Number of panels side by side."""
+        return self.folding[1] * len(self.rows[0])
+
+    @property
+    def height(self) -> float:
+        """Height of all rows, inches, at the usual font size."""
+        return self.folding[0] * sum(self.heights)
 
     @property
     def folding(self) -> tuple[int, int]:

@@ -139,9 +139,8 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
         rows.append([_over(charts, compared, signals, joint, column) for column in there_in])
         rows.append([_apart(charts, compared, differences, joint, column) for column in there_in])
     time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
-    block = Block(time, rows, MOST_ROWS, HEIGHTS)
-    height, folds = block.folding
-    size = (max(2, folds * there.shape[1]) * PANEL_WIDTH, sum(HEIGHTS) * height + 1.2)
+    block = Block(time, rows, HEIGHTS, MOST_ROWS)
+    size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
     robots = " / ".join(dict.fromkeys(file.robot_name for file in charts.files))
     legend = {label: number for number, label in enumerate(distinct_labels(charts.files))}
     files = counted(len(charts.files), charts.first.kind)

@@ -24,7 +24,7 @@ from vsacli.base.variables import (
     deviation,
     select_variables,
 )
-from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet, folding
+from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
 from vsacli.results.store.reader import StoredResult
 
@@ -112,14 +112,9 @@ def grouped(charts: StoredCharts, *parts: Part, words: str = "") -> Sheet:
     blocks = [_groups(charts, part, named=part == parts[-1]) for part in parts]
     columns = [len(block.rows[0]) for block in blocks]
     width = PANEL_WIDTH * sum(columns) if len(blocks) > 1 else 2 * PANEL_WIDTH + legend_width(charts)
-    height = max(_height(block) for block in blocks) + 1
+    height = max(block.height for block in blocks) + 1
     title = ": ".join(filter(None, (result_title(charts.first), words)))
     return Sheet(title, (width, height), _legend(charts, blocks), blocks, columns)
-
-
-def _height(block: Block) -> float:
-    """Return the height of the panels of a block of `_groups`, inches."""
-    return GROUP_HEIGHT * len(block.rows) * sum(block.heights) / len(block.heights)
 
 
 def _of_parts(*parts: Part) -> Drawing:
@@ -150,13 +145,13 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
     for group in groups:
         rows += zip(*(panels(group, column) for column in columns), strict=True)
     beside: list[Legend] = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
-    heights: tuple[float, ...] = (1.0, UTILIZATION)
+    heights: tuple[float, ...] = (GROUP_HEIGHT, UTILIZATION * GROUP_HEIGHT)
     if any(chart for row in rows[1::2] for chart in row):
         beside = [legend for each in beside for legend in (each, {})]
     else:
-        rows, heights = rows[::2], (1.0,)
+        rows, heights = rows[::2], (GROUP_HEIGHT,)
     named = named and legend_width(charts) > 0
-    return Block(charts.first.time, rows, heights=heights, beside=beside if named else ())
+    return Block(charts.first.time, rows, heights, beside=beside if named else ())
 
 
 def legend_width(charts: StoredCharts) -> float:
@@ -179,20 +174,19 @@ def _legend(charts: StoredCharts, blocks: Sequence[Block]) -> dict[str, int]:
     return {} if legend_width(charts) else {name: joint for joint, name in names if joint in drawn}
 
 
-def _corridors(charts: StoredCharts, most_rows: int) -> Block:
-    """Return the stiffness of each joint within its attainable range."""
+def _corridors(charts: StoredCharts, most_rows: int, height: float) -> Block:
+    """Return the stiffness of each joint within its attainable range, in rows of this height, inches."""
     rows = [
         [replace(chart, failures=[(each, [joint]) for each in charts.failures])]
         for joint, chart in zip(charts.compliant, charts.corridors(), strict=True)
     ]
-    return Block(charts.first.time, rows, most_rows)
+    return Block(charts.first.time, rows, (height,), most_rows)
 
 
 def feasibility(charts: StoredCharts) -> Sheet:
     """Return the figure of the commanded stiffness within the attainable range."""
-    block = _corridors(charts, CORRIDOR_ROWS)
-    rows, folds = block.folding
-    size = (PANEL_WIDTH * (2 if folds == 1 else folds), CORRIDOR_HEIGHT * rows + 1)
+    block = _corridors(charts, CORRIDOR_ROWS, CORRIDOR_HEIGHT)
+    size = (PANEL_WIDTH * max(2, block.columns), block.height + 1)
     return Sheet(result_title(charts.first), size, {}, [block])
 
 
@@ -212,11 +206,11 @@ def _motion(charts: StoredCharts) -> Sheet:
     if not charts.compliant:
         return grouped(charts, part)
     positions = _groups(charts, part)
-    left = _height(positions)
-    stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(left / LOW_HEIGHT)))
-    rows, folds = stiffness.folding
+    left = positions.height
+    stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(left / LOW_HEIGHT)), LOW_HEIGHT)
+    folds = stiffness.columns
     widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
-    size = (sum(widths) + legend_width(charts), max(left, LOW_HEIGHT * rows) + 1)
+    size = (sum(widths) + legend_width(charts), max(left, stiffness.height) + 1)
     blocks = [positions, stiffness]
     return Sheet(result_title(charts.first), size, _legend(charts, blocks), blocks, widths)
 
@@ -272,9 +266,9 @@ def _simulated_motion(charts: StoredCharts) -> Sheet:
         [panel(joint, name) if has_it else None for name, has_it in zip(names, of_joint, strict=True)]
         for joint, of_joint in enumerate(there)
     ]
-    height, folds = folding(len(rows), MOTION_ROWS)
-    size = (max(2, folds * len(names)) * PANEL_WIDTH, MOTION_HEIGHT * height + 1.2)
-    return Sheet(result_title(first), size, _ROLES, [Block(first.time, rows, MOTION_ROWS)])
+    block = Block(first.time, rows, (MOTION_HEIGHT,), MOTION_ROWS)
+    size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
+    return Sheet(result_title(first), size, _ROLES, [block])
 
 
 RESULT_DRAWINGS: dict[str, Drawing] = {

@@ -24,6 +24,9 @@ SIZES = (2.0, 200.0)
 FONTS = (4.0, 72.0)
 """Smallest and largest font size, pt."""
 
+LEGIBLE = 7.0
+"""Smallest size of texts, pt, unless the font size itself is smaller."""
+
 SQUEEZE = 1.1
 """Largest ratio of the font size to that with which panels have their declared size."""
 
@@ -56,6 +59,10 @@ class Look:
     def scale(self) -> float:
         """Size of fonts, lines and panels relative to the declared ones."""
         return self.font_size / USUAL_FONT
+
+    def points(self, declared: float) -> float:
+        """Return the size, pt, of a text that has the declared one at the usual font size."""
+        return max(self.scale * declared, min(LEGIBLE, self.font_size))
 
     def fitted(self, natural: tuple[float, float]) -> Look:
         """Return the look with the font with which a figure of this natural size fits into width and height.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -63,11 +62,9 @@ def measured_sheet(curves: Sequence[MeasuredCurve], title: str, computed: str = 
         title: title of the figure.
         computed: label of the curves compared with the measured ones.
     """
-    columns = 2 * math.ceil(len(curves) / MOST_ROWS)
-    rows = math.ceil(2 * len(curves) / columns)
     time = np.array([min(c.time[0] for c in curves), max(c.time[-1] for c in curves)])
-    block = Block(time, [curve.charts(computed) for curve in curves], MOST_ROWS)
-    size = (PANEL_WIDTH * columns, ROW_HEIGHT * rows + 1)
+    block = Block(time, [curve.charts(computed) for curve in curves], (ROW_HEIGHT,), MOST_ROWS)
+    size = (PANEL_WIDTH * block.columns, block.height + 1)
     legend = {computed: 0, "measured": 1, f"measured minus {computed}": DIFFERENCE}
     return Sheet(title, size, legend, [block])
 

@@ -20,12 +20,11 @@ from vsacli.results.charts.chart import (
     Limit,
     Line,
     Sheet,
-    folding,
 )
 from vsacli.results.charts.reduction import Curve, visible_range
 
 MOST_ROWS = 7
-ROW_HEIGHT, PACE_HEIGHT = 1.7, 3.0
+ROW_HEIGHT, PACE_HEIGHT, BAND_HEIGHT = 1.7, 2.0, 1.6
 """Heights of panels, inches."""
 
 BEFORE, AFTER, UNIFORM = 1, 0, 3
@@ -119,16 +118,15 @@ def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool)
         title: title of the figure.
         along_path: whether places are positions on the path instead of times.
     """
-    rows, folds = folding(len(joints), MOST_ROWS)
     stiffness = [joint.stiffness for joint in joints]
     motors = range(1, 1 + max(len(joint.motors) for joint in joints))
     panels = [[joint.torque(motor) for motor in motors] for joint in joints]
     if any(stiffness):
         panels = [[chart, *torques] for chart, torques in zip(stiffness, panels, strict=True)]
-    block = Block(joints[0].before.place, panels, MOST_ROWS)
+    block = Block(joints[0].before.place, panels, (ROW_HEIGHT,), MOST_ROWS)
     if along_path:
         block = block._replace(xlabel=SHORT_PATH)
-    size = (max(2, len(panels[0]) * folds) * PANEL_WIDTH, ROW_HEIGHT * rows + 1)
+    size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1)
     return Sheet(title, size, {"as commanded": BEFORE, "optimum": AFTER}, [block])
 
 
@@ -148,7 +146,8 @@ def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str)
             lines.append(Line(Curve(ends, np.full(2, value)), look))
             legend[label] = look
     chart = Chart("", "", lines, "relative speed", from_zero=True)
-    return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT), legend, [Block(ends, [[chart]], xlabel=PATH)])
+    block = Block(ends, [[chart]], (PACE_HEIGHT,), xlabel=PATH)
+    return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT + 1), legend, [block])
 
 
 class Torque(NamedTuple):
@@ -181,5 +180,6 @@ def band_sheet(time: FloatArray, torques: Sequence[Torque], title: str) -> Sheet
     for torque in torques:
         by_joint.setdefault(torque.joint, {})[torque.motor] = torque.chart(time)
     rows = [[charts.get(motor) for motor in MOTORS] for charts in by_joint.values()]
-    size = (2 * PANEL_WIDTH, 1.6 * len(rows) + 1)
-    return Sheet(title, size, {"computed": 0}, [Block(time, rows, 7)])
+    block = Block(time, rows, (BAND_HEIGHT,), MOST_ROWS)
+    size = (block.columns * PANEL_WIDTH, block.height + 1)
+    return Sheet(title, size, {"computed": 0}, [block])

@@ -21,12 +21,18 @@ from matplotlib.patches import Patch
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.look import current_look
+from vsacli.results.plots.arrangement import columns_of_panels
+from vsacli.results.plots.long_texts import POINTS_PER_INCH
 from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, shortened
+from vsacli.results.plots.styles import new_figure, scaled, shortened
 
 LABEL_WIDTH = 0.55
 """Width of the column of names, relative to a view."""
+
+NARROWEST_VIEW, VIEW_HEIGHT = 2.0, 2.6
+"""Smallest width of a view, and its height where one is above the others, at the usual font size, inches."""
 
 NAME_LENGTH, MOST_NAMES = 18, 14
 """Characters in the name of a joint, and number of names that fit into the column."""
@@ -46,6 +52,12 @@ ARROW_SHARE = 0.19
 SHORTEST_ARROW = 0.3
 """Share of its length below which an arrow of a frame, seen from its tip, is left out."""
 
+NAME_SIZE, ARROW_SIZE = 9, 8
+"""Sizes of the names of joints and arrows at the usual font size, points."""
+
+NAME_LINE = 1.5
+"""Height of the line of a name relative to its size, where the legend is not yet drawn."""
+
 EDGE = 0.7
 """Width of edges, points."""
 
@@ -64,15 +76,30 @@ _ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.
 
 def arm_figure(chart: ArmChart) -> Figure:
     """Draw the views of an arm at one scale; the first one names the joints."""
-    with house_style():
-        widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
-        figure = Figure((PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4), layout="constrained")
-        panels = figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0]
+    widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
+
+    def natural(columns: int) -> tuple[float, float]:
+        if columns == len(widths):
+            return PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4
+        return PANEL_WIDTH * 2, VIEW_HEIGHT * 2 + 1.0
+
+    columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * sum(widths) / len(widths))
+    with new_figure(natural(columns)) as figure:
+        panels = _panels(figure, widths, stacked=columns < len(widths))
         for axes, view in zip(panels, chart.views, strict=True):
             _frame_panel(axes, chart, view, named=view is chart.views[0])
             _draw_arm(axes, chart, view)
         _name_joints(panels[0], chart, chart.views[0])
         return complete(figure, chart.title, _handles(chart))
+
+
+def _panels(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[Axes]:
+    """Return panels of these widths side by side, or the first one above the others."""
+    if not stacked:
+        return list(figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0])
+    places = figure.add_gridspec(2, len(widths) - 1)
+    first = figure.add_subplot(places[0, :])
+    return [first, *(figure.add_subplot(places[1, column]) for column in range(len(widths) - 1))]
 
 
 def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> None:
@@ -99,15 +126,16 @@ def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> Non
 def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
     length, arrow, chain = chart.joint_length, ARROW_SHARE * chart.size, chart.chain
-    axes.plot(*view.project(chart.line).T, **_LINK, zorder=2)
+    axes.plot(*view.project(chart.line).T, **scaled(_LINK), zorder=2)
     for origin, center in zip(chain.origins[0], chart.centers, strict=False):  # joints moved along their axes
-        axes.plot(*view.project(np.stack((origin, center))).T, **{**_LINK, "linewidth": 2.5}, zorder=2)
+        moved = view.project(np.stack((origin, center))).T
+        axes.plot(*moved, **scaled({**_LINK, "linewidth": 2.5}), zorder=2)
     solids = sorted(_solids(chart), key=lambda solid: float(solid.middle @ view.toward))
     for rank, solid in enumerate(solids):
         _draw_solid(axes, solid, view, 3 + rank / len(solids))
     for center, axis in zip(chart.centers, chain.axes[0], strict=True):
         ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
-        axes.plot(*view.project(ends).T, **_AXIS, zorder=4.2)
+        axes.plot(*view.project(ends).T, **scaled(_AXIS), zorder=4.2)
     for direction, name in zip(chain.tool[0].T, "xyz", strict=True):
         _draw_arrow(axes, view, chain.origins[0, -1], arrow * direction, name)
     start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
@@ -176,7 +204,7 @@ def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
     )
     for rank, (faces, edges, width) in enumerate(layers):
         look: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
-        axes.add_collection(PolyCollection(faces, **look, zorder=order + 1e-4 * rank))
+        axes.add_collection(PolyCollection(faces, **scaled(look), zorder=order + 1e-4 * rank))
 
 
 def _area(face: FloatArray) -> float:
@@ -192,21 +220,32 @@ def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, na
         return
     axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
     x, y = tail + 1.25 * (tip - tail)
-    axes.text(x, y, name, fontsize=8, ha="center", va="center", zorder=5)
+    axes.text(x, y, name, fontsize=current_look().points(ARROW_SIZE), ha="center", va="center", zorder=5)
 
 
 def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
     """Write names in a column at the right, each with a line to its joint; of long chains only some."""
-    every = math.ceil(len(chart.joints) / MOST_NAMES)
+    most, size = _names_that_fit(axes), current_look().points(NAME_SIZE)
+    every = math.ceil(len(chart.joints) / most)
     places = view.project(chart.centers)[::every]
     names = [shortened(joint.name, NAME_LENGTH) for joint in chart.joints[::every]]
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     column = left + (right - left) / (1 + LABEL_WIDTH)
-    gap = (top - bottom) / (MOST_NAMES + 1)
+    gap = (top - bottom) / (most + 1)
     heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
     for (x, y), height, name in zip(places, heights, names, strict=True):
-        axes.plot([x, column, column + gap / 2], [y, height, height], **_LEADER, zorder=1)
-        axes.text(column + 0.7 * gap, height, name, fontsize=9, va="center", parse_math=False)
+        axes.plot([x, column, column + gap / 2], [y, height, height], **scaled(_LEADER), zorder=1)
+        axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
+
+
+def _names_that_fit(axes: Axes) -> int:
+    """Return the number of names that fit into the column, at most `MOST_NAMES`."""
+    look, figure = current_look(), axes.get_figure(root=True)
+    if look.width is None or figure is None:
+        return MOST_NAMES
+    figure.draw_without_rendering()
+    height = axes.get_window_extent().height / figure.dpi * POINTS_PER_INCH
+    return min(MOST_NAMES, max(1, int(height / (NAME_LINE * look.points(NAME_SIZE))) - 1))
 
 
 def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:
@@ -233,7 +272,7 @@ def _handles(chart: ArmChart) -> list[Artist]:
     return [
         *handles,
         Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE, label="motor"),
-        Line2D([], [], **_AXIS, label="joint axis"),
-        Line2D([], [], **_LINK, label="link"),
+        Line2D([], [], **scaled(_AXIS), label="joint axis"),
+        Line2D([], [], **scaled(_LINK), label="link"),
         Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
     ]

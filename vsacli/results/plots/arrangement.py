@@ -1,62 +1,167 @@
-"""Arrangement of panels in a figure of a given size: blocks side by side, or stacked where it is narrow."""
+"""Arrangement of panels in a figure of a given size: fewer side by side where it is narrow.
+
+Where the width alone is fixed, as many panels as fit are side by side, and the figure is as high as they
+require. Where the height is fixed as well, the arrangement is chosen that permits the largest font.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import chain
+from typing import NamedTuple, TypeAlias, TypeVar
 
-from vsacli.results.charts.chart import Block, Sheet
-from vsacli.results.charts.look import current_look
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vsacli.results.charts.chart import PANEL_WIDTH, Block, Sheet
+from vsacli.results.charts.figures import LEGEND_WIDTH
+from vsacli.results.charts.look import CM_PER_INCH, current_look
+from vsacli.results.plots.styles import new_figure
 
 NARROWEST = 2.2
 """Smallest width of a panel at the usual font size, inches, including the labels of its axes."""
 
-AROUND = 1.0
-"""Height of title, legend and labels of the time axis at the usual font size, inches."""
+AROUND, BETWEEN = 1.0, 0.4
+"""Height of title, legend and labels of the time axis, and of the labels between stacked blocks, at the usual
+font size, inches."""
+
+HIGHEST = 9.5
+"""Height of a page, inches; higher figures of a fixed width have as many panels side by side as fit."""
+
+MOST_ROWS = 6
+"""Maximum number of rows of two panels; further panels continue at the right."""
+
+MOST_COLUMNS = 8
+"""Maximum number of panels side by side that is tried where width and height are fixed."""
+
+WORTHWHILE = 1.15
+"""Ratio of font sizes from which another arrangement than the declared one is chosen."""
+
+Size: TypeAlias = tuple[float, float]
+"""Width and height of a figure at the usual font size, inches."""
 
 
 class Arrangement(NamedTuple):
     """Blocks and their places.
 
     Attributes:
-        size: width and height of the figure, inches.
+        natural: size of the figure at the usual font size, inches.
         blocks: blocks of panels, folded to fit.
         stacked: whether the blocks are below each other.
         shares: widths of blocks side by side, or heights of stacked blocks, relative.
     """
 
-    size: tuple[float, float]
+    natural: Size
     blocks: list[Block]
     stacked: bool
     shares: list[float]
 
 
 def arranged(sheet: Sheet) -> Arrangement:
-    """Arrange the blocks of a sheet for the current look: as declared, unless its width alone is fixed."""
+    """Arrange the blocks of a sheet for the current look: as declared, unless its width is fixed."""
     look = current_look()
-    width, height = look.size(sheet.size)
-    if look.width is None or look.height is not None:
-        return Arrangement((width, height), list(sheet.blocks), stacked=False, shares=list(sheet.widths))
-    columns = max(1, int(width / (NARROWEST * look.scale)))
-    stacked = sum(map(_columns, sheet.blocks)) > columns and len(sheet.blocks) > 1
-    blocks = [_refolded(block, columns) for block in sheet.blocks] if stacked else list(sheet.blocks)
-    heights = [
-        (sheet.size[1] - AROUND) * new.folding[0] / old.folding[0]
-        for new, old in zip(blocks, sheet.blocks, strict=True)
-    ]
-    height = look.scale * ((sum if stacked else max)(heights) + AROUND)
-    return Arrangement((width, height), blocks, stacked, heights if stacked else list(sheet.widths))
+    declared = Arrangement(sheet.size, list(sheet.blocks), stacked=False, shares=list(sheet.widths))
+    if look.width is None:
+        return declared
+    if look.height is None:
+        columns = _fitting()
+        fits = sum(block.columns for block in sheet.blocks) <= columns
+        return declared if fits and look.scale * sheet.size[1] <= HIGHEST else _in_columns(sheet, columns)
+    others = (_in_columns(sheet, columns) for columns in range(1, MOST_COLUMNS + 1))
+    return _largest_font((declared, *others), lambda option: option.natural)
 
 
-def _columns(block: Block) -> int:
-    """Return the number of panels of a block side by side."""
-    return block.folding[1] * len(block.rows[0])
+def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: float = NARROWEST) -> int:
+    """Return the number of panels side by side for the current look.
+
+    Args:
+        declared: number of panels side by side if there is room for them.
+        natural: size of the figure for a number of panels side by side.
+        narrowest: smallest width of a panel, inches.
+    """
+    look = current_look()
+    if look.width is None:
+        return declared
+    if look.height is None:
+        return min(declared, _fitting(narrowest))
+    columns: int = _largest_font((declared, *range(1, MOST_COLUMNS + 1)), natural)
+    return columns
+
+
+@contextmanager
+def panel_grid(count: int, height: float) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Yield a figure with this number of panels, row by row, of this height each, inches."""
+    declared = min(2 * math.ceil(count / (2 * MOST_ROWS)), count)
+
+    def natural(columns: int) -> Size:
+        return PANEL_WIDTH * max(2, columns), height * math.ceil(count / columns) + 1.1
+
+    columns = min(count, columns_of_panels(declared, natural))
+    with new_figure(natural(columns)) as figure:
+        panels = figure.subplots(math.ceil(count / columns), columns, squeeze=False).flatten()
+        for unused in panels[count:]:
+            unused.remove()
+        yield figure, list(panels[:count])
+
+
+Option = TypeVar("Option")
+
+
+def _largest_font(options: Sequence[Option], natural: Callable[[Option], Size]) -> Option:
+    """Return the option with the largest font, or the first one if that is not much smaller."""
+    fonts = [current_look().fitted(natural(option)).font_size for option in options]
+    best = fonts.index(max(fonts))
+    return options[best if fonts[best] > WORTHWHILE * fonts[0] else 0]
+
+
+def _fitting(narrowest: float = NARROWEST) -> int:
+    """Return the number of panels that fit side by side into the fixed width."""
+    look = current_look()
+    assert look.width is not None, "a width is fixed"
+    return max(1, int(look.width / CM_PER_INCH / (narrowest * look.scale)))
+
+
+def _in_columns(sheet: Sheet, columns: int) -> Arrangement:
+    """Arrange a sheet with at most this number of panels side by side: blocks below each other."""
+    blocks = [_refolded(block, columns) for block in sheet.blocks]
+    heights = [block.height for block in blocks]
+    names = LEGEND_WIDTH if any(block.beside for block in blocks) else 0.0
+    width = PANEL_WIDTH * max(2, *(block.columns for block in blocks)) + names
+    height = sum(heights) + AROUND + BETWEEN * (len(blocks) - 1)
+    return Arrangement((width, height), blocks, stacked=True, shares=heights)
 
 
 def _refolded(block: Block, columns: int) -> Block:
-    """Return a block with at most `columns` panels side by side, if its rows can be folded otherwise."""
+    """Return a block with at most this number of panels side by side."""
+    block = _divided(block, columns)
     if block.most_rows is None:
         return block
     groups = len(block.rows) // len(block.heights)
-    folds = max(1, min(block.folding[1], columns // len(block.rows[0])))
+    folds = max(1, min(groups, columns // len(block.rows[0])))
     return block._replace(most_rows=math.ceil(groups / folds))
+
+
+def _divided(block: Block, columns: int) -> Block:
+    """Return a block whose rows are divided where they have more panels than that; the first part is short.
+
+    Groups of rows stay together, so that a difference remains below its curves.
+    """
+    wide, each = len(block.rows[0]), len(block.heights)
+    if wide <= columns:
+        return block
+    parts = math.ceil(wide / columns)
+    padded = [
+        [*row[: wide % columns], *[None] * (-wide % columns), *row[wide % columns :]] for row in block.rows
+    ]
+    groups = [padded[first : first + each] for first in range(0, len(padded), each)]
+    rows = [
+        row[columns * part : columns * (part + 1)]
+        for group in groups
+        for part in range(parts)
+        for row in group
+    ]
+    beside = [block.beside[first : first + each] for first in range(0, len(block.beside), each)]
+    named = list(chain.from_iterable(list(names) * parts for names in beside))
+    return block._replace(rows=rows, heights=[*block.heights] * parts, beside=named)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +15,9 @@ from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.results.charts.chart import ATTAINABLE, UNCERTAIN, Chart, Failures, Limit, Line
+from vsacli.results.charts.look import current_look
 from vsacli.results.charts.reduction import Curve, marked_spans
-from vsacli.results.plots.styles import LineStyle, line_style, shortened
+from vsacli.results.plots.styles import LineStyle, line_style, scaled, shortened
 
 MARKERS_PER_CURVE = 8
 MARKER_STAGGER = 0.37
@@ -48,11 +50,15 @@ MARK_DEPTH = 0.03
 STRIP = 0.03
 """Height of the strip that marks failures of one of several joints, relative to the panel."""
 
+SMALL = 8.33
+"""Font size of notes inside a panel, points at the usual font size."""
+
+NOTE_SIZE = (0.7, 0.2)
+"""Width and height of a note in a corner, relative to the panel."""
+
 NOTE_LENGTH = 24
 """Longest line of a note inside a panel, characters."""
 
-_SMALL: dict[str, Any] = {"fontsize": "small", "color": "0.35"}
-_NOTE: dict[str, Any] = {**_SMALL, "ha": "center", "va": "center"}
 _MARK: dict[str, Any] = {"markersize": 6, "linestyle": ""}
 _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5}
 
@@ -60,7 +66,7 @@ _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 
 def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
     """Draw a chart into an empty panel; return the legend entries besides those of its lines."""
     if chart.zero:
-        axes.axhline(0.0, **ZERO)
+        axes.axhline(0.0, **scaled(ZERO))
     corridors = _draw_corridors(axes, chart) if chart.band == ATTAINABLE else None
     handles: list[Artist] = []
     for line in chart.lines:
@@ -88,9 +94,15 @@ def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
 
 def _write_note(axes: Axes, note: str, *, empty: bool) -> None:
     """Write a note into the middle of a panel, and remove the ticks of values if it is empty."""
-    axes.text(0.5, 0.5, textwrap.fill(note, NOTE_LENGTH), **_NOTE, transform=axes.transAxes)
+    _write_inside(axes, (0.5, 0.5), textwrap.fill(note, NOTE_LENGTH), ha="center", va="center")
     if empty:
         axes.set_yticks([])
+
+
+def _write_inside(axes: Axes, place: tuple[float, float], text: str, *, ha: str, va: str) -> None:
+    """Write small gray text at a place relative to the panel."""
+    size = current_look().points(SMALL)
+    axes.text(*place, text, ha=ha, va=va, fontsize=size, color="0.35", transform=axes.transAxes)
 
 
 def add_title(axes: Axes, title: str) -> None:
@@ -155,7 +167,7 @@ def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
         area = np.maximum(low, bottom), np.minimum(high, top)
         axes.fill_between(time, *area, ~np.isnan(low), **_AREA)
         for edge in (low, high):
-            axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **_EDGE)
+            axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **scaled(_EDGE))
     return [Patch(**_AREA, label=ATTAINABLE)] if bands else []
 
 
@@ -166,7 +178,7 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     bounds = sorted({(limit.look, limit.value) for limit in limits})
     seen = [(look, value) for look, value in bounds if low - reach <= value <= high + reach]
     for look, value in seen:
-        axes.axhline(value, color=line_style(look).color, **_LIMIT)
+        axes.axhline(value, color=line_style(look).color, **scaled(_LIMIT))
         low, high = min(low, value - LIMIT_ROOM * reach), max(high, value + LIMIT_ROOM * reach)
     if seen:
         axes.set_ylim(low, high)
@@ -174,8 +186,25 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     if distant:
         words = "limits" if len(distant) > 1 else "limit"
         text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
-        axes.text(0.98, 0.97, text, ha="right", va="top", transform=axes.transAxes, **_SMALL)
-    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
+        place, aligned = _free_corner(axes)
+        _write_inside(axes, place, text, **aligned)
+    return [Line2D([], [], color="0.4", **scaled(_LIMIT), label="limit")] if seen else []
+
+
+def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
+    """Return the corner of a panel with the fewest points of curves, and the alignment of text there."""
+    to_panel = axes.transData + axes.transAxes.inverted()
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines]
+    points = [to_panel.transform(line) for line in lines if len(line) > 2]
+
+    def occupied(corner: tuple[str, str]) -> int:
+        x, y = (0.5 - NOTE_SIZE[0], 0.5 - NOTE_SIZE[1])
+        signs = np.array([1 if corner[0] == "right" else -1, 1 if corner[1] == "top" else -1])
+        return sum(int(((each - 0.5) * signs > (x, y)).all(axis=1).sum()) for each in points)
+
+    ha, va = min(product(("right", "left"), ("top", "bottom")), key=occupied)
+    place = (0.98 if ha == "right" else 0.02, 0.97 if va == "top" else 0.03)
+    return place, {"ha": ha, "va": va}
 
 
 class _Failing(NamedTuple):
@@ -264,7 +293,7 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]
         peaks = [peak for line in lines for peak in _peaks(line, sign, end)]
         if peaks:
             _mark(axes, peaks, sign, middle, edge)
-    return [Line2D([], [], marker="^", color="0.4", **_MARK, label="cut off, near-singular")]
+    return [Line2D([], [], marker="^", color="0.4", **scaled(_MARK), label="cut off, near-singular")]
 
 
 def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
@@ -282,7 +311,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: fl
     place = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"
     for peak in peaks:
-        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **_MARK)
+        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **scaled(_MARK))
     farthest = max(peaks, key=lambda peak: sign * peak.value)
     at_right, value = farthest.time > middle, farthest.value
     axes.annotate(
@@ -293,7 +322,7 @@ def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: fl
         textcoords="offset points",
         ha="right" if at_right else "left",
         va="top" if sign > 0 else "bottom",
-        fontsize="small",
+        fontsize=current_look().points(SMALL),
         color=farthest.color,
         bbox=_BACKGROUND,
     )

@@ -9,17 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from vsacli.base.arrays import FloatArray
+from vsacli.results.charts.look import current_look
+from vsacli.results.plots.long_texts import POINTS_PER_INCH
 
 SIZE = 8
-"""Size of the font, points."""
+"""Size of the font at the usual font size, points."""
 
 LETTER, LINE = 0.075, 0.14
-"""Width of a character and height of a line, inches."""
+"""Width of a character and height of a line at that size, inches."""
 
 GAP = 5.0
-"""Distance between a point and its label, points."""
-
-POINTS_PER_INCH = 72.0
+"""Distance between a point and its label at the usual font size, points."""
 
 
 class _Side(NamedTuple):
@@ -65,7 +65,7 @@ def label_points(
     figure = axes.get_figure(root=True)
     assert figure is not None, "panels belong to figures"
     axes.autoscale_view()  # else the transformation below has not seen the last curves
-    size = axes.get_position().size * figure.get_size_inches()
+    size = np.asarray(axes.get_position().size) * figure.get_size_inches() / _scale()
     points = [axes.transLimits.transform(place) * size for place in places]
     marks = [
         np.array([point - GAP / POINTS_PER_INCH / 2, point + GAP / POINTS_PER_INCH / 2]) for point in points
@@ -81,6 +81,11 @@ def label_points(
                 taken.append(box)
                 _write(axes, text, places[own], side)
                 break
+
+
+def _scale() -> float:
+    """Return the size of labels and distances relative to the declared ones."""
+    return current_look().points(SIZE) / SIZE
 
 
 def _grouped(points: Sequence[FloatArray], labels: Sequence[str]) -> Iterator[tuple[str, list[int]]]:
@@ -100,5 +105,6 @@ def _overlapping(one: FloatArray, other: FloatArray) -> bool:
 
 def _write(axes: Axes, text: str, place: tuple[float, float], side: _Side) -> None:
     aligned: dict[str, Any] = {"ha": side.align, "va": side.valign}
-    offset = (GAP * side.across, GAP * side.up)
-    axes.annotate(text, place, offset, textcoords="offset points", fontsize=SIZE, **aligned)
+    gap = GAP * _scale()
+    offset = (gap * side.across, gap * side.up)
+    axes.annotate(text, place, offset, textcoords="offset points", fontsize=SIZE * _scale(), **aligned)

@@ -15,13 +15,14 @@ from matplotlib.patches import Patch
 
 from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, folding
 from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import ZERO, add_title, draw_curve
 from vsacli.results.plots.sheets import AxesGrid, complete, share_time
-from vsacli.results.plots.styles import LineStyle, house_style, line_handle, line_style
+from vsacli.results.plots.styles import LineStyle, line_handle, line_style, new_figure, scaled
 
 COLUMNS, MOST_ROWS = 4, 14
-ROW_HEIGHT = 1.8
-"""Height of a row of panels, inches."""
+ROW_HEIGHT, LABEL_HEIGHT = 1.8, 0.4
+"""Height of a row of panels, and of the labels below a row, inches."""
 
 LEAST_DENSITY = 1e-12
 """Density, relative to the largest, below which only rounding errors remain and nothing is shown."""
@@ -37,15 +38,15 @@ _FIT = LineStyle(line_style(1).color, "-", "")
 
 def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
     """Draw four panels for each component: samples and spline, their difference, and two spectra."""
-    with house_style():
-        rows, folds = folding(len(curves), MOST_ROWS)
-        figure = Figure((COLUMNS * folds * PANEL_WIDTH, ROW_HEIGHT * rows + 1.2), layout="constrained")
-        grid = figure.add_gridspec(rows, COLUMNS * folds).subplots(squeeze=False)
-        panels = grid.reshape(rows, folds, COLUMNS).swapaxes(0, 1).reshape(-1, COLUMNS)
-        for unused in panels[len(curves) :].flat:
-            unused.remove()
-        _label_axes(panels[: len(curves)], curves, rows)
-        handles: list[Artist] = [Line2D([], [], **_SAMPLES, label="recorded"), line_handle(_FIT, "spline")]
+    rows, folds = folding(len(curves), MOST_ROWS)
+    across = _panels_across(rows, folds)
+    folds = folds if across == COLUMNS else 1
+    with new_figure(_natural(len(curves), folds, across)) as figure:
+        panels = _panels(figure, curves, folds, across)
+        handles: list[Artist] = [
+            Line2D([], [], **scaled(_SAMPLES), label="recorded"),
+            line_handle(_FIT, "spline"),
+        ]
         for curve, (signal, residual, spectrum, highest) in zip(curves, panels, strict=False):
             handles += _draw_signal(signal, curve)
             handles += _draw_residual(residual, curve)
@@ -56,8 +57,40 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
         return complete(figure, title, handles)
 
 
+def _natural(count: int, folds: int, across: int) -> tuple[float, float]:
+    """Return the size of the figure with `across` of the panels of a component side by side, inches."""
+    rows = math.ceil(count / folds)
+    labels = 0.0 if across == COLUMNS else LABEL_HEIGHT
+    return across * folds * PANEL_WIDTH, (ROW_HEIGHT + labels) * rows * COLUMNS / across + 1.2
+
+
+def _panels_across(rows: int, folds: int) -> int:
+    """Return the number of panels of a component side by side: 4, or 2 or 1 where the figure is narrow."""
+    count = rows * folds
+    natural = {4 * folds: (folds, 4), 2: (1, 2), 1: (1, 1)}
+
+    def size(columns: int) -> tuple[float, float]:
+        return _natural(count, *natural.get(columns, (folds, 4)))
+
+    columns = columns_of_panels(COLUMNS * folds, size)
+    return COLUMNS if columns >= COLUMNS else min(columns, 2)
+
+
+def _panels(figure: Figure, curves: Sequence[RecordedCurve], folds: int, across: int) -> AxesGrid:
+    """Return panels with labels of time and frequency, (components, 4)."""
+    rows, parts = math.ceil(len(curves) / folds), COLUMNS // across
+    grid = figure.add_gridspec(rows * parts, folds * across).subplots(squeeze=False)
+    grid = grid.reshape(rows, parts, folds, across).transpose(2, 0, 1, 3)
+    panels: AxesGrid = grid.reshape(-1, COLUMNS)
+    for unused in panels[len(curves) :].flat:
+        unused.remove()
+    # Panels of other axes lie between those of one kind unless all are side by side: each is labeled.
+    _label_axes(panels[: len(curves)], curves, rows if parts == 1 else 1)
+    return panels
+
+
 def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) -> None:
-    """Share the time axis of the panels of a column, and label it below the last."""
+    """Share the time axis of the panels of a column of so many rows, and label it below the last."""
     times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
     span = np.array([min(times), max(times)])
     for first in range(0, len(panels), rows):
@@ -69,7 +102,7 @@ def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) ->
 
 
 def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
-    axes.plot(curve.recorded.time, curve.recorded.values, **_SAMPLES)
+    axes.plot(curve.recorded.time, curve.recorded.values, **scaled(_SAMPLES))
     handles = draw_curve(axes, curve.fitted, _FIT)
     if not np.any(curve.spectrum.recorded):  # at rest: rounding errors must not set the scale
         middle = float(np.mean(curve.recorded.values))
@@ -81,11 +114,11 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     """Draw the residual of the spline, the reported noise, and the ends with unreliable derivatives."""
-    axes.axhline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
     handles = draw_curve(axes, curve.residual, line_style(DIFFERENCE))
     if curve.rms > 0:
         for level in (-2 * curve.noise, 2 * curve.noise):
-            axes.axhline(level, **_NOISE)
+            axes.axhline(level, **scaled(_NOISE))
         handles.append(_noise_handle())
     else:
         axes.set_yticks([0.0])
@@ -101,7 +134,7 @@ def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 
 def _noise_handle() -> Artist:
-    return Line2D([], [], **_NOISE, label="reported noise (difference: twice)")
+    return Line2D([], [], **scaled(_NOISE), label="reported noise (difference: twice)")
 
 
 def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> list[Artist]:
@@ -118,10 +151,10 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
     if top == 0:
         return []
     handles: list[Artist] = []
-    axes.loglog(spectrum.frequencies, recorded, **_SAMPLES)
+    axes.loglog(spectrum.frequencies, recorded, **scaled(_SAMPLES))
     axes.loglog(spectrum.frequencies, fitted, **_FIT.words)
     if spectrum.noise > LEAST_DENSITY * float(np.max(spectrum.recorded)):
-        axes.loglog(spectrum.frequencies, noise, **_NOISE)
+        axes.loglog(spectrum.frequencies, noise, **scaled(_NOISE))
         handles.append(_noise_handle())
     axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
     axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
@@ -141,8 +174,8 @@ def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
         axes.axvspan(spectrum.above, end, **_FILTERED)
         handles.append(Patch(**_FILTERED, label="low-pass filtered noise"))
     if end < last:
-        axes.axvline(end, **_CUTOFF)
-        handles.append(Line2D([], [], **_CUTOFF, label="cut-off of the spline"))
+        axes.axvline(end, **scaled(_CUTOFF))
+        handles.append(Line2D([], [], **scaled(_CUTOFF), label="cut-off of the spline"))
     return handles
 
 

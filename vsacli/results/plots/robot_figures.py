@@ -13,20 +13,24 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.look import current_look
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, TorqueCurve
+from vsacli.results.plots.arrangement import panel_grid
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, line_style, shortened
+from vsacli.results.plots.styles import line_style, scaled, shortened
 
 PANEL_HEIGHT = 2.7
 """Height of a panel, inches."""
 
+LEGEND_SIZE = 8
+"""Font size of legends inside a panel, points at the usual font size."""
+
+LEGEND_ROOM = 0.15
+"""Space above and below the curves of a figure of a fixed width, relative to them."""
+
 TITLE_LENGTH = 34
 """Characters in a line of the title of a panel, which has two lines."""
-
-MOST_ROWS = 6
-"""Maximum number of rows of two panels; further panels continue at the right."""
 
 WIDE_RATIO, SMALLEST_SHARE = 50.0, 1e-4
 """Ratio of the largest to the median minimum stiffness from which the axis is logarithmic, and the lowest
@@ -47,8 +51,7 @@ _LIMIT: dict[str, dict[str, Any]] = {
 
 def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the torque over deflection of the springs, a panel for joints with equal actuators."""
-    with house_style():
-        figure, panels = _panels(len(charts))
+    with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
             _name(axes, chart)
@@ -58,25 +61,12 @@ def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
 
 def stiffness_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the attainable stiffness over torque, a panel for joints with equal actuators."""
-    with house_style():
-        figure, panels = _panels(len(charts))
+    with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
             _name(axes, chart)
             handles += _draw_map(axes, chart)
         return complete(figure, f"{title}: attainable stiffness at rest", handles)
-
-
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure with so many panels, row by row."""
-    columns = min(2 * math.ceil(count / (2 * MOST_ROWS)), count)
-    rows = math.ceil(count / columns)
-    size = (max(PANEL_WIDTH * columns, 2 * PANEL_WIDTH), PANEL_HEIGHT * rows + 1.1)
-    figure = Figure(size, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).flatten()
-    for unused in panels[count:]:
-        unused.remove()
-    return figure, list(panels[:count])
 
 
 def _name(axes: Axes, chart: ActuatorChart) -> None:
@@ -92,8 +82,8 @@ def _torque_words(chart: ActuatorChart) -> str:
 def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     """Draw the torques of springs into a panel; return the legend entries."""
     handles: list[Artist] = []
-    axes.axhline(0.0, **ZERO)
-    axes.axvline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
+    axes.axvline(0.0, **scaled(ZERO))
     curves = chart.torques
     for look, curve in enumerate(curves):
         style = line_style(look)
@@ -101,10 +91,12 @@ def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
         shown = np.isfinite(curve.torque)
         axes.plot(curve.deflection[shown], curve.torque[shown], **marked, label=curve.label)
         if math.isfinite(curve.limit):
-            axes.axvline(curve.limit, **_LIMIT[LIMITS["phi"]])
-            axes.axvline(-curve.limit, **_LIMIT[LIMITS["phi"]])
-            handles.append(Line2D([], [], **_LIMIT[LIMITS["phi"]], label=LIMITS["phi"]))
+            axes.axvline(curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
+            axes.axvline(-curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
+            handles.append(Line2D([], [], **scaled(_LIMIT[LIMITS["phi"]]), label=LIMITS["phi"]))
     axes.margins(x=0.04)
+    if current_look().width is not None:
+        axes.margins(y=LEGEND_ROOM)  # in narrow panels the legend is above the curves instead
     _legend(axes, chart, curves)
     axes.set_xlabel(f"deflection [{chart.unit('phi')}]")
     axes.set_ylabel(f"{_torque_words(chart)} [{chart.unit('tau_e')}]")
@@ -116,7 +108,8 @@ def _legend(axes: Axes, chart: ActuatorChart, curves: Sequence[TorqueCurve]) -> 
     mechanism = chart.actuator.spring_elements is None
     title = rf"$\theta_2$ [{chart.unit('theta')}]" if mechanism else None
     if mechanism or len(curves) > 1 or chart.commanded:
-        axes.legend(loc="upper left", fontsize=8, title=title, title_fontsize=8, handlelength=2.2)
+        size = current_look().points(LEGEND_SIZE)
+        axes.legend(loc="upper left", fontsize=size, title=title, title_fontsize=size, handlelength=2.2)
 
 
 def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:
@@ -130,11 +123,11 @@ def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     else:
         handles += _draw_only(axes, seen)
     for size in (-chart.load, chart.load) if chart.load else ():
-        axes.axvline(size, **_LOAD)
-        handles.append(Line2D([], [], **_LOAD, label="largest torque of gravity"))
+        axes.axvline(size, **scaled(_LOAD))
+        handles.append(Line2D([], [], **scaled(_LOAD), label="largest torque of gravity"))
     for end in chart.limits:
-        axes.axhline(end, **_ALLOWED)
-        handles.append(Line2D([], [], **_ALLOWED, label="stiffness limit of the file"))
+        axes.axhline(end, **scaled(_ALLOWED))
+        handles.append(Line2D([], [], **scaled(_ALLOWED), label="stiffness limit of the file"))
     axes.set_xlim(seen.tau_e[0], seen.tau_e[-1])
     axes.set_ylim(0, seen.top)
     if _is_wide(seen):
@@ -168,7 +161,7 @@ def _draw_limits(axes: Axes, seen: StiffnessMap) -> list[Artist]:
     for words, clearance in seen.clearance.items():
         if not (clearance < 0).any():
             continue
-        look = _LIMIT[words]
+        look = scaled(_LIMIT[words])
         lines = {"colors": look["color"], "linewidths": look["linewidth"], "linestyles": [look["linestyle"]]}
         axes.contour(tau_e, seen.levels, clearance, levels=[0.0], **lines)
         handles.append(Line2D([], [], **look, label=words))
@@ -193,17 +186,17 @@ def _draw_ends(axes: Axes, seen: StiffnessMap) -> list[Artist]:
             there = np.isfinite(end) & (end <= seen.top) & (marks == singular)
             if there.any():
                 joined = there | np.roll(there, 1) & np.isfinite(end)
-                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **look)
-                handles.append(Line2D([], [], **look, label=label))
+                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **scaled(look))
+                handles.append(Line2D([], [], **scaled(look), label=label))
     return handles
 
 
 def _draw_only(axes: Axes, seen: StiffnessMap) -> list[Artist]:
     """Draw the stiffness of springs that no motor adjusts, dotted beyond a limit."""
     within, beyond = seen.within[0], {**_ONLY, "linestyle": (0, (1, 1.5))}
-    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **_ONLY)
-    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **beyond)
-    handles: list[Artist] = [Line2D([], [], **_ONLY, label="stiffness that no motor adjusts")]
+    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **scaled(_ONLY))
+    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **scaled(beyond))
+    handles: list[Artist] = [Line2D([], [], **scaled(_ONLY), label="stiffness that no motor adjusts")]
     if not within.all():
-        handles.append(Line2D([], [], **beyond, label="stiffness beyond a limit"))
+        handles.append(Line2D([], [], **scaled(beyond), label="stiffness beyond a limit"))
     return handles

@@ -20,8 +20,9 @@ from vsacli.results.charts import chart as charts
 from vsacli.results.charts.chart import Block, Sheet
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arrangement import arranged
+from vsacli.results.plots.long_texts import LINE, broken, fit_texts
 from vsacli.results.plots.panels import draw_chart
-from vsacli.results.plots.styles import house_style, line_handle, line_style, make_legible, shortened
+from vsacli.results.plots.styles import line_handle, line_style, make_legible, new_figure, shortened
 
 LATE = 1e5
 """Start time, s, from which ticks count from the start, since their digits would not fit side by side."""
@@ -32,6 +33,12 @@ FINE, FEW_TICKS = 0.1, 4
 TITLE_LENGTH, LABEL_BESIDE = 70, 16
 """Maximum length of a title, and of a name next to a panel, characters."""
 
+TITLE_CHARACTER = 0.095
+"""Width of a character of a title at the usual font size, inches."""
+
+ROWS_OF_LEGEND = 2
+"""Number of rows of a legend for which figures of a fixed width have room."""
+
 _INCHES_PER_CHARACTER = 0.07
 _INCHES_PER_HANDLE = 0.7
 
@@ -41,9 +48,8 @@ AxesGrid = npt.NDArray[Any]
 
 def drawn(sheet: Sheet) -> Figure:
     """Draw a sheet as a figure."""
-    with house_style(sheet.size):
-        arrangement = arranged(sheet)
-        figure = Figure(arrangement.size, layout="constrained")
+    arrangement = arranged(sheet)
+    with new_figure(arrangement.natural) as figure:
         if arrangement.stacked:
             places = figure.add_gridspec(len(arrangement.blocks), 1, height_ratios=arrangement.shares)
         else:
@@ -122,7 +128,7 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
     """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
     look = current_look()
     if look.title:
-        figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=1.1 * look.font_size, parse_math=False)
+        figure.suptitle(_title(title, figure), fontsize=1.1 * look.font_size, parse_math=False)
     by_label = {str(handle.get_label()): handle for handle in handles}
     if by_label:
         labels = [shortened(label) for label in by_label]
@@ -131,8 +137,21 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
         columns = math.ceil(len(labels) / rows)
         legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
         _take_literally(legend)
+        if look.width is not None and look.height is None:
+            more = max(0, rows - ROWS_OF_LEGEND)
+            figure.set_figheight(figure.get_figheight() + LINE * look.scale * more)
     make_legible(figure)
+    if look.width is not None:
+        fit_texts(figure)
     return figure
+
+
+def _title(title: str, figure: Figure) -> str:
+    """Return a title of limited length, in lines as wide as the figure if its width is fixed."""
+    look, whole = current_look(), shortened(title, TITLE_LENGTH)
+    if look.width is None:
+        return whole
+    return broken(whole, int(figure.get_figwidth() / (TITLE_CHARACTER * look.scale)))
 
 
 def _take_literally(legend: Legend) -> None:

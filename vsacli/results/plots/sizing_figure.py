@@ -14,18 +14,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.plots.arrangement import panel_grid
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, line_style, shortened
+from vsacli.results.plots.styles import line_style, scaled, shortened
 
 PANEL_HEIGHT = 2.3
 """Height of a panel, inches."""
 
 TITLE_LENGTH = 32
 """Characters in a line of the title of a panel, which has two lines."""
-
-MOST_ROWS = 6
-"""Maximum number of rows of two panels; further panels continue at the right."""
 
 SIGHT = 6.0
 """Limits larger than the motion by more than this factor are not shown, so that the motion stays visible."""
@@ -104,19 +101,10 @@ class TorqueSpeed(NamedTuple):
 
 def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
     """Draw a panel for each motor: |torque| over |speed|, paler where it brakes."""
-    with house_style():
-        folds = math.ceil(len(motors) / (2 * MOST_ROWS))
-        columns = min(2 * folds, len(motors))
-        rows = math.ceil(len(motors) / columns)
-        figure = Figure(
-            (max(PANEL_WIDTH * columns, 2 * PANEL_WIDTH), PANEL_HEIGHT * rows + 1.1), layout="constrained"
-        )
-        panels = figure.subplots(rows, columns, squeeze=False).flatten()
-        for unused in panels[len(motors) :]:
-            unused.remove()
+    with panel_grid(len(motors), PANEL_HEIGHT) as (figure, panels):
         names = list(dict.fromkeys(name for motor in motors for name in motor.runs))
         handles: list[Artist] = [Line2D([], [], **_run_look(at), label=name) for at, name in enumerate(names)]
-        for axes, motor in zip(panels, motors, strict=False):
+        for axes, motor in zip(panels, motors, strict=True):
             handles += _draw(axes, motor, names)
         return complete(figure, title, handles)
 
@@ -129,8 +117,8 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
     handles = _draw_bounds(axes, motor.bounds, right, top)
     for name, (velocity, torque) in motor.runs.items():
         _draw_run(axes, velocity, torque, _run_look(names.index(name)))
-    axes.plot(*motor.rms, **RMS_LOOK, zorder=5)
-    handles.append(Line2D([], [], **RMS_LOOK, label="root mean square"))
+    axes.plot(*motor.rms, **scaled(RMS_LOOK), zorder=5)
+    handles.append(Line2D([], [], **scaled(RMS_LOOK), label="root mean square"))
     if any((velocity * torque < 0).any() for velocity, torque in motor.runs.values()):
         handles.append(Line2D([], [], color="black", alpha=BRAKING, label="pale: while it brakes"))
     axes.set_xlim(0, right)
@@ -173,10 +161,10 @@ def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[A
         lasting = np.minimum(edge, bounds.continuous_torque)
         axes.fill_between(speed, np.minimum(lasting, 2 * top), **CONTINUOUS_LOOK, zorder=0.5)
         handles.append(Patch(**CONTINUOUS_LOOK, label="within the continuous limits"))
-    axes.plot(speed, np.minimum(edge, 2 * top), **EDGE)
+    axes.plot(speed, np.minimum(edge, 2 * top), **scaled(EDGE))
     last = speed[np.isfinite(edge)]
     if last.size and last[-1] < right * (1 - 1 / POINTS):
-        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **EDGE)
+        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **scaled(EDGE))
     return handles
 
 

@@ -22,19 +22,22 @@ from matplotlib.patheffects import withStroke
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.ranking import Ranking
 from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.plots.arrangement import columns_of_panels
+from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
-from vsacli.results.plots.point_labels import BELOW, label_points
-from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import house_style, line_handle, line_style, shortened
+from vsacli.results.plots.point_labels import BELOW, LETTER, label_points
+from vsacli.results.plots.sheets import AxesGrid, complete
+from vsacli.results.plots.styles import line_handle, line_style, new_figure, scaled, shortened
 from vsacli.results.store.study_table import StoredStudy
 
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
 """Names of the figures, whose files are called `<stem>-<name>`."""
 
-PANEL_HEIGHT = 2.4
-"""Height of a panel, inches."""
+PANEL_HEIGHT, LOW_HEIGHT = 2.4, 1.8
+"""Height of a panel, and of each of several rows of parameters, inches."""
 
 MOST_LETTERS = 30
 """Longest line of a label along a panel, characters."""
@@ -42,11 +45,15 @@ MOST_LETTERS = 30
 MOST_PANELS = 6
 """Maximum number of parameters in one figure: those with the highest correlation to the margin."""
 
-BAR_HEIGHT = 0.28
-"""Height of a bar, inches."""
+MAP_WIDTH = 1.5 * PANEL_WIDTH
+"""Width of a map with its color bar, inches."""
 
-LABEL_LENGTH, ROOM_FOR_LABELS = 16, 0.35
-"""Characters of a joint's name next to its bar, and the space for it, relative to the longest bar."""
+BAR_HEIGHT, HIGH_BAR = 0.28, 0.37
+"""Height of a bar, and of one whose label has two lines, inches."""
+
+LABEL_LENGTH, LABEL_SIZE, ROOM_FOR_LABELS = 16, 8, 0.35
+"""Characters of the name of a joint next to its bar, its size at the usual font size in points, and the space
+for it, relative to the longest bar."""
 
 MOST_TICKS = 8
 """Maximum number of values of a grid that are ticks of a map; of more, some are."""
@@ -86,14 +93,13 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
         InputError: there is nothing to draw.
     """
     points = StudyPoints(table)
-    with house_style():
-        figures = {FEASIBILITY_OF_RUNS: _feasibility([points], ["feasible"], points.title)}
-        if points.varying:
-            figures[COST if points.optimized else MARGIN] = (
-                _over_map(points) if _is_grid(points) else _over_numbers(points)
-            )
-        if points.cost is not None and not points.optimized and len(points.front) > 1:
-            figures[PARETO] = _pareto(points)
+    figures = {FEASIBILITY_OF_RUNS: _feasibility([points], ["feasible"], points.title)}
+    if points.varying:
+        figures[COST if points.optimized else MARGIN] = (
+            _over_map(points) if _is_grid(points) else _over_numbers(points)
+        )
+    if points.cost is not None and not points.optimized and len(points.front) > 1:
+        figures[PARETO] = _pareto(points)
     return figures
 
 
@@ -103,31 +109,57 @@ def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Fi
     Raises:
         InputError: a study has nothing to draw.
     """
-    with house_style():
-        title = f"comparison of {counted(len(tables), 'study', 'studies')}: feasible runs"
-        return _feasibility([StudyPoints(table) for table in tables], labels, title)
+    title = f"comparison of {counted(len(tables), 'study', 'studies')}: feasible runs"
+    return _feasibility([StudyPoints(table) for table in tables], labels, title)
 
 
 def _over_numbers(points: StudyPoints) -> Figure:
     """Draw margin, and cost below, over each varying parameter; of optimized runs the costs alone."""
     paths = _most_followed(points)
     rows = 1 if points.cost is None or points.optimized else 2
-    figure = Figure((PANEL_WIDTH * max(2, len(paths)), PANEL_HEIGHT * rows + 0.9), layout="constrained")
-    panels = figure.subplots(rows, len(paths), squeeze=False, sharex="col", sharey="row")
+
+    def natural(columns: int) -> tuple[float, float]:
+        groups = math.ceil(len(paths) / columns)
+        height = PANEL_HEIGHT if groups == 1 else LOW_HEIGHT
+        return PANEL_WIDTH * max(2, columns), height * rows * groups + 0.9
+
+    columns = min(len(paths), columns_of_panels(len(paths), natural))
     handles: list[Artist] = []
-    for column, path in zip(panels.T, paths, strict=True):
-        if not points.optimized:
-            handles += _margins_over(column[0], points, points.varying[path])
-        if points.cost is not None:
-            handles += _costs_over(column[-1], points, points.varying[path])
-        column[-1].set_xlabel(
-            _label(points, path, MOST_LETTERS * (2 if len(paths) == 1 else 1)), parse_math=False
-        )
-    if points.cost is not None:
-        panels[-1, 0].set_ylabel(_fitting(points.cost_words))
-    if not points.optimized:
-        panels[0, 0].set_ylabel("smallest margin [%]")
-    return complete(figure, points.title, handles)
+    with new_figure(natural(columns)) as figure:
+        panels = _columns_over(figure, len(paths), rows, columns)
+        for column, path in zip(panels, paths, strict=True):
+            if not points.optimized:
+                handles += _margins_over(column[0], points, points.varying[path])
+            if points.cost is not None:
+                handles += _costs_over(column[-1], points, points.varying[path])
+            column[-1].set_xlabel(
+                _label(points, path, MOST_LETTERS * (2 if len(paths) == 1 else 1)), parse_math=False
+            )
+        for column in panels[::columns]:
+            if points.cost is not None:
+                column[-1].set_ylabel(_fitting(points.cost_words))
+            if not points.optimized:
+                column[0].set_ylabel("smallest margin [%]")
+        return complete(figure, points.title, handles)
+
+
+def _columns_over(figure: Figure, count: int, rows: int, columns: int) -> AxesGrid:
+    """Return panels (count, rows): in each, x is shared from top to bottom; y is shared by all of a kind."""
+    groups = math.ceil(count / columns)
+    grid = figure.subplots(groups * rows, columns, squeeze=False).reshape(groups, rows, columns)
+    panels = grid.swapaxes(1, 2).reshape(-1, rows)
+    for unused in panels[count:].flat:
+        unused.remove()
+    for at, column in enumerate(panels[:count]):
+        for kind, axes in enumerate(column):
+            if at:
+                axes.sharey(panels[0, kind])
+            if at % columns:
+                axes.tick_params(labelleft=False)
+            if kind < rows - 1:
+                axes.sharex(column[-1])
+                axes.tick_params(labelbottom=False)
+    return panels[:count]
 
 
 def _most_followed(points: StudyPoints) -> list[str]:
@@ -150,12 +182,12 @@ def _margins_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Ar
     margin = 100 * points.margin
     yield from _scatter(axes, x, margin, points.feasible, "feasible", _FEASIBLE)
     yield from _scatter(axes, x, margin, ~points.feasible, "infeasible", _INFEASIBLE)
-    axes.axhline(0.0, **ZERO)
+    axes.axhline(0.0, **scaled(ZERO))
     worst = points.worst
     if worst.size:
         places = [(float(x[row]), float(margin[row])) for row in worst]
         label_points(axes, places, [str(points.runs[row]) for row in worst])
-        yield Line2D([], [], **_NAMED, label="runs of the smallest margins")
+        yield Line2D([], [], **scaled(_NAMED), label="runs of the smallest margins")
 
 
 def _costs_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
@@ -182,10 +214,10 @@ def _scatter(
 ) -> Iterator[Artist]:
     """Draw the chosen points that have a value; yield their legend entry if there are any."""
     rows = chosen & np.isfinite(y)
-    axes.plot(x[rows], y[rows], **look)
+    axes.plot(x[rows], y[rows], **scaled(look))
     axes.margins(0.08)
     if rows.any():
-        yield Line2D([], [], **{**look, "markersize": 5}, label=label)
+        yield Line2D([], [], **scaled({**look, "markersize": 5}), label=label)
 
 
 def _is_grid(points: StudyPoints) -> bool:
@@ -201,29 +233,47 @@ def _over_map(points: StudyPoints) -> Figure:
     """Draw margin and cost, or costs before and after an optimization, as maps over two parameters."""
     (across, x), (up, y) = points.varying.items()
     maps = points.shown
-    figure = Figure((1.5 * PANEL_WIDTH * len(maps), PANEL_HEIGHT + 1.2), layout="constrained")
-    panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
-    panels[0].set_ylabel(_label(points, up, MOST_LETTERS), parse_math=False)
+
+    def natural(columns: int) -> tuple[float, float]:
+        return MAP_WIDTH * columns, (PANEL_HEIGHT + 0.5) * math.ceil(len(maps) / columns) + 0.7
+
+    columns = min(len(maps), columns_of_panels(len(maps), natural, MAP_WIDTH - 1))
     order, shape = np.lexsort((x, y)), (len(np.unique(y)), len(np.unique(x)))
     margin = points.margin[order].reshape(shape)
     bounded = not points.optimized and np.nanmin(margin, initial=0.0) < 0 < np.nanmax(margin, initial=0.0)
-    for axes, (label, values) in zip(panels, maps, strict=True):
-        place = [each[order].reshape(shape) for each in (x, y, values)]
-        shown = axes.pcolormesh(*place, shading="nearest", cmap="viridis", rasterized=True)
-        if bounded:
-            boundary = axes.contour(*place[:2], margin, levels=[0], colors=[_BOUNDARY["color"]])
-            boundary.set_path_effects(_BOUNDARY["path_effects"])
-        for axis, grid in ((axes.xaxis, np.unique(x)), (axes.yaxis, np.unique(y))):
-            if len(grid) <= MOST_TICKS:
-                axis.set_ticks(grid)
-        axes.set_xlabel(_label(points, across, MOST_LETTERS), parse_math=False)
-        axes.grid(visible=False)
-        axes.patch.set(**_NOTHING)
-        figure.colorbar(shown, ax=axes, label=_fitting(label))
-    handles: list[Artist] = [Line2D([], [], **_BOUNDARY, label="margin zero")] if bounded else []
-    if any(np.isnan(values).any() for _, values in maps):
-        handles.append(Patch(**_NOTHING, label="infeasible"))
-    return complete(figure, points.title, handles)
+    with new_figure(natural(columns)) as figure:
+        panels = figure.subplots(math.ceil(len(maps) / columns), columns, squeeze=False, sharey=True)
+        for axes in panels[:, 0]:
+            axes.set_ylabel(_label(points, up, MOST_LETTERS), parse_math=False)
+        for axes, (label, values) in zip(panels.flat, maps, strict=True):
+            place = [each[order].reshape(shape) for each in (x, y, values)]
+            _draw_map(axes, place, margin if bounded else None, label)
+            axes.set_xlabel(_label(points, across, MOST_LETTERS), parse_math=False)
+        handles: list[Artist] = [Line2D([], [], **_BOUNDARY, label="margin zero")] if bounded else []
+        if any(np.isnan(values).any() for _, values in maps):
+            handles.append(Patch(**_NOTHING, label="infeasible"))
+        return complete(figure, points.title, handles)
+
+
+def _draw_map(axes: Axes, place: Sequence[FloatArray], margin: FloatArray | None, label: str) -> None:
+    """Draw values over two parameters as colors.
+
+    Args:
+        axes: panel to draw into.
+        place: both parameters and the values, (rows, columns) each.
+        margin: margins, whose zero is drawn as a line; None for no line.
+        label: label of the values.
+    """
+    shown = axes.pcolormesh(*place, shading="nearest", cmap="viridis", rasterized=True)
+    if margin is not None:
+        boundary = axes.contour(*place[:2], margin, levels=[0], colors=[_BOUNDARY["color"]])
+        boundary.set_path_effects(_BOUNDARY["path_effects"])
+    for axis, grid in ((axes.xaxis, np.unique(place[0])), (axes.yaxis, np.unique(place[1]))):
+        if len(grid) <= MOST_TICKS:
+            axis.set_ticks(grid)
+    axes.grid(visible=False)
+    axes.patch.set(**_NOTHING)
+    axes.figure.colorbar(shown, ax=axes, label=_fitting(label))
 
 
 def _fitting(label: str, length: int = MOST_LETTERS) -> str:
@@ -237,18 +287,18 @@ def _pareto(points: StudyPoints) -> Figure:
     """Draw cost over margin of the feasible runs, with the Pareto front."""
     assert points.cost is not None, "see study_figures"
     words, cost = points.cost
-    figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
-    axes = figure.add_subplot()
-    margin, front = 100 * points.margin, points.front
-    runs = list(_scatter(axes, margin, cost, points.feasible, "feasible runs", _ANY))
-    axes.plot(margin[front], cost[front], **line_style(2).words)
-    axes.margins(ROOM_FOR_RUNS)
-    named = list(dict.fromkeys([front[0], front[-1], front[len(front) // 2]]))
-    places = [(float(margin[row]), float(cost[row])) for row in named]
-    label_points(axes, places, [f"run {points.runs[row]}" for row in named], BELOW)
-    axes.set_xlabel("smallest margin [%]")
-    axes.set_ylabel(_fitting(words))
-    return complete(figure, points.title, [*runs, line_handle(line_style(2), "Pareto front")])
+    with new_figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT)) as figure:
+        axes = figure.add_subplot()
+        margin, front = 100 * points.margin, points.front
+        runs = list(_scatter(axes, margin, cost, points.feasible, "feasible runs", _ANY))
+        axes.plot(margin[front], cost[front], **line_style(2).words)
+        axes.margins(ROOM_FOR_RUNS)
+        named = list(dict.fromkeys([front[0], front[-1], front[len(front) // 2]]))
+        places = [(float(margin[row]), float(cost[row])) for row in named]
+        label_points(axes, places, [f"run {points.runs[row]}" for row in named], BELOW)
+        axes.set_xlabel("smallest margin [%]")
+        axes.set_ylabel(_fitting(words))
+        return complete(figure, points.title, [*runs, line_handle(line_style(2), "Pareto front")])
 
 
 def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: str) -> Figure:
@@ -257,21 +307,21 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: s
     Shares of random draws estimate probabilities, and have a band of their 95 % intervals; shares of a grid
     have none, since its runs are chosen.
     """
-    figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
-    axes, handles = figure.add_subplot(), []
-    for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
-        style = replace(line_style(index), marker="")
-        _draw_shares(axes, points, style.words)
-        share, low, high = (100 * each for each in points.share)
-        interval = f" ({low:.3g} to {high:.3g} %)" if points.random else ""
-        handles.append(line_handle(style, f"{label}: {share:.3g} %{interval}"))
-    if any(points.random for points in studies):
-        handles.append(Patch(facecolor="0.3", **_INTERVAL, label="95 % interval (random samples)"))
-    axes.axvline(0.0, **ZERO)
-    axes.set_xlabel("smallest margin [%]")
-    axes.set_ylabel("runs with at least this margin [%]")
-    axes.set_ylim(0, 103)
-    return complete(figure, title, handles)
+    with new_figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT)) as figure:
+        axes, handles = figure.add_subplot(), []
+        for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
+            style = replace(line_style(index), marker="")
+            _draw_shares(axes, points, style.words)
+            share, low, high = (100 * each for each in points.share)
+            interval = f" ({low:.3g} to {high:.3g} %)" if points.random else ""
+            handles.append(line_handle(style, f"{label}: {share:.3g} %{interval}"))
+        if any(points.random for points in studies):
+            handles.append(Patch(facecolor="0.3", **_INTERVAL, label="95 % interval (random samples)"))
+        axes.axvline(0.0, **scaled(ZERO))
+        axes.set_xlabel("smallest margin [%]")
+        axes.set_ylabel("runs with at least this margin [%]")
+        axes.set_ylim(0, 103)
+        return complete(figure, title, handles)
 
 
 def _draw_shares(axes: Axes, points: StudyPoints, look: Mapping[str, Any]) -> None:
@@ -299,18 +349,27 @@ def _label(points: StudyPoints, path: str, length: int) -> str:
 def ranking_figure(ranking: Ranking) -> Figure:
     """Draw a bar for each parameter, the most important on top, with the joint that it affects most."""
     bars = ranking.bars
-    with house_style():
-        figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
-        axes = figure.add_subplot()
+    labels = [_bar_label(bar.label) for bar in bars]
+    height = HIGH_BAR if any("\n" in label for label in labels) else BAR_HEIGHT
+    with new_figure((2 * PANEL_WIDTH, height * len(bars) + 1.2)) as figure:
+        axes, size = figure.add_subplot(), current_look().points(LABEL_SIZE)
         joints = list(dict.fromkeys(bar.joint for bar in bars))
         colors = [line_style(joints.index(bar.joint)).color for bar in bars]
         axes.barh(range(len(bars)), [100 * bar.share for bar in bars], color=colors, height=0.7)
-        axes.set_yticks(range(len(bars)), [bar.label for bar in bars], parse_math=False)
+        axes.set_yticks(range(len(bars)), labels, parse_math=False)
         axes.invert_yaxis()
         for place, bar in enumerate(bars):
             text = f" {shortened(bar.joint, LABEL_LENGTH)}"
-            axes.text(100 * bar.share, place, text, va="center", fontsize=8, parse_math=False)
+            axes.text(100 * bar.share, place, text, va="center", fontsize=size, parse_math=False)
         axes.margins(x=ROOM_FOR_LABELS)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("change of motor torque [% of its peak]")
         return complete(figure, ranking.title, [])
+
+
+def _bar_label(label: str) -> str:
+    """Return the label of a bar, in lines of half the width of the figure if that alone is fixed."""
+    look = current_look()
+    if look.width is None or look.height is not None:
+        return label
+    return broken(label, int(look.width / CM_PER_INCH / 2 / (LETTER * look.scale)))

@@ -7,7 +7,7 @@ font lacks are drawn in a font of this machine, or else as escape codes.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -26,13 +26,16 @@ from vsacli.results.charts.look import current_look, drawing_with
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
+TICK_SIZE = 9
+"""Size of the labels of ticks at the usual font size, points."""
+
 SETTINGS: dict[RcKeyType, Any] = {
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.labelsize": 10,
     "legend.fontsize": 9.5,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
     "lines.linewidth": 1.5,
     "lines.markersize": 5,
     "axes.grid": True,
@@ -53,14 +56,18 @@ SETTINGS: dict[RcKeyType, Any] = {
     "svg.hashsalt": "vsacli",
 }
 
-SCALED: tuple[RcKeyType, ...] = (
+TEXTS: tuple[RcKeyType, ...] = (
     "font.size",
     *("axes.titlesize", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize"),
+)
+"""Sizes of texts, which follow the font size of the look but stay legible."""
+
+SCALED: tuple[RcKeyType, ...] = (
     *("lines.linewidth", "lines.markersize", "lines.markeredgewidth", "axes.linewidth", "grid.linewidth"),
     *("xtick.major.size", "ytick.major.size", "xtick.major.width", "ytick.major.width", "patch.linewidth"),
     *("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"),
 )
-"""Settings that follow the font size of the look."""
+"""Other settings that follow the font size of the look."""
 
 LONGEST_LABEL = 36
 """Maximum length of a name in a legend, characters."""
@@ -111,23 +118,36 @@ def shortened(name: str, length: int = LONGEST_LABEL) -> str:
 
 
 @contextmanager
-def house_style(natural: tuple[float, float] | None = None) -> Iterator[None]:
-    """Draw with these settings and the current look alone, regardless of a matplotlibrc on this machine.
-
-    Args:
-        natural: size of the figure at the usual font size, inches, to which the font is fitted.
-    """
-    look = current_look() if natural is None else current_look().fitted(natural)
-    with matplotlib.rc_context(), drawing_with(look):
+def house_style() -> Iterator[None]:
+    """Draw with these settings and the current look alone, regardless of a matplotlibrc on this machine."""
+    look = current_look()
+    with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
+        matplotlib.rcParams.update({name: look.points(matplotlib.rcParams[name]) for name in TEXTS})
         matplotlib.rcParams.update({name: look.scale * matplotlib.rcParams[name] for name in SCALED})
         yield
 
 
-def blank_figure(natural: tuple[float, float]) -> Figure:
-    """Return an empty figure with the current look; `natural` is its size at the usual font size, inches."""
-    return Figure(current_look().size(natural), layout="constrained")
+@contextmanager
+def new_figure(natural: tuple[float, float]) -> Iterator[Figure]:
+    """Yield an empty figure to draw with the settings of `house_style`.
+
+    Args:
+        natural: size of the figure at the usual font size, inches, to which the font is fitted.
+    """
+    with drawing_with(current_look().fitted(natural)), house_style():
+        yield Figure(current_look().size(natural), layout="constrained")
+
+
+SIZES = ("linewidth", "markersize")
+"""Properties of lines in points."""
+
+
+def scaled(look: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a style whose widths of lines and sizes of markers follow the font size of the current look."""
+    scale = current_look().scale
+    return {name: scale * value if name in SIZES else value for name, value in look.items()}
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:

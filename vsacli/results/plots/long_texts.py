@@ -1,0 +1,142 @@
+"""Titles and labels longer than their panel, broken into lines where the width of a figure is fixed."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import pairwise
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Annotation, Text
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from vsacli.results.charts.look import current_look
+from vsacli.results.plots.styles import TICK_SIZE, shortened
+
+UNDIVIDED = re.compile(r"\$[^$]*\$|\[[^\]]*\]|\d (?:N m|%|\w+)|motor \d")
+"""Parts of a text that stay in one line: formulas, units, values with their units, and motors."""
+
+SEPARATORS = (r"(?<=,) ", " ", r"(?<=\.)(?=[a-z])")
+"""Places at which texts are divided, the preferred ones first."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+FEWEST = 8
+"""Smallest length of a line, characters."""
+
+POINTS_PER_INCH = 72.0
+
+LINE = 0.17
+"""Height of a line at the usual font size, inches."""
+
+OVERHANG, SAFE = 1.1, 0.95
+"""Width that the label of an axis may have, relative to its panel; and share of its room that a text may
+take, since widths depend on the resolution."""
+
+TICK_GAP = 0.3
+"""Smallest distance between labels of ticks, relative to their font size."""
+
+
+def fit_texts(figure: Figure) -> None:
+    """Break texts of panels that are too long, and remove ticks whose labels overlap.
+
+    The figure grows by the further lines if its height is free.
+    """
+    look = current_look()
+    for axes in figure.axes:  # else the number of ticks depends on the settings when the figure is saved
+        axes.tick_params(labelsize=look.points(TICK_SIZE))
+    figure.draw_without_rendering()
+    added: dict[int, int] = defaultdict(int)
+    for axes in figure.axes:
+        _thin_ticks(axes, figure.dpi)
+        for text, room, upright in _texts(axes):
+            extent = text.get_window_extent()
+            taken = extent.height if upright else extent.width
+            if taken > SAFE * room:
+                before = text.get_text()
+                text.set_text(broken(before, max(FEWEST, int(_longest(before) * SAFE * room / taken))))
+                if not upright:
+                    added[round(axes.bbox.x0)] += text.get_text().count("\n") - before.count("\n")
+    _keep_inside(figure)
+    if look.height is None:
+        lines = max(added.values(), default=0)
+        figure.set_figheight(figure.get_figheight() + LINE * look.scale * lines)
+
+
+def broken(text: str, length: int) -> str:
+    """Break a text into lines of limited length between words; shorten words that are longer than a line."""
+    lines: list[str] = []
+    for line in text.split("\n"):
+        whole = UNDIVIDED.sub(lambda found: found[0].replace(" ", NO_BREAK), line)
+        lines += _lines(whole, length, SEPARATORS)
+    return "\n".join(lines).replace(NO_BREAK, " ")
+
+
+def _lines(text: str, length: int, separators: tuple[str, ...]) -> list[str]:
+    """Return the lines of a text that is divided at the first separators as far as that is enough."""
+    if len(text) <= length:
+        return [text]
+    if not separators:
+        return [text if "$" in text else shortened(text, length)]
+    between = " " if separators[0].endswith(" ") else ""
+    lines: list[str] = []
+    for part in re.split(separators[0], text):
+        if lines and len(lines[-1]) + len(between) + len(part) <= length:
+            lines[-1] += between + part
+        else:
+            lines += _lines(part, length, separators[1:])
+    return lines
+
+
+def _keep_inside(figure: Figure) -> None:
+    """Leave space at the right for labels of ticks there, which some columns have outside of the layout."""
+    ends = [label.get_window_extent().x1 for axes in figure.axes for label in _shown_labels(axes)]
+    beyond = max(ends, default=0.0) / figure.bbox.width - 1
+    engine = figure.get_layout_engine()
+    if beyond > 0 and isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(rect=(0.0, 0.0, 1.0 - beyond, 1.0))
+
+
+def _thin_ticks(axes: Axes, dpi: float) -> None:
+    """Reduce the number of ticks of time, speed or torque until their labels are apart."""
+    locator = axes.xaxis.get_major_locator()
+    if not isinstance(locator, MaxNLocator | FixedLocator):
+        return
+    gap = TICK_GAP * current_look().points(TICK_SIZE) * dpi / POINTS_PER_INCH
+    for bins in range(len(axes.get_xticks()) - 1, 1, -1):
+        extents = [label.get_window_extent() for label in _shown_labels(axes)]
+        if all(right.x0 - left.x1 >= gap for left, right in pairwise(extents)):
+            return
+        locator.set_params(nbins=bins)
+
+
+def _shown_labels(axes: Axes) -> list[Text]:
+    """Return the labels of the ticks of the horizontal axis that are drawn."""
+    low, high = sorted(axes.get_xlim())
+    room = 1e-6 * (high - low)
+    axes.get_xticklabels()  # places the ticks
+    shown = [
+        tick.label1
+        for tick in axes.xaxis.get_major_ticks()
+        if -room <= tick.get_loc() - low <= high - low + room
+    ]
+    return [label for label in shown if label.get_visible() and label.get_text()]
+
+
+def _longest(text: str) -> int:
+    return max(map(len, text.split("\n")))
+
+
+def _texts(axes: Axes) -> Iterator[tuple[Text, float, bool]]:
+    """Yield titles, labels and notes of a panel, each with its room in pixels and whether it is upright."""
+    box = axes.get_window_extent()
+    for text in axes.get_children():
+        if not isinstance(text, Text) or isinstance(text, Annotation):
+            continue
+        if text not in axes.texts or text.get_transform() == axes.transAxes:
+            yield text, box.width, False
+    yield axes.xaxis.label, OVERHANG * box.width, False
+    yield axes.yaxis.label, OVERHANG * box.height, True
