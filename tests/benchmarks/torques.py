@@ -1,7 +1,8 @@
 """Print how right d4q and torques of noisy records are: `python tests/benchmarks/torques.py results.jsonl`.
 
-The tables behind docs/recorded.md, with more columns. Each record adds lines to the file as it is done, seeds
-one after the other; those that are there are not done again. All take an hour, `--records 1` minutes, `--records 0` no time.
+The tables behind docs/recorded.md, with more columns. Each record adds lines to the file as it is done,
+seeds one after the other; those that are there are not done again. All take an hour, `--records 1` minutes,
+`--records 0` no time.
 """
 
 from __future__ import annotations
