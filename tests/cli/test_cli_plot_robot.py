@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, SEVEN_JOINTS, contents
 
@@ -34,7 +36,6 @@ def test_of_rigid_joints_only_the_arm_is_drawn_and_a_note_says_so(vsacli, tmp_pa
         (["--from", "1"], "--from cannot be used with a robot; leave it out"),
         (["--joints", "elbow"], "--joints cannot be used with a robot; leave it out"),
         (["--robot", ROBOT], "--robot is only for recordings; leave it out"),
-        (["--format", "html"], "--format html needs a result"),
         ([SEVEN_JOINTS], "robots are drawn one at a time"),
     ],
 )
@@ -52,3 +53,12 @@ def test_an_invalid_robot_is_refused_with_the_line(vsacli, tmp_path):
     assert done.code == 2
     assert done.err.startswith("bad.yaml:")
     assert "revolving" in done.err
+
+
+def test_a_page_has_the_figures_parameters_and_file_of_a_robot(vsacli):
+    assert vsacli("plot", ROBOT, "-o", "arm.html").code == 0
+    page = Path("arm.html").read_text(encoding="utf-8")
+    assert page.count('src="data:image/svg+xml;base64,') == 3
+    assert "<h1>vsa-3r</h1>" in page
+    assert "format: vsacli-robot/1" in page
+    assert "<script" not in page

@@ -21,7 +21,7 @@ from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import TIME
 from vsacli.cli.plot_recording import RECORDING, draw_recording, has_recording, is_recording, recording_figure
-from vsacli.cli.plot_robot import draw_robot, is_robot
+from vsacli.cli.plot_robot import draw_robot, is_robot, write_robot_page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -112,7 +112,8 @@ def plot(
 
     --format html writes one page <stem>.html for a browser, without network access: the report, zoomable
     plots of every variable, and the robot at the time cursor; for results that fail, the fixes of
-    check-feasibility --fixes; for several FILEs, their differences; for studies, margin and cost of each run.
+    check-feasibility --fixes; for several FILEs, their differences; for studies, margin and cost of each run;
+    for a robot its figures and parameters.
     It requires the package bokeh: pip install bokeh.
     """
     from vsacli.base.outputs import Outputs
@@ -124,8 +125,11 @@ def plot(
     with naming_kind("FILE", files, DRAWN), Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         target = _Target(figures, outputs)
         if any(map(is_robot, files)):
-            _check_robot(files, shown, robot, figures.file_format)
-            draw_robot(files[0], target.figures, talk)
+            _check_robot(files, shown, robot)
+            if page := figures.page(Path(files[0]).stem, outputs):
+                write_robot_page(files[0], page)
+            else:
+                draw_robot(files[0], target.figures, talk)
         elif any(map(is_recording, files)):
             _check_recording(files, shown, figures.file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
@@ -149,7 +153,7 @@ class _Target(NamedTuple):
         return self.place.files(names, stem, self.outputs)
 
 
-def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None, file_format: str) -> None:
+def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None) -> None:
     """Refuse options that do not apply to figures of robots.
 
     Raises:
@@ -161,10 +165,6 @@ def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None, file_
         raise click.UsageError(f"{shown.option} cannot be used with a robot; leave it out")
     if robot is not None:
         raise click.UsageError("--robot is only for recordings; leave it out")
-    if file_format == PAGE:
-        raise click.UsageError(
-            "--format html needs a result, which `vsacli invdyn` computes; choose png, pdf or svg"
-        )
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:

@@ -10,7 +10,10 @@ from vsacli.cli.console import Talk
 from vsacli.cli.input_errors import recognized
 
 if TYPE_CHECKING:
+    from vsacli.base.outputs import Staged
     from vsacli.results.plots import FigureFiles
+    from vsacli.results.plots.figures import Figures
+    from vsacli.robot.model import Robot
 
 ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 """Names of the figures, whose files are called `<stem>-<name>`."""
@@ -19,6 +22,14 @@ ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 def is_robot(path: str) -> bool:
     """Return whether a file is a robot; False if its kind is unknown."""
     return recognized(path) == "robot"
+
+
+WORDS = {
+    ARM: "the arm with joints, links and motors",
+    ACTUATORS: "torque of the springs over deflection",
+    STIFFNESS: "attainable stiffness over torque",
+}
+"""Figures in words, for readers of a page who do not see them."""
 
 
 def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk: Talk) -> None:
@@ -34,23 +45,50 @@ def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk:
         InputError: the robot cannot be used.
         StorageError: a figure cannot be written.
     """
+    from vsacli.robot.file import load_robot
+
+    robot = load_robot(path)
+    figures = staged(_names(robot), Path(path).stem)
+    figures.save(_figures(robot))
+    if _names(robot) == [ARM]:
+        talk.note(f"{path}: no figures of actuators and stiffness: all joints are rigid")
+
+
+def write_robot_page(path: str, page: Staged) -> None:
+    """Write the page of a robot: its figures, its description and its files.
+
+    Raises:
+        InputError: the robot cannot be used.
+        StorageError: the page cannot be written.
+    """
+    from vsacli.files.info import render
+    from vsacli.files.info.robot_info import describe_robot
+    from vsacli.results.pages import robot_page
+    from vsacli.results.pages.document import source_text
+    from vsacli.results.plots.figures import rendered_figure
+    from vsacli.robot.file import load_robot
+
+    robot = load_robot(path)
+    drawn = {WORDS[name]: rendered_figure(figure, "svg") for name, figure in _figures(robot).items()}
+    inputs = [source_text(source) for source in robot.sources]
+    page.write_text(robot_page(robot.name, drawn, render(describe_robot(robot)), inputs))
+
+
+def _names(robot: Robot) -> list[str]:
+    """Return the names of the figures of a robot; a rigid one has no springs to draw."""
+    compliant = any(joint.actuator.sprung for joint in robot.joints)
+    return [ARM, ACTUATORS, STIFFNESS] if compliant else [ARM]
+
+
+def _figures(robot: Robot) -> Figures:
     from vsacli.files.info.robot_info import load_sizes, static_load
     from vsacli.results.charts.arm_chart import arm_chart
     from vsacli.results.charts.robot_charts import actuator_charts
     from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
-    from vsacli.robot.file import load_robot
 
-    robot = load_robot(path)
-    compliant = any(joint.actuator.sprung for joint in robot.joints)
-    figures = staged([ARM, ACTUATORS, STIFFNESS] if compliant else [ARM], Path(path).stem)
-    figures.save({ARM: arm_figure(arm_chart(robot))})
-    if not compliant:
-        talk.note(f"{path}: no figures of actuators and stiffness: all joints are rigid")
-        return
-    charts = actuator_charts(robot, load_sizes(static_load(robot)).tolist())
-    figures.save(
-        {
-            ACTUATORS: actuators_figure(charts, robot.name),
-            STIFFNESS: stiffness_figure(charts, robot.name),
-        }
-    )
+    figures = {ARM: arm_figure(arm_chart(robot))}
+    if _names(robot) != [ARM]:
+        charts = actuator_charts(robot, load_sizes(static_load(robot)).tolist())
+        figures[ACTUATORS] = actuators_figure(charts, robot.name)
+        figures[STIFFNESS] = stiffness_figure(charts, robot.name)
+    return figures

@@ -97,7 +97,7 @@ class FigureFiles:
         for name, figure in figures.items():
             shown = drawn(figure) if isinstance(figure, Sheet) else figure
             file = self._files[name]
-            file.write_bytes(_rendered(shown, file.path.suffix.removeprefix(".")))
+            file.write_bytes(rendered_figure(shown, file.path.suffix.removeprefix(".")))
 
 
 def save_figures(
@@ -122,7 +122,8 @@ def save_figures(
     return outputs.paths
 
 
-def _rendered(figure: Figure, file_format: str) -> bytes:
+def rendered_figure(figure: Figure, file_format: str) -> bytes:
+    """Return a figure as the content of a file of one of `FORMATS`."""
     buffer = BytesIO()
     with house_style():
         resolution = _resolution(figure)
