@@ -260,7 +260,7 @@ def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]
         assert (len(shoulder.collections), len(elbow.collections)) == (0, 1)
-        assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "reachable"
+        assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "attainable"
 
 
 def test_motor_two_is_drawn_where_it_exists() -> None:
