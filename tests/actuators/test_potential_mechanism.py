@@ -280,7 +280,7 @@ REFUSED = {
     ),
     "a constant that is no word": (
         {"constants": (("k", 5.0), ("r", 0.01), ("b-c", 1.0))},
-        "constants.b-c: is no word: letters, digits and _, of which the first is no digit",
+        "constants.b-c: is not a name: expected letters, digits and _, beginning with a letter or _",
     ),
     "an infinite constant": ({"constants": (("k", math.inf), ("r", 0.01))}, "constants.k: must be finite"),
     "no second motor": ({"energy": "k*r*phi^2"}, "energy: does not depend on theta_2"),
@@ -303,15 +303,15 @@ REFUSED = {
     ),
     "a kink at the start": (
         {"energy": "k*r*theta_2^2*(phi^2)^1.5"},
-        "start: the energy or one of its first four derivatives is no finite number here; choose",
+        "start: the energy or one of its first four derivatives is not finite here; choose",
     ),
     "a division by zero": (
         {"energy": "k*(r*theta_2)^2*phi^2/0"},
-        "start: the energy or one of its first four derivatives is no finite number here; choose",
+        "start: the energy or one of its first four derivatives is not finite here; choose",
     ),
     "a root of a negative number": (
         {"energy": "(-2)^0.5*k*(r*theta_2)^2*phi^2"},
-        "start: the energy or one of its first four derivatives is no finite number here; choose",
+        "start: the energy or one of its first four derivatives is not finite here; choose",
     ),
 }  # fmt: skip
 

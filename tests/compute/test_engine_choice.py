@@ -201,7 +201,7 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
 @pytest.mark.parametrize(
     ("command", "reason"),
     [
-        ("'", r"the environment variable CC is no command: \"'\" \(No closing quotation\)"),
+        ("'", r"the environment variable CC is not a command: \"'\" \(No closing quotation\)"),
         pytest.param("cc -ffast-math", "'cc -ffast-math' enables -ffast-math or", marks=needs_compiler),
         pytest.param("cc -Ofast", "'cc -Ofast' enables", marks=needs_compiler),
         pytest.param("cc -ffinite-math-only", "'cc -ffinite-math-only' enables", marks=needs_compiler),

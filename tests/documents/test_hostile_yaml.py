@@ -49,12 +49,12 @@ def test_a_directory():
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_a_pipe_is_not_waited_for():
     os.mkfifo("pipe.yaml")
-    assert only_problem("pipe.yaml") == "pipe.yaml: is no regular file (a device, pipe or socket)"
+    assert only_problem("pipe.yaml") == "pipe.yaml: is not a regular file (a device, pipe or socket)"
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="the system has no /dev/zero")
 def test_a_device():
-    assert only_problem("/dev/zero") == "/dev/zero: is no regular file (a device, pipe or socket)"
+    assert only_problem("/dev/zero") == "/dev/zero: is not a regular file (a device, pipe or socket)"
 
 
 def test_a_file_that_may_not_be_read(monkeypatch):

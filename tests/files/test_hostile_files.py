@@ -130,7 +130,7 @@ def test_devices_and_folders_are_no_files(vsacli: Any) -> None:
     done = vsacli("validate", "/dev/zero", "folder", "a\0b")
     assert done.code == 2
     assert done.out.splitlines() == [
-        "/dev/zero: is no regular file (a device, pipe or socket)",
+        "/dev/zero: is not a regular file (a device, pipe or socket)",
         "folder: is a folder; give the name of a file in it",
         "a\\x00b: the path holds a NUL character",
     ]

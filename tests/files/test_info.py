@@ -314,7 +314,11 @@ def test_the_cache_is_shown_and_emptied(vsacli: Any, tmp_path: Path, monkeypatch
     [
         ((), 2, "Error: Missing argument 'FILE'."),
         (("--clear", "x"), 2, "Error: --clear empties the cache; give --cache, too"),
-        (("--cache", "nowhere"), 2, "nowhere: is no folder, in which to look for unfinished files"),
+        (
+            ("--cache", "nowhere"),
+            2,
+            "nowhere: is not a folder; name one in which to look for unfinished files",
+        ),
     ],
     ids=["nothing", "clear alone", "no folder"],
 )

@@ -203,7 +203,7 @@ def test_hdf5_of_others(vsacli: Any, tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_a_pipe_is_not_waited_for(vsacli: Any) -> None:
     os.mkfifo("pipe.h5")
-    assert vsacli("validate", "pipe.h5").out == "pipe.h5: is no regular file (a device, pipe or socket)\n"
+    assert vsacli("validate", "pipe.h5").out == "pipe.h5: is not a regular file (a device, pipe or socket)\n"
     assert (
         vsacli("plot", "pipe.h5").err
         == "pipe.h5: is a pipe; expected a result file, as invdyn or simulate writes it\n"

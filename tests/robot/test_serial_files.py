@@ -48,7 +48,7 @@ def load(*lines: str) -> object:
         ((f"{RATIO}{{type: power, exponent: -1, lead: -1, offset: 1}}}}",), "not positive at theta_2 = 1"),
         ((f"{RATIO}{{type: polynomial, c0: 1, c1: 2, c2: -1}}}}",), "it has no slope near theta_2 = 1"),
         ((f"{RATIO}{{type: polynomial, c0: 1}}}}",), "scale: must rise or fall over all of `setting`"),
-        ((LIMITED,), "torque.max_deflection: is no limit of a serial actuator"),
+        ((LIMITED,), "torque.max_deflection: is not a limit of a serial actuator"),
         ((AWAS.replace("awas", "awass"),), "mechanism.type: unknown word 'awass'; did you mean 'awas'?"),
         ((AWAS, "coupled_inertia: -0.2"), "is -0.2 on the joint side of the gears; its size must be below"),
         ((AWAS, "branch: negative"), "unknown key 'branch'"),

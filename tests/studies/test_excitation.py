@@ -177,5 +177,5 @@ def test_a_noise_out_of_range_is_refused(noise: tuple[float, float | None]) -> N
 
 
 def test_a_duration_too_short_is_refused() -> None:
-    with pytest.raises(InputError, match="the duration must be at least 5 s, not 1 s"):
+    with pytest.raises(InputError, match="the duration must be from 5 to 3600 s, not 1 s"):
         plan_excitation(shipped_robot("rp_2"), duration=1)

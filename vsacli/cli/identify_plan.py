@@ -43,10 +43,10 @@ def plan(
         excitation_text,
         plan_excitation,
     )
-    from vsacli.studies.identification.excitation.plan import SHORTEST
+    from vsacli.studies.identification.excitation.plan import LONGEST, SHORTEST
 
-    if duration < SHORTEST:
-        hint = f"must be at least {SHORTEST:g} s, not {duration:g} s"
+    if not SHORTEST <= duration <= LONGEST:
+        hint = f"must be from {SHORTEST:g} to {LONGEST:g} s, not {duration:g} s"
         raise click.BadParameter(hint, param_hint="--duration")
     sensors = USUAL_NOISE if noise is None else Noise(*noise)
     robot = read_robot(robot_path)

@@ -103,7 +103,7 @@ def _cache(folder: str, clear: bool) -> dict[str, Any]:
     from vsacli.files.info import clear_cache, describe_cache
 
     if not Path(folder).is_dir():
-        raise InputError.one("is no folder, in which to look for unfinished files", folder)
+        raise InputError.one("is not a folder; name one in which to look for unfinished files", folder)
     if clear:
         clear_cache()
     return describe_cache(folder)

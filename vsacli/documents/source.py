@@ -104,7 +104,7 @@ def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize)
     if stat.S_ISDIR(status.st_mode):
         raise InputError.one("is a folder; give the name of a file in it", name)
     if not stat.S_ISREG(status.st_mode):
-        raise InputError.one("is no regular file (a device, pipe or socket)", name)
+        raise InputError.one("is not a regular file (a device, pipe or socket)", name)
     if status.st_size > max_bytes:
         with _refusing(name), open(place_of(name), "rb") as file:
             start = file.read(len(HDF5_SIGNATURE))

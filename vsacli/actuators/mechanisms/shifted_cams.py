@@ -44,7 +44,7 @@ class ShiftedCams(Mechanism):
         """Yield a problem if the rotation of a cam is limited: it is no result variable to flag."""
         for side, law in enumerate(self.spring):
             if math.isfinite(law.max_deflection):
-                reason = "is not known of a cam, whose turn is no variable of results; leave it out"
+                reason = "is not known of a cam, whose turn is not a variable of results; leave it out"
                 yield FieldProblem(("spring", side, "max_deflection"), reason)
 
     @cached_property

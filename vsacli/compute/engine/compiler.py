@@ -99,7 +99,7 @@ def _command(wanted: str) -> tuple[str, ...]:
     try:
         return tuple(shlex.split(wanted)) or ("cc",)
     except ValueError as error:
-        raise CompilerError(f"the environment variable CC is no command: {wanted!r} ({error})") from None
+        raise CompilerError(f"the environment variable CC is not a command: {wanted!r} ({error})") from None
 
 
 @lru_cache(maxsize=4)

@@ -122,8 +122,8 @@ class Journal:
         if not FIRST_LINE.startswith(line):
             raise StorageError(
                 self.path,
-                "is no journal of a study, and stands where this one keeps its finished runs; move it, or "
-                "name another table with -o",
+                "is not the journal of a study, but has the name of the file in which this one keeps its "
+                "finished runs; move it, or name another table with -o",
             )
         try:
             os.lseek(self._file, 0, os.SEEK_SET)

@@ -124,7 +124,7 @@ class Potential(Mechanism):
         return (*self._gaps(), *self._poles())
 
     def _gaps(self) -> Iterator[str]:
-        """Yield the grid point nearest to the start at which the energy is no finite number."""
+        """Yield the grid point nearest to the start at which the energy is not finite."""
         shares = (np.arange(GRID) + 0.5) / GRID
         ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
         axes = [low + (high - low) * shares for low, high in ends]
@@ -135,7 +135,7 @@ class Potential(Mechanism):
         if lost.any():
             distance = np.where(lost, np.hypot(far[0][:, None], far[1]), np.inf)
             phi, s = np.unravel_index(distance.argmin(), distance.shape)
-            what = "the energy or one of its first four derivatives is no finite number"
+            what = "the energy or one of its first four derivatives is not finite"
             yield f"{what} {_place(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
 
     def _poles(self) -> Iterator[str]:
@@ -143,7 +143,7 @@ class Potential(Mechanism):
         stiffest = self._branch.stiffest
         if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
             place = _place(stiffest.phi[0], stiffest.s[0])
-            yield f"the energy is no finite number {place}, where the stiffness grows beyond all bounds"
+            yield f"the energy is not finite {place}, where the stiffness grows beyond all bounds"
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Mechanism.solve`; on the branch of the start."""
@@ -205,7 +205,7 @@ class Potential(Mechanism):
             at_start = np.array([[self.start.theta_1, self.start.theta_2, 0.0]])
             known = self._potential.derivatives(at_start, ACCELERATIONS).finite
         if not known.all():
-            reason = "the energy or one of its first four derivatives is no finite number here"
+            reason = "the energy or one of its first four derivatives is not finite here"
         elif stiffness <= 0:
             reason = f"the stiffness, the second derivative over q, must be positive here, not {stiffness:g}"
         elif not sine > LEAST_START_SINE:
@@ -231,5 +231,5 @@ def _place(phi: float, theta_2: float) -> str:
 def _why_no_word(name: str) -> str:
     """Return why no constant may have a name; empty if one may."""
     if not _WORD.fullmatch(name):
-        return "is no word: letters, digits and _, of which the first is no digit"
+        return "is not a name: expected letters, digits and _, beginning with a letter or _"
     return "has a meaning of its own in the energy; choose another name" if name in RESERVED else ""

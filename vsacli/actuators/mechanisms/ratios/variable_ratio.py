@@ -77,7 +77,9 @@ class VariableRatio(Mechanism):
         else:
             problems += [FieldProblem(("scale",), each) for each in self.scale.problems(self.setting)]
         if isinstance(self.torque, SpringLaw) and np.isfinite(self.torque.max_deflection):
-            reason = "is no limit of a serial actuator; delete it (the range of a table already is a limit)"
+            reason = (
+                "is not a limit of a serial actuator; delete it (the range of a table already is a limit)"
+            )
             problems.append(FieldProblem(("torque", "max_deflection"), reason))
         check_fields(self, *problems)
 

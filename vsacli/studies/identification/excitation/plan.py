@@ -115,8 +115,8 @@ FREQUENCIES = (0.05, 0.1, 0.2)
 """Lowest harmonics of the families, Hz: five harmonics reach at most 1 Hz, well within the low-pass filter of
 recordings and below the resonances of robot arms."""
 
-SHORTEST = 5.0
-"""Shortest duration, s: one period of the fastest family."""
+SHORTEST, LONGEST = 5.0, 3600.0
+"""Shortest duration, s: one period of the fastest family. And the longest one: what is planned is in memory."""
 
 EXAMPLES = 4
 """Number of members that determine which parameters no motion distinguishes."""
@@ -157,8 +157,8 @@ def plan_excitation(
             user's motion.
         ImpossibleError: no excitation is feasible.
     """
-    if not SHORTEST <= duration < np.inf:
-        raise InputError.one(f"the duration must be at least {SHORTEST:g} s, not {duration:g} s")
+    if not SHORTEST <= duration <= LONGEST:
+        raise InputError.one(f"the duration must be from {SHORTEST:g} to {LONGEST:g} s, not {duration:g} s")
     for each in noise:
         if each is not None and not 0 <= each <= LARGEST:
             raise InputError.one(f"the sensor noise must be from 0 to {LARGEST:g}, not {each:g}")
