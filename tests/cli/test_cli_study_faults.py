@@ -98,8 +98,8 @@ def test_a_file_of_somebody_else_is_no_journal(vsacli: Any, grid_study: str, con
     done = vsacli("study", grid_study)
     assert (done.code, Path("study.h5").exists()) == (4, False)
     assert done.err == (
-        f"{journal}: is not the journal of a study, but has the name of the file in which this one keeps its finished runs; move it, "
-        "or name another table with -o\n"
+        f"{journal}: is not the journal of a study, but has the name of the file in which this one keeps its "
+        "finished runs; move it, or name another table with -o\n"
     )
     assert journal.read_bytes() == content_then
 

@@ -116,7 +116,7 @@ FREQUENCIES = (0.05, 0.1, 0.2)
 recordings and below the resonances of robot arms."""
 
 SHORTEST, LONGEST = 5.0, 3600.0
-"""Shortest duration, s: one period of the fastest family. And the longest one: what is planned is in memory."""
+"""Shortest duration, s: one period of the fastest family; and longest one, since the plan is in memory."""
 
 EXAMPLES = 4
 """Number of members that determine which parameters no motion distinguishes."""
