@@ -334,6 +334,15 @@ def _raising_output_errors() -> Iterator[None]:
         raise OutputError("standard output", f"cannot be written: {error.strerror}") from error
 
 
+def flush_notes() -> None:
+    """Flush stderr, and discard what cannot be written: at its exit Python would fail with code 120."""
+    try:
+        if sys.stderr is not None:
+            sys.stderr.flush()
+    except OSError:
+        _discard_buffer(sys.stderr)
+
+
 def _discard_buffer(stream: TextIO) -> None:
     """Redirect a stream to the null device: its buffer would fail again when the interpreter exits."""
     nowhere = os.open(os.devnull, os.O_WRONLY)

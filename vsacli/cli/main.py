@@ -17,7 +17,7 @@ from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
-from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
+from vsacli.cli.console import Exit, OutputClosedError, flush_notes, reporting_stdout_errors, tell
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml")
 _EPILOG += """
@@ -123,6 +123,7 @@ def main() -> NoReturn:
         sys.stdout.reconfigure(errors="backslashreplace")
     with unwinding_when_ended():
         code = run(sys.argv[1:])
+    flush_notes()
     gc.freeze()  # else Python collects garbage once more before it exits
     sys.exit(code)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.base.storage import place_of
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import CheckedFile, DamageError, own_dataset
+from vsacli.results.store.damage import CheckedFile, DamageError, check_present, own_dataset
 from vsacli.results.store.schema import TEXT, storable
 
 LARGEST_STORED = 256 * 2**20
@@ -92,6 +92,7 @@ def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
     number = 1
     while (name := f"inputs/file_{number}") in file:
         attributes = {key: str(value) for key, value in file[name].attrs.items()}
+        check_present(attributes, ("path", "sha256"), name)
         yield StoredInput(
             path=attributes["path"],
             sha256=attributes["sha256"],

@@ -276,6 +276,7 @@ class StoredStudy(StoredFile):
                 if (found := self.attributes.get("format")) != FORMAT:
                     kind = kind_of_format(found if isinstance(found, str) else None)
                     raise InputError.one(f"is {kind}, expected a table that vsacli study writes", path)
+                check_present(self.attributes, ("study_name", "robot_name"))
                 self.study_name, self.robot_name = (
                     one_line(str(self.attributes[name])) for name in ("study_name", "robot_name")
                 )
