@@ -30,24 +30,24 @@ from vsacli.results.store.study_table import StoredStudy
 GRID = "vary:\n  joints.*.actuator.spring.k: [380, 400, 440]\n  duration: [3, 4, 5]\n"
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A table of nine runs, three of which are infeasible."""
-    folder = tmp_path_factory.mktemp("figures")
-    study(folder, GRID)
+def computed(folder: Path, text: str) -> Path:
+    """The table of a study in a folder."""
+    study(folder, text)
     with contextlib.chdir(folder):
         assert run(["study", "study.yaml", "-q"]) == 0
     return folder / "study.h5"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A table of nine runs, three of which are infeasible."""
+    return computed(tmp_path_factory.mktemp("figures"), GRID)
 
 
 @pytest.fixture(scope="module")
 def drawn_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A table of six random draws."""
-    folder = tmp_path_factory.mktemp("drawn")
-    study(folder, DRAWN)
-    with contextlib.chdir(folder):
-        assert run(["study", "study.yaml", "-q"]) == 0
-    return folder / "study.h5"
+    return computed(tmp_path_factory.mktemp("drawn"), DRAWN)
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind, naming_option
+from vsacli.cli.input_errors import naming_kind, naming_option, recognized
 from vsacli.cli.option_types import TIME
-from vsacli.cli.plot_recording import RECORDING, draw_recording, has_recording, is_recording, recording_figure
-from vsacli.cli.plot_robot import draw_robot, is_robot, write_robot_page
+from vsacli.cli.plot_recording import RECORDED, RECORDING, draw_recording, has_recording, recording_figure
+from vsacli.cli.plot_robot import draw_robot, write_robot_page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -124,13 +124,14 @@ def plot(
     inputs = [*files, *filter(None, [robot])]
     with naming_kind("FILE", files, DRAWN), Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         target = _Target(figures, outputs)
-        if any(map(is_robot, files)):
+        kinds = set(map(recognized, files))
+        if "robot" in kinds:
             _check_robot(files, shown, robot)
             if page := figures.page(Path(files[0]).stem, outputs):
                 write_robot_page(files[0], page)
             else:
                 draw_robot(files[0], target.figures, talk)
-        elif any(map(is_recording, files)):
+        elif kinds & RECORDED:
             _check_recording(files, shown, figures.file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
@@ -143,7 +144,7 @@ def plot(
 
 
 class _Target(NamedTuple):
-    """Where figures are written, and the output files of the command."""
+    """The place of the figures, and the output files of the command."""
 
     place: FigureTarget
     outputs: Outputs

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import Talk
-from vsacli.cli.input_errors import recognized
 
 if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
@@ -22,10 +21,8 @@ if TYPE_CHECKING:
 RECORDING = "recording"
 """Name of the figure of recorded signals, with their splines and the noise found in them."""
 
-
-def is_recording(path: str) -> bool:
-    """Return whether a file is a CSV table or a trajectory; False if its kind is unknown."""
-    return recognized(path) in ("table", "motor catalog", "trajectory")
+RECORDED = frozenset({"table", "motor catalog", "trajectory"})
+"""Kinds of files whose recorded signals are drawn; the reader of a catalog says what it is."""
 
 
 def draw_recording(

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vsacli.cli.console import Talk
-from vsacli.cli.input_errors import recognized
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Staged
@@ -17,11 +16,6 @@ if TYPE_CHECKING:
 
 ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 """Names of the figures, whose files are called `<stem>-<name>`."""
-
-
-def is_robot(path: str) -> bool:
-    """Return whether a file is a robot; False if its kind is unknown."""
-    return recognized(path) == "robot"
 
 
 WORDS = {
@@ -48,9 +42,9 @@ def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk:
     from vsacli.robot.file import load_robot
 
     robot = load_robot(path)
-    figures = staged(_names(robot), Path(path).stem)
-    figures.save(_figures(robot))
-    if _names(robot) == [ARM]:
+    names = _names(robot)
+    staged(names, Path(path).stem).save(_figures(robot))
+    if names == [ARM]:
         talk.note(f"{path}: no figures of actuators and stiffness: all joints are rigid")
 
 

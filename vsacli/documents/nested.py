@@ -312,13 +312,13 @@ def _note(
     problems: Iterable[FieldProblem], name: str, of_joints: bool, node: tree.Mapping, scope: Scope
 ) -> None:
     """Note the problems of a field; joints with the same problem share a message."""
-    alike: dict[tuple[int, str, str], list[str]] = {}
+    equal: dict[tuple[int, str, str], list[str]] = {}
     for problem in problems:
         joint = list(scope.members)[int(problem.path[-1])] if of_joints else ""
         message = problem.in_units(scope.members[joint] if of_joints else scope.variant).message
         fault = "" if of_joints else f"{name}: {problem.message}"
-        alike.setdefault((line_of(problem.path, node, scope), message, fault), []).append(joint)
-    for (line, message, fault), joints in alike.items():
+        equal.setdefault((line_of(problem.path, node, scope), message, fault), []).append(joint)
+    for (line, message, fault), joints in equal.items():
         place = _of_joints(joints, scope) if of_joints else ""
         scope.problems.add(line, f"{name}{place}: {message}", fault)
 

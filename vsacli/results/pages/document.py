@@ -131,21 +131,33 @@ def rendered(
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
-    import jinja2  # a dependency of bokeh
-
-    folder = files(__package__)
-    scripts = [*library.scripts, *((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)]
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    template = environment.from_string((folder / TEMPLATE).read_text(encoding="utf-8"))
-    return template.render(
+    scripts = [*library.scripts, *map(_own_file, SCRIPTS)]
+    return filled(
+        TEMPLATE,
         title=title,
         texts=texts,
         data=as_script({**data, "library": library.name}),
         arrays=packed.texts,
-        style=(folder / STYLE).read_text(encoding="utf-8"),
         scripts=scripts,
         allowed=" ".join(map(_hash, scripts)),
     )
+
+
+def filled(template: str, **values: Any) -> str:
+    """Return a template of this package filled with values, every text escaped; `style` is given."""
+    import jinja2  # a dependency of bokeh
+
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_own_file),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    return environment.get_template(template).render(style=_own_file(STYLE), **values)
+
+
+def _own_file(name: str) -> str:
+    return (files(__package__) / name).read_text(encoding="utf-8")
 
 
 def _hash(script: str) -> str:

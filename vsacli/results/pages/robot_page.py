@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 
 from vsacli.base.texts import for_terminal, one_line
-from vsacli.results.pages.document import STYLE, InputText
+from vsacli.results.pages.document import InputText, filled
 
 TEMPLATE = "robot.html"
 
@@ -21,15 +20,10 @@ def robot_page(name: str, figures: Mapping[str, bytes], text: str, inputs: Seque
         text: description of the robot, as of `vsacli info`.
         inputs: robot file, and the files that it names.
     """
-    import jinja2  # a dependency of bokeh
-
-    folder = files(__package__)
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    template = environment.from_string((folder / TEMPLATE).read_text(encoding="utf-8"))
-    return template.render(
+    return filled(
+        TEMPLATE,
         title=one_line(name),
         figures={words: base64.b64encode(image).decode("ascii") for words, image in figures.items()},
         text="\n".join(map(for_terminal, text.splitlines())),
         inputs=inputs,
-        style=(folder / STYLE).read_text(encoding="utf-8"),
     )

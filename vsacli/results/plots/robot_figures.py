@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,22 +51,24 @@ _LIMIT: dict[str, dict[str, Any]] = {
 
 def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the torque over deflection of the springs, a panel for joints with equal actuators."""
-    with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
-        handles: list[Artist] = []
-        for axes, chart in zip(panels, charts, strict=True):
-            _name(axes, chart)
-            handles += _draw_torques(axes, chart)
-        return complete(figure, f"{title}: torque of springs", handles)
+    return _figure(charts, f"{title}: torque of springs", _draw_torques)
 
 
 def stiffness_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the attainable stiffness over torque, a panel for joints with equal actuators."""
+    return _figure(charts, f"{title}: attainable stiffness at rest", _draw_map)
+
+
+def _figure(
+    charts: Sequence[ActuatorChart], title: str, draw: Callable[[Axes, ActuatorChart], list[Artist]]
+) -> Figure:
+    """Draw a panel for each chart, with one legend."""
     with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
             _name(axes, chart)
-            handles += _draw_map(axes, chart)
-        return complete(figure, f"{title}: attainable stiffness at rest", handles)
+            handles += draw(axes, chart)
+        return complete(figure, title, handles)
 
 
 def _name(axes: Axes, chart: ActuatorChart) -> None:
