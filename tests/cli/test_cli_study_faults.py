@@ -81,7 +81,7 @@ def test_whichever_bit_of_a_journal_is_wrong(tmp_path: Path, grid_study: str) ->
         content_now[place] ^= 1 << place % 8
         spoiled.write_bytes(content_now)
         if place < first:
-            with pytest.raises(StorageError, match="is no journal"), Journal(spoiled):
+            with pytest.raises(StorageError, match="is not the journal of a study"), Journal(spoiled):
                 pass
             assert spoiled.read_bytes() == content_now
             continue
