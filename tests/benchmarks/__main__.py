@@ -30,6 +30,7 @@ import single_calls
 import small_numbers
 import stages
 import storage
+import waits
 import whole_runs
 from machine import description
 from subjects import ROOT
@@ -74,6 +75,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "sensitivity": lambda: page.sensitivity_part(sensitivities.compare(3 * repeats)),
         "simulations": lambda: page.simulation_table(simulations.compare(repeats)),
         "startup": lambda: page.startup_table(commands.startup(3 * repeats)),
+        "waits": lambda: page.waits_table(waits.compare(repeats)),
         "memory": lambda: page.memory_sentence(LONG_RUN, commands.peak_memory(LONG_RUN)),
         "growth": grown,
     }

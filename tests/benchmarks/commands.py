@@ -24,7 +24,8 @@ begin = time.perf_counter()
 code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
 elapsed = time.perf_counter() - begin
 unit = 1 if sys.platform == "darwin" else 1024
-print(elapsed, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit, code)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(elapsed, used.ru_utime + used.ru_stime, used.ru_maxrss * unit, code)
 """
 
 
@@ -33,10 +34,12 @@ class Taken(NamedTuple):
 
     Attributes:
         seconds: by the clock.
+        processor: seconds of processor time, of all threads.
         memory: bytes resident at most.
     """
 
     seconds: float
+    processor: float
     memory: int
 
 
@@ -48,10 +51,10 @@ def taken(line: Sequence[str], folder: Path | None = None) -> Taken:
     """
     measured = [sys.executable, "-c", _MEASURE, *line]
     printed = subprocess.run(measured, check=True, capture_output=True, text=True, cwd=folder)
-    seconds, memory, code = printed.stdout.split()
+    seconds, processor, memory, code = printed.stdout.split()
     if int(code) not in DONE:
         raise RuntimeError(f"{' '.join(line)}: exit code {code}: {printed.stderr}")
-    return Taken(float(seconds), int(memory))
+    return Taken(float(seconds), float(processor), int(memory))
 
 
 def startup(repeats: int) -> Seconds:

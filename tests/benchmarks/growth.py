@@ -44,7 +44,11 @@ def _arm(samples: int, engine: str, folder: Path) -> Taken:
 
 
 def _chain(joints: int, engine: str, folder: Path) -> Taken:
-    """The joints of the arm over and over again, without gravity.
+    return _run(*chain_documents(joints), engine, folder)
+
+
+def chain_documents(joints: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Robot and trajectory: the joints of the arm over and over again, without gravity.
 
     The longer, the shorter is their way, since the inertia that a joint moves grows with the cube of what is
     beyond it: so hardly a joint leaves its corridor.
@@ -64,7 +68,7 @@ def _chain(joints: int, engine: str, folder: Path) -> Taken:
             **{key: _repeated(values, joints) for key, values in stiffness.items()},
         },
     }
-    return _run({**robot, "gravity": [0, 0, 0], "joints": chain}, {**trajectory, **moved}, engine, folder)
+    return {**robot, "gravity": [0, 0, 0], "joints": chain}, {**trajectory, **moved}
 
 
 def _read(path: Path) -> dict[str, Any]:

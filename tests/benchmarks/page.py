@@ -18,6 +18,7 @@ from single_calls import CALLS, SCALAR_FLAGS, Calls
 from stages import Stages
 from storage import Stored
 from timing import Seconds
+from waits import Wait
 from whole_runs import WholeRun
 
 
@@ -252,3 +253,12 @@ def _both(found: Mapping[str, Mapping[int, Taken]], number: int) -> Iterable[str
     for by_number in found.values():
         each = by_number[number]
         yield from (f"{each.seconds:.2g} s", f"{each.memory / 1e6:.0f} MB")
+
+
+def waits_table(waits: Iterable[Wait]) -> str:
+    """Processor time, the clock, and memory of commands."""
+    rows = (
+        (name, f"{found.processor:.2g}", f"{found.seconds:.2g}", f"{found.memory / 1e6:.0f}")
+        for name, found in waits
+    )
+    return table(("command", "processor time, s", "by the clock, s", "MB"), rows)

@@ -13,6 +13,7 @@ from samples.command_line import REST_TO_REST, ROBOT
 from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result, simulate
 from vsacli.base.renamed import RENAMINGS, successor
 from vsacli.base.simulation_variables import SIMULATED, SIMULATION_VARIABLES
+from vsacli.cli.main import run
 
 STORED = {
     "tau_spring": "tau_transmission",
@@ -21,13 +22,21 @@ STORED = {
 }
 
 
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """A result, `r.h5`, and a simulation, `s.h5`, of the trajectory `move.yaml`; not to be changed."""
+    folder = tmp_path_factory.mktemp("computed")
+    shutil.copy(REST_TO_REST, folder / "move.yaml")
+    inputs = (str(ROBOT), str(folder / "move.yaml"))
+    assert run(["invdyn", *inputs, "-q", "-o", str(folder / "r.h5")]) == 0
+    assert run(["simulate", *inputs, "--sensor-noise", "1e-4,0.5", "-q", "-o", str(folder / "s.h5")]) == 0
+    return folder
+
+
 @pytest.fixture
-def files(vsacli, tmp_path):
-    """A result, `r.h5`, and a simulation, `s.h5`, of the trajectory `move.yaml`."""
-    shutil.copy(REST_TO_REST, tmp_path / "move.yaml")
-    assert vsacli("invdyn", ROBOT, "move.yaml", "-o", "r.h5").code == 0
-    assert vsacli("simulate", ROBOT, "move.yaml", "--sensor-noise", "1e-4,0.5", "-o", "s.h5").code == 0
-    return tmp_path
+def files(computed, own_folder):
+    """Copies of them in the folder in which the test runs."""
+    return shutil.copytree(computed, own_folder, dirs_exist_ok=True)
 
 
 @pytest.mark.parametrize("name", STORED)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import dataclasses
 import xml.etree.ElementTree as ElementTree
 
-import mujoco
 import numpy as np
 import pytest
-from samples.marks import slow, slow_but
 from samples.mechanisms import DEVICES
-from samples.mujoco_models import accelerations, compiled, coordinates, inverse_error
+from samples.mujoco_models import accelerations, compiled, coordinates, inverse_error, mujoco
 from samples.robots import inertia_from_tensor, random_robot, vsa_3r
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
@@ -29,6 +27,8 @@ from vsacli.dynamics.forward import state_derivative
 from vsacli.robot.joint import Inertia, Limits, Link, Pose
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start
+
+pytestmark = pytest.mark.slow
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and
@@ -74,7 +74,7 @@ def with_actuators(robot, *actuators):
 CHAINS = [(types, seed) for types in ("RRR", "RPRP", "PRR", "PP") for seed in range(4)]
 
 
-@pytest.mark.parametrize(("types", "seed"), [slow(*chain) if chain[1] else chain for chain in CHAINS])
+@pytest.mark.parametrize(("types", "seed"), CHAINS)
 def test_random_chains_under_odd_gravity(types, seed):
     robot = dataclasses.replace(
         random_robot(types, seed),
@@ -141,17 +141,8 @@ def test_a_tendon_that_is_slack_does_not_push(name):
         assert data.qfrc_passive[1] < 0 == data.qfrc_passive[2]
 
 
-QUICK = [("awas", 0.06), ("maccepa, long lever, drum against the motor", -0.07), ("cam", 0), ("lever", 0)]
-
-
-@pytest.mark.parametrize(
-    ("name", "coupled"),
-    [
-        case if case in QUICK else slow(*case)
-        for name in DEVICES
-        for case in ((name, 0), (name, 0.06), (name, -0.07))
-    ],
-)
+@pytest.mark.parametrize("coupled", [0, 0.06, -0.07])
+@pytest.mark.parametrize("name", DEVICES)
 def test_every_mechanism_with_coupled_rotors(name, coupled):
     device = DEVICES[name]
     actuator = Serial(
@@ -201,7 +192,7 @@ RUNS = {
 """Robots that come along, and a motion of each."""
 
 
-@pytest.mark.parametrize("name", slow_but(["vsa_3r", "rp_2", "maccepa_1r"], RUNS))
+@pytest.mark.parametrize("name", RUNS)
 def test_mujocos_inverse_dynamics_are_ours(name):
     robot, trajectory = shipped_run(name, RUNS[name])
     assert inverse_error(robot, inverse_dynamics(robot, trajectory)) < ROUNDING

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.marks import slow
 from samples.mujoco_models import driven
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
+
+pytestmark = pytest.mark.slow
 
 
 def error(robot_name, trajectory_name, step):
@@ -24,12 +25,12 @@ def error(robot_name, trajectory_name, step):
     [
         ("vsa_3r", "rest_to_rest", 0.016, 1e-6),
         ("maccepa_1r", "maccepa_1r", 0.016, 1e-5),
-        slow("awas_1r", "awas_1r", 0.008, 1e-6),
-        slow("lwr_7r_vsa", "lwr_7r", 0.002, 1e-9),
-        slow("mixed_3r", "mixed_3r", 0.008, 1e-6),
-        slow("rp_2", "rp_2", 0.004, 1e-7),
-        slow("compact_1r", "compact_1r", 0.008, 1e-6),
-        slow("tendon_1r", "tendon_1r", 0.008, 1e-6),
+        ("awas_1r", "awas_1r", 0.008, 1e-6),
+        ("lwr_7r_vsa", "lwr_7r", 0.002, 1e-9),
+        ("mixed_3r", "mixed_3r", 0.008, 1e-6),
+        ("rp_2", "rp_2", 0.004, 1e-7),
+        ("compact_1r", "compact_1r", 0.008, 1e-6),
+        ("tendon_1r", "tendon_1r", 0.008, 1e-6),
     ],
 )
 def test_the_error_falls_with_the_fourth_power_of_the_step(robot, trajectory, step, largest):
@@ -42,7 +43,6 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(robot, trajectory, st
     assert 12 < coarse / fine < 22
 
 
-@pytest.mark.slow
 def test_of_a_small_step_hardly_anything_is_left():
     """1 ms; 4e-13 rad were seen."""
     assert error("vsa_3r", "rest_to_rest", 1e-3) < 1e-12

@@ -23,6 +23,14 @@ def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
     return [case if case in quick else slow(case) for case in whole]
 
 
+def sampled(quick: Collection[Any], cases: Iterable[Any], count: int) -> list[Any]:
+    """All cases: quick ones, `count` slow ones spread over the others, and the rest, which are exhaustive."""
+    whole = slow_but(quick, cases)
+    rest = [number for number, case in enumerate(whole) if case not in quick]
+    chosen = {rest[round(place)] for place in np.linspace(0, len(rest) - 1, min(count, len(rest)))}
+    return [exhaustive(case) if number in {*rest} - chosen else case for number, case in enumerate(whole)]
+
+
 def needs(command: str, package: str) -> Any:
     """A test that is skipped without a command; `.ci/run` tells which Debian packages are missing."""
     return _skipped_unless(bool(shutil.which(command)), package)

@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
+import pytest
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
@@ -15,6 +15,8 @@ from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start, motor_name
+
+mujoco = pytest.importorskip("mujoco")
 
 
 class Compiled(NamedTuple):

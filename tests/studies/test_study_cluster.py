@@ -180,6 +180,7 @@ def test_a_worker_reads_the_study_again(tmp_path: Path) -> None:
     assert edited[0].message.startswith("a file of the study is another one here, or was changed meanwhile")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("address", "message"),
     [
