@@ -11,12 +11,11 @@ import re
 import sys
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import click
-from click.testing import CliRunner
+from command_pages import FOLDER, command_pages, command_table
 from field_tables import record_sections, table, variant_sections
 from noise_study import table_rows
 from page_examples import renewed
@@ -36,7 +35,6 @@ from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
-from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
 from vsacli.documents.columns_file import ColumnSource
 from vsacli.documents.plausibility import Rule
@@ -51,6 +49,8 @@ from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+"""Pages written by hand, with generated parts."""
+
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 
 MECHANISM_WORDS = {
@@ -64,31 +64,8 @@ MECHANISM_WORDS = {
 }
 """Mechanisms of serial actuators in words."""
 
-HELP_WIDTH = 80
 END = "<!-- end of generated part -->"
 PART = re.compile(rf"(<!-- generated: (?P<name>\S+) -->\n).*?({END})", re.DOTALL)
-
-
-def commands() -> str:
-    """The help of `vsacli`, of each command, and of the commands in a group."""
-    return "\n".join(
-        f"## `{' '.join(['vsacli', *words])}`\n\n```text\n{command_help(words)}```\n"
-        for words in ([], *command_words(vsacli))
-    )
-
-
-def command_words(group: click.Group) -> Iterator[list[str]]:
-    """What to type for each command of a group, without the name of the group."""
-    for name, command in group.commands.items():
-        yield [name]
-        if isinstance(command, click.Group):
-            yield from ([name, *words] for words in command_words(command))
-
-
-def command_help(words: Sequence[str]) -> str:
-    """What `vsacli WORDS --help` prints."""
-    arguments = [*words, "--help"]
-    return CliRunner().invoke(vsacli, arguments, prog_name="vsacli", terminal_width=HELP_WIDTH).stdout
 
 
 def exit_codes() -> str:
@@ -309,7 +286,7 @@ def noise_study() -> str:
 
 PARTS: dict[str, Callable[[], str]] = {
     "noise-study": noise_study,
-    "commands": commands,
+    "commands": command_table,
     "exit-codes": exit_codes,
     "robot-fields": robot_fields,
     "spring-fields": spring_fields,
@@ -332,15 +309,40 @@ PARTS: dict[str, Callable[[], str]] = {
 }
 
 
+WHOLE_PAGES: dict[Path, Callable[[], str]] = {
+    FOLDER / f"{name}.md": page for name, page in command_pages().items()
+}
+"""Pages that are generated from the first line to the last."""
+
+
 def regenerated(page: str) -> str:
-    """The text of a page with its generated parts made anew."""
+    """Return the text of a page with its generated parts made anew."""
     return PART.sub(lambda part: f"{part[1]}\n{PARTS[part['name']]()}\n{END}", page)
 
 
-def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
-    """The pages that are not what the code says."""
-    texts = {page: page.read_text(encoding="utf-8") for page in pages}
-    return [page for page, text in texts.items() if text != regenerated(text)]
+def text_of(page: Path, whole: Mapping[Path, Callable[[], str]] = WHOLE_PAGES) -> str:
+    """Return the text that a page should have."""
+    return whole[page]() if page in whole else regenerated(page.read_text(encoding="utf-8"))
+
+
+def stale(pages: Iterable[Path] = PAGES, whole: Mapping[Path, Callable[[], str]] = WHOLE_PAGES) -> list[Path]:
+    """Return the pages that are missing, differ from what the code says, or belong to no command any more."""
+    current = {page: page.read_text(encoding="utf-8") if page.exists() else "" for page in (*pages, *whole)}
+    return [page for page, text in current.items() if text != text_of(page, whole)] + _surplus(whole)
+
+
+def _surplus(whole: Iterable[Path]) -> list[Path]:
+    """Return files in the folders of wholly generated pages that are none of these."""
+    found = {file for folder in {page.parent for page in whole} for file in folder.glob("*.md")}
+    return sorted(found - set(whole))
+
+
+def write_texts(pages: Iterable[Path]) -> None:
+    """Write the generated texts of these pages, or of all; delete pages of commands that are gone."""
+    for page in [page.resolve() for page in pages] or (*PAGES, *WHOLE_PAGES):
+        page.write_text(text_of(page), encoding="utf-8")
+    for page in _surplus(WHOLE_PAGES):
+        page.unlink()
 
 
 def main() -> int:
@@ -358,10 +360,12 @@ def main() -> int:
         for page in (outdated := stale()):
             print(f"{page}: generated parts are stale; run python docs/generate.py", file=sys.stderr)
         return 1 if outdated else 0
-    for page in chosen.pages or PAGES:
-        text = renewed(page) if chosen.examples else regenerated(page.read_text(encoding="utf-8"))
-        page.write_text(text, encoding="utf-8")
-    if not (chosen.examples or chosen.texts):
+    if chosen.examples:
+        for page in chosen.pages or PAGES:
+            page.write_text(renewed(page), encoding="utf-8")
+        return 0
+    write_texts(chosen.pages)
+    if not chosen.texts:
         draw_images(PAGES)
     return 0
 
