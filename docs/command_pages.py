@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
 
 import click
 from click.testing import CliRunner
@@ -12,8 +11,6 @@ from field_tables import table
 
 from vsacli.cli.main import SectionedGroup, vsacli
 
-FOLDER = Path(__file__).resolve().parent / "commands"
-WRITTEN = "<!-- written by docs/generate.py -->"
 HELP_WIDTH = 80
 
 GUIDES = {
@@ -64,7 +61,7 @@ def command_page(name: str) -> str:
     """Return the page of a command."""
     first, *others = command_words(name, vsacli.commands[name])
     guide = GUIDES[name].replace("](", "](../")
-    head = f"{WRITTEN}\n\n# `vsacli {name}`\n\nSee {guide}; [exit codes](../cli.md#exit-codes).\n"
+    head = f"# `vsacli {name}`\n\nSee {guide}; [exit codes](../cli.md#exit-codes).\n"
     sections = (f"## `vsacli {' '.join(words)}`\n\n{_help_block(words)}" for words in others)
     return "\n".join([head, _help_block(first), *sections])
 

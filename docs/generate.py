@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from command_pages import FOLDER, command_pages, command_table
+from command_pages import command_pages, command_table
 from field_tables import record_sections, table, variant_sections
 from noise_study import table_rows
 from page_examples import renewed
@@ -306,13 +306,12 @@ PARTS: dict[str, Callable[[], str]] = {
     "variables": variables,
     "flags": flags,
     "renamings": renamings,
+    **{f"commands/{name}": page for name, page in command_pages().items()},
 }
 
 
-WHOLE_PAGES: dict[Path, Callable[[], str]] = {
-    FOLDER / f"{name}.md": page for name, page in command_pages().items()
-}
-"""Pages that are generated from the first line to the last."""
+WHOLE_PAGES = {ROOT / "docs" / f"{name}.md": name for name in PARTS if "/" in name}
+"""Pages that are one generated part, and its name."""
 
 
 def regenerated(page: str) -> str:
@@ -320,28 +319,31 @@ def regenerated(page: str) -> str:
     return PART.sub(lambda part: f"{part[1]}\n{PARTS[part['name']]()}\n{END}", page)
 
 
-def text_of(page: Path, whole: Mapping[Path, Callable[[], str]] = WHOLE_PAGES) -> str:
+def text_of(page: Path) -> str:
     """Return the text that a page should have."""
-    return whole[page]() if page in whole else regenerated(page.read_text(encoding="utf-8"))
+    if page in WHOLE_PAGES:
+        return regenerated(f"<!-- generated: {WHOLE_PAGES[page]} -->\n{END}\n")
+    return regenerated(page.read_text(encoding="utf-8"))
 
 
-def stale(pages: Iterable[Path] = PAGES, whole: Mapping[Path, Callable[[], str]] = WHOLE_PAGES) -> list[Path]:
-    """Return the pages that are missing, differ from what the code says, or belong to no command any more."""
-    current = {page: page.read_text(encoding="utf-8") if page.exists() else "" for page in (*pages, *whole)}
-    return [page for page, text in current.items() if text != text_of(page, whole)] + _surplus(whole)
+def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
+    """Return the pages that differ from what the code says, and whole pages that are missing or surplus."""
+    current = {
+        page: page.read_text(encoding="utf-8") if page.exists() else "" for page in (*pages, *WHOLE_PAGES)
+    }
+    return [page for page, text in current.items() if text != text_of(page)] + _surplus()
 
 
-def _surplus(whole: Iterable[Path]) -> list[Path]:
-    """Return files in the folders of wholly generated pages that are none of these."""
-    found = {file for folder in {page.parent for page in whole} for file in folder.glob("*.md")}
-    return sorted(found - set(whole))
+def _surplus() -> list[Path]:
+    """Return the pages in folders of whole pages that are none of these."""
+    return sorted({file for page in WHOLE_PAGES for file in page.parent.glob("*.md")} - WHOLE_PAGES.keys())
 
 
 def write_texts(pages: Iterable[Path]) -> None:
-    """Write the generated texts of these pages, or of all; delete pages of commands that are gone."""
+    """Write the generated texts of these pages, or of all; delete whole pages that are surplus."""
     for page in [page.resolve() for page in pages] or (*PAGES, *WHOLE_PAGES):
         page.write_text(text_of(page), encoding="utf-8")
-    for page in _surplus(WHOLE_PAGES):
+    for page in _surplus():
         page.unlink()
 
 

@@ -73,11 +73,15 @@ def test_a_stale_part_is_noticed(tmp_path: Path) -> None:
     assert "old" not in page.read_text()
 
 
-def test_missing_and_surplus_pages_of_commands_are_noticed(tmp_path: Path) -> None:
-    whole = {tmp_path / "one.md": lambda: "# One\n", tmp_path / "two.md": lambda: "# Two\n"}
-    (tmp_path / "one.md").write_text("# One\n")
-    (tmp_path / "three.md").write_text("# Three\n")
-    assert generate.stale([], whole) == [tmp_path / "two.md", tmp_path / "three.md"]
+def test_missing_and_surplus_pages_are_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one, two, three = (tmp_path / f"{name}.md" for name in ("one", "two", "three"))
+    monkeypatch.setattr(generate, "WHOLE_PAGES", {one: "exit-codes", two: "flags"})
+    one.write_text(generate.text_of(one))
+    three.write_text("# Three\n")
+    assert generate.stale([]) == [two, three]
+    generate.write_texts([two])
+    assert generate.stale([]) == []
+    assert not three.exists()
 
 
 def test_a_stale_example_is_renewed(tmp_path: Path) -> None:
@@ -89,7 +93,7 @@ def test_a_stale_example_is_renewed(tmp_path: Path) -> None:
 
 
 def test_every_part_has_its_place() -> None:
-    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    text = "".join(page.read_text(encoding="utf-8") for page in (*PAGES, *COMMANDS))
     assert {match["name"] for match in generate.PART.finditer(text)} == generate.PARTS.keys()
 
 
