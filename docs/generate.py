@@ -11,12 +11,11 @@ import re
 import sys
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import click
-from click.testing import CliRunner
+from command_pages import command_pages, command_table
 from field_tables import record_sections, table, variant_sections
 from noise_study import table_rows
 from page_examples import renewed
@@ -36,7 +35,6 @@ from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
-from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
 from vsacli.documents.columns_file import ColumnSource
 from vsacli.documents.plausibility import Rule
@@ -51,6 +49,8 @@ from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+"""Pages written by hand, with generated parts."""
+
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 
 MECHANISM_WORDS = {
@@ -64,31 +64,8 @@ MECHANISM_WORDS = {
 }
 """Mechanisms of serial actuators in words."""
 
-HELP_WIDTH = 80
 END = "<!-- end of generated part -->"
 PART = re.compile(rf"(<!-- generated: (?P<name>\S+) -->\n).*?({END})", re.DOTALL)
-
-
-def commands() -> str:
-    """The help of `vsacli`, of each command, and of the commands in a group."""
-    return "\n".join(
-        f"## `{' '.join(['vsacli', *words])}`\n\n```text\n{command_help(words)}```\n"
-        for words in ([], *command_words(vsacli))
-    )
-
-
-def command_words(group: click.Group) -> Iterator[list[str]]:
-    """What to type for each command of a group, without the name of the group."""
-    for name, command in group.commands.items():
-        yield [name]
-        if isinstance(command, click.Group):
-            yield from ([name, *words] for words in command_words(command))
-
-
-def command_help(words: Sequence[str]) -> str:
-    """What `vsacli WORDS --help` prints."""
-    arguments = [*words, "--help"]
-    return CliRunner().invoke(vsacli, arguments, prog_name="vsacli", terminal_width=HELP_WIDTH).stdout
 
 
 def exit_codes() -> str:
@@ -309,7 +286,7 @@ def noise_study() -> str:
 
 PARTS: dict[str, Callable[[], str]] = {
     "noise-study": noise_study,
-    "commands": commands,
+    "commands": command_table,
     "exit-codes": exit_codes,
     "robot-fields": robot_fields,
     "spring-fields": spring_fields,
@@ -329,18 +306,45 @@ PARTS: dict[str, Callable[[], str]] = {
     "variables": variables,
     "flags": flags,
     "renamings": renamings,
+    **{f"commands/{name}": page for name, page in command_pages().items()},
 }
 
 
+WHOLE_PAGES = {ROOT / "docs" / f"{name}.md": name for name in PARTS if "/" in name}
+"""Pages that are one generated part, and its name."""
+
+
 def regenerated(page: str) -> str:
-    """The text of a page with its generated parts made anew."""
+    """Return the text of a page with its generated parts made anew."""
     return PART.sub(lambda part: f"{part[1]}\n{PARTS[part['name']]()}\n{END}", page)
 
 
+def text_of(page: Path) -> str:
+    """Return the text that a page should have."""
+    if page in WHOLE_PAGES:
+        return regenerated(f"<!-- generated: {WHOLE_PAGES[page]} -->\n{END}\n")
+    return regenerated(page.read_text(encoding="utf-8"))
+
+
 def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
-    """The pages that are not what the code says."""
-    texts = {page: page.read_text(encoding="utf-8") for page in pages}
-    return [page for page, text in texts.items() if text != regenerated(text)]
+    """Return the pages that differ from what the code says, and whole pages that are missing or surplus."""
+    current = {
+        page: page.read_text(encoding="utf-8") if page.exists() else "" for page in (*pages, *WHOLE_PAGES)
+    }
+    return [page for page, text in current.items() if text != text_of(page)] + _surplus()
+
+
+def _surplus() -> list[Path]:
+    """Return the pages in folders of whole pages that are none of these."""
+    return sorted({file for page in WHOLE_PAGES for file in page.parent.glob("*.md")} - WHOLE_PAGES.keys())
+
+
+def write_texts(pages: Iterable[Path]) -> None:
+    """Write the generated texts of these pages, or of all; delete whole pages that are surplus."""
+    for page in [page.resolve() for page in pages] or (*PAGES, *WHOLE_PAGES):
+        page.write_text(text_of(page), encoding="utf-8")
+    for page in _surplus():
+        page.unlink()
 
 
 def main() -> int:
@@ -358,10 +362,12 @@ def main() -> int:
         for page in (outdated := stale()):
             print(f"{page}: generated parts are stale; run python docs/generate.py", file=sys.stderr)
         return 1 if outdated else 0
-    for page in chosen.pages or PAGES:
-        text = renewed(page) if chosen.examples else regenerated(page.read_text(encoding="utf-8"))
-        page.write_text(text, encoding="utf-8")
-    if not (chosen.examples or chosen.texts):
+    if chosen.examples:
+        for page in chosen.pages or PAGES:
+            page.write_text(renewed(page), encoding="utf-8")
+        return 0
+    write_texts(chosen.pages)
+    if not chosen.texts:
         draw_images(PAGES)
     return 0
 

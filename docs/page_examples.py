@@ -102,8 +102,6 @@ def renewed(page: Path) -> str:
     text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as name:
         copy_examples(Path(name))
-        if page.name == "cli.md":
-            make_files_of_other_pages(Path(name))
         for (start, end), shown in sorted(_outputs(page, Path(name)).items(), reverse=True):
             text = text[:start] + shown + text[end:]
     return text

@@ -18,7 +18,7 @@ from page_picture import take_picture
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"
 
-DRAWING = ("gallery.md", "optimization.md", "pages.md", "sizing.md", "studies.md")
+DRAWING = ("figures.md", "gallery.md", "optimization.md", "sizing.md", "studies.md")
 """Pages whose commands draw the figures of the tool, wherever they are shown."""
 
 FILE_OR_COMMANDS = re.compile(

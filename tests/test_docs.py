@@ -20,6 +20,7 @@ import pytest
 from page_examples import PRINTED, blocks, commands, comparable, copy_examples, run_shell
 from samples.command_line import installed
 from samples.marks import slow
+from site_parts import contents
 
 import vsacli
 from vsacli.analysis.derivative_check import LADDER_BOUND, SPRING_BOUND
@@ -32,11 +33,13 @@ REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*.md"))
+COMMANDS = [REPOSITORY / "docs" / "commands" / f"{name}.md" for name in group.commands]
+FORMATS = [REPOSITORY / "docs" / "file-formats.md", *sorted((REPOSITORY / "docs").glob("formats-*.md"))]
 
 LONG = (
-    *("cli.md", "codegen.md", "damping.md", "energy.md", "figures.md", "file-formats.md"),
+    *("cli.md", "codegen.md", "damping.md", "energy.md", "figures.md", "formats-results.md"),
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
-    *("models.md", "optimization.md", "pages.md", "performance.md", "plausibility.md", "python.md"),
+    *("models.md", "optimization.md", "performance.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
@@ -70,6 +73,17 @@ def test_a_stale_part_is_noticed(tmp_path: Path) -> None:
     assert "old" not in page.read_text()
 
 
+def test_missing_and_surplus_pages_are_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one, two, three = (tmp_path / f"{name}.md" for name in ("one", "two", "three"))
+    monkeypatch.setattr(generate, "WHOLE_PAGES", {one: "exit-codes", two: "flags"})
+    one.write_text(generate.text_of(one))
+    three.write_text("# Three\n")
+    assert generate.stale([]) == [two, three]
+    generate.write_texts([two])
+    assert generate.stale([]) == []
+    assert not three.exists()
+
+
 def test_a_stale_example_is_renewed(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("```sh\nvsacli --version\n```\n\n```text\nvsacli none\n```\n\nend\n")
@@ -79,15 +93,13 @@ def test_a_stale_example_is_renewed(tmp_path: Path) -> None:
 
 
 def test_every_part_has_its_place() -> None:
-    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    text = "".join(page.read_text(encoding="utf-8") for page in (*PAGES, *COMMANDS))
     assert {match["name"] for match in generate.PART.finditer(text)} == generate.PARTS.keys()
 
 
 @pytest.mark.parametrize("page", [slow(page) if page.name in LONG else page for page in PAGES], ids=named)
 def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
     printed: tuple[str, ...] = ()
-    if page.name == "cli.md":
-        page_examples.make_files_of_other_pages(folder)
     for block in blocks(page):
         if block.saved_as:
             (folder / block.saved_as).write_text(block.text)
@@ -102,6 +114,15 @@ def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
             if block.language == "sh":
                 printed = comparable(outcome.stdout), comparable(outcome.stderr)
     check_python_examples(page, folder)
+
+
+@slow
+def test_examples_of_help_texts_work(folder: Path) -> None:
+    page_examples.make_files_of_other_pages(folder)
+    for page in COMMANDS:
+        for line in (line for block in blocks(page) for line in commands(block)):
+            outcome = run_shell(line, folder)
+            assert outcome.returncode == 0, f"{line}\n{outcome.stdout}{outcome.stderr}"
 
 
 def check_python_examples(page: Path, folder: Path) -> None:
@@ -136,11 +157,12 @@ def test_every_command_explains_itself(name: str) -> None:
     assert command.help
     assert command.short_help
     assert all(option.help for option in command.params if isinstance(option, click.Option))
-    shown = [line for block in blocks(REPOSITORY / "docs" / "cli.md") for line in commands(block)]
+    page = REPOSITORY / "docs" / "commands" / f"{name}.md"
+    shown = [line for block in blocks(page) for line in commands(block)]
     assert any(line.startswith(f"vsacli {name} ") for line in shown), f"no example for {name}"
 
 
-@pytest.mark.parametrize("page", [*PAGES, *TUTORIALS], ids=named)
+@pytest.mark.parametrize("page", [*PAGES, *COMMANDS, *TUTORIALS], ids=named)
 def test_internal_links_resolve(page: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
@@ -151,13 +173,14 @@ def test_internal_links_resolve(page: Path) -> None:
         assert not anchor or anchor in anchors(file), f"{page.name}: {target}"
 
 
-def test_the_first_page_lists_every_page() -> None:
-    """Its lists are the contents of the site."""
+def test_the_contents_list_every_page() -> None:
+    """The first page lists pages, `cli` those of commands, `file-formats` those of formats."""
     docs = REPOSITORY / "docs"
     index = (docs / "index.md").read_text(encoding="utf-8")
     groups = re.findall(r"^## (.*)$", index, re.MULTILINE)
     assert groups == ["Tutorials", "How-to guides", "Reference", "Explanation", "Contributing"]
-    listed = re.findall(r"^- \[[^\]]+\]\((\S+\.md)\)", index, re.MULTILINE)
+    texts = [(docs / f"{name}.md").read_text(encoding="utf-8") for name in contents.PAGES]
+    listed = [f"{page}.md" for text in texts for _, page in contents.ENTRY.findall(text)]
     assert sorted(listed) == sorted(
         page.relative_to(docs).as_posix() for page in docs.rglob("*.md") if page.name != "index.md"
     )
@@ -177,8 +200,9 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def format_page() -> str:
-    return (REPOSITORY / "docs" / "file-formats.md").read_text(encoding="utf-8")
+def format_pages() -> str:
+    """The pages of the file formats in one text."""
+    return "".join(page.read_text(encoding="utf-8") for page in FORMATS)
 
 
 @pytest.fixture
@@ -190,11 +214,11 @@ def result(folder: Path) -> Path:
     return folder / "result.h5"
 
 
-def test_every_key_of_the_report_is_documented(result: Path, format_page: str) -> None:
+def test_every_key_of_the_report_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         report = json.loads(file["report/json"].asstr()[()])
     for key in leaves(report):
-        assert f"`{key}`" in format_page, key
+        assert f"`{key}`" in format_pages, key
 
 
 def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
@@ -215,23 +239,23 @@ def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
                 yield f"{prefix}{key}"
 
 
-def test_every_attribute_and_group_of_a_result_is_documented(result: Path, format_page: str) -> None:
+def test_every_attribute_and_group_of_a_result_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         attributes = list(file.attrs)
         groups = [name for name, item in file.items() if isinstance(item, h5py.Group)]
     tree = next(
-        block.text for block in blocks(REPOSITORY / "docs" / "file-formats.md") if block.language == "text"
+        block.text for block in blocks(REPOSITORY / "docs" / "formats-results.md") if block.language == "text"
     )
-    assert all(f"`{name}`" in format_page for name in attributes)
+    assert all(f"`{name}`" in format_pages for name in attributes)
     assert sorted(groups) == ["inputs", "report"]
     assert all(f"── {name}" in tree for name in groups)
 
 
-def test_the_numbers_in_the_text_are_those_of_the_code(format_page: str) -> None:
+def test_the_numbers_in_the_text_are_those_of_the_code(format_pages: str) -> None:
     theory = (REPOSITORY / "docs" / "theory.md").read_text(encoding="utf-8")
     for number in (SINGULAR_MARGIN, MIN_MARGIN, SPRING_BOUND, LADDER_BOUND):
         assert f"{number:g}".replace("e-0", "e-") in theory
-    assert f"{MAX_DOCUMENT_BYTES // 10**6} MB, {MAX_LEVELS} levels and {MAX_NODES:,} nodes" in format_page
+    assert f"{MAX_DOCUMENT_BYTES // 10**6} MB, {MAX_LEVELS} levels and {MAX_NODES:,} nodes" in format_pages
 
 
 def test_every_extra_package_has_its_reason() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-import generate
+import command_pages
 import pytest
 
 from vsacli.base.flags import Flag
@@ -84,7 +84,7 @@ def test_a_phrase_is_found(text: str) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_is_in_standard_terms(name: str) -> None:
-    help_text = generate.command_help(name.split()[1:])
+    help_text = command_pages.command_help(name.split()[1:])
     assert help_text.startswith("Usage")
     assert found(" ".join(help_text.split())) == []
 

@@ -1,4 +1,4 @@
-"""The lists of links on the page `index` are the contents of the site: what it does not list, it lacks."""
+"""The contents of the site are the links with which lists and table rows of `PAGES` begin."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+PAGES = ("index", "cli", "file-formats")
+"""The first page, and pages of the reference that have pages below them."""
+
 SECTION = re.compile(r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n?)*)", re.MULTILINE)
-ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<page>[\w/-]+)\.md\)", re.MULTILINE)
+ENTRY = re.compile(r"^(?:-|\|) \[`?(?P<title>[^\]`]+)`?\]\((?P<page>[\w/-]+)\.md\)", re.MULTILINE)
 CONTENTS = "```{{toctree}}\n:hidden:\n:caption: {title}\n\n{pages}\n```\n"
 
 
@@ -20,7 +23,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def with_contents(text: str) -> str:
-    """The page `index`, behind each section with a list the contents that follow from it."""
+    """Return a page with the contents that follow from its links behind each section."""
     return SECTION.sub(_contents, text)
 
 
@@ -33,5 +36,5 @@ def _contents(section: re.Match[str]) -> str:
 
 
 def _add_contents(_app: Sphinx, page: str, source: list[str]) -> None:
-    if page == "index":
+    if page in PAGES:
         source[0] = with_contents(source[0])

@@ -1,4 +1,4 @@
-"""GNU Octave reads the variables of a result that are named to it, as docs/file-formats.md says."""
+"""GNU Octave reads the variables of a result that are named to it, as docs/formats-results.md says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The result file: written atomically, readable with h5py alone; see docs/file-formats for its format."""
+"""The result file: written atomically, readable with h5py alone; format: docs/formats-results.md."""
 
 from vsacli.base.interrupts import interrupts_deferred
 
