@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -53,15 +54,21 @@ def fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch, engine: str = "nu
     return answer(report.self_check)
 
 
+def terms_noticed_by(parts: str) -> list[str]:
+    """The terms in the row of the page for these parts of the self-check."""
+    row = re.search(rf"^\| {parts} \| (.*) \|$", THEORY.read_text(encoding="utf-8"), re.MULTILINE)
+    return row[1].split("; ") if row else []
+
+
 @pytest.mark.parametrize("mutation", slow_but(QUICK, MUTATIONS), ids=lambda each: each.term)
 def test_a_wrong_term_fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert f"| {mutation.term} | {fails(mutation, monkeypatch)} |" in THEORY.read_text()
+    assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch))
 
 
 @needs_compiler
 @pytest.mark.parametrize("mutation", slow_but([], COMPILED), ids=lambda each: each.term)
 def test_a_wrong_term_fails_in_compiled_code(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert f"| {mutation.term} | {fails(mutation, monkeypatch, 'c')} |" in THEORY.read_text()
+    assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch, "c"))
 
 
 @pytest.mark.parametrize("seed", [*range(7), *map(slow, range(7, 60))])
