@@ -21,7 +21,7 @@ QUICK = [each for each in MUTATIONS if each.term in ("B_12 theta_k''", "D_m,k th
 COMPILED = [
     each
     for each in MUTATIONS
-    if each.term in ("B_12 theta_k''", "motor friction, sign", "voltage, R i", "sigma q'' in beta (70)")
+    if each.term in ("B_12 theta_k''", "motor friction, sign", "voltage, R i", "sigma q'' in (70)")
 ]
 
 STIFF = 2014
