@@ -1,4 +1,4 @@
-"""How far off identified numbers are, in standard errors: the figure of docs/identification.md.
+"""How far off identified numbers are, in standard errors: the figure of docs/identification-method.md.
 
 python docs/coverage_study.py    draws it, in about a minute
 """

@@ -40,7 +40,8 @@ LONG = (
     *("cli.md", "codegen.md", "damping.md", "energy.md", "figures.md", "formats-results.md"),
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
     *("models.md", "optimization.md", "performance.md", "plausibility.md", "python.md"),
-    *("reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "serial.md"),
+    *("reading-a-verdict.md", "recorded.md", "recordings.md", "robots.md", "ros-bags.md"),
+    *("sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
 """Pages whose examples take more than half a second."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ QUICK = [each for each in MUTATIONS if each.term in ("B_12 theta_k''", "D_m,k th
 COMPILED = [
     each
     for each in MUTATIONS
-    if each.term in ("B_12 theta_k''", "motor friction, sign", "voltage, R i", "sigma q'' in beta (70)")
+    if each.term in ("B_12 theta_k''", "motor friction, sign", "voltage, R i", "sigma q'' in (70)")
 ]
 
 STIFF = 2014
@@ -53,15 +54,21 @@ def fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch, engine: str = "nu
     return answer(report.self_check)
 
 
+def terms_noticed_by(parts: str) -> list[str]:
+    """The terms in the row of the page for these parts of the self-check."""
+    row = re.search(rf"^\| {parts} \| (.*) \|$", THEORY.read_text(encoding="utf-8"), re.MULTILINE)
+    return row[1].split("; ") if row else []
+
+
 @pytest.mark.parametrize("mutation", slow_but(QUICK, MUTATIONS), ids=lambda each: each.term)
 def test_a_wrong_term_fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert f"| {mutation.term} | {fails(mutation, monkeypatch)} |" in THEORY.read_text()
+    assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch))
 
 
 @needs_compiler
 @pytest.mark.parametrize("mutation", slow_but([], COMPILED), ids=lambda each: each.term)
 def test_a_wrong_term_fails_in_compiled_code(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert f"| {mutation.term} | {fails(mutation, monkeypatch, 'c')} |" in THEORY.read_text()
+    assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch, "c"))
 
 
 @pytest.mark.parametrize("seed", [*range(7), *map(slow, range(7, 60))])

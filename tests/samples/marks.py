@@ -16,19 +16,21 @@ def slow(*values: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
-def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
-    """All cases, of which only some are quick."""
+def slow_but(quick: Collection[Any], cases: Iterable[Any], most: int | None = None) -> list[Any]:
+    """All cases, of which only some are quick.
+
+    Of the others `most` are slow, spread over them, and the rest exhaustive; without `most` all are slow.
+    """
     whole = list(cases)
     assert set(quick) <= set(whole)
-    return [case if case in quick else slow(case) for case in whole]
-
-
-def sampled(quick: Collection[Any], cases: Iterable[Any], count: int) -> list[Any]:
-    """All cases: quick ones, `count` slow ones spread over the others, and the rest, which are exhaustive."""
-    whole = slow_but(quick, cases)
-    rest = [number for number, case in enumerate(whole) if case not in quick]
-    chosen = {rest[round(place)] for place in np.linspace(0, len(rest) - 1, min(count, len(rest)))}
-    return [exhaustive(case) if number in {*rest} - chosen else case for number, case in enumerate(whole)]
+    rest = [case for case in whole if case not in quick]
+    count = len(rest) if most is None else min(most, len(rest))
+    chosen = [rest[place * len(rest) // count] for place in range(count)]
+    exhaustive = [pytest.mark.slow, pytest.mark.exhaustive]
+    return [
+        case if case in quick else slow(case) if case in chosen else pytest.param(case, marks=exhaustive)
+        for case in whole
+    ]
 
 
 def needs(command: str, package: str) -> Any:

@@ -113,7 +113,7 @@ MUTATIONS = (
         "phi + 1.01 * q",
     ),
     *(
-        Mutation(f"{term} in beta ({70 + row})", "pair", BETA, old, new)
+        Mutation(f"{term} in ({70 + row})", "pair", BETA, old, new)
         for row, term, old, new in (
             (0, "tau_e''", "ddtau_e - (", "1.01 * ddtau_e - ("),
             (0, "zeta_1 phi_1'^2", "(one.zeta * squared_1", "(1.01 * one.zeta * squared_1"),
@@ -147,13 +147,11 @@ MUTATIONS = (
     ),
     Mutation("motor friction", "pair", TORQUES, "+ friction.with", "+ 1.01 * friction.with"),
     Mutation("motor friction, sign", "pair", TORQUES, "+ friction.with", "- friction.with"),
-    Mutation("law of friction, Coulomb", "pair", f"{FRICTION}.torque", "return self", "return 1.01 * self"),
-    Mutation("law of friction, offset", "pair", f"{FRICTION}.torque", "self.offset", "1.01 * self.offset"),
+    Mutation("Coulomb friction", "pair", f"{FRICTION}.torque", "return self", "return 1.01 * self"),
+    Mutation("friction offset", "pair", f"{FRICTION}.torque", "self.offset", "1.01 * self.offset"),
+    Mutation("friction width", "pair", f"{FRICTION}.torque", "np.tanh(velocity", "np.tanh(1.01 * velocity"),
     Mutation(
-        "law of friction, width", "pair", f"{FRICTION}.torque", "np.tanh(velocity", "np.tanh(1.01 * velocity"
-    ),
-    Mutation(
-        "law of friction, direction",
+        "friction direction",
         "pair",
         f"{FRICTION}._size",
         "self.backward, self.forward",
@@ -195,15 +193,15 @@ MUTATIONS = (
         "command.tau_e - springs",
         "1.01 * command.tau_e - springs",
     ),
-    Mutation("T of a mechanism", "serial", RATIO, "T=value", "T=1.01 * value"),
-    Mutation("U_s of a mechanism", "serial", RATIO, "setting_torque=slope", "setting_torque=1.01 * slope"),
-    Mutation("T_p of a mechanism", "serial", RATIO, "T_p=value", "T_p=1.01 * value"),
-    Mutation("T_s of a mechanism", "serial", RATIO, "T_s=slope", "T_s=1.01 * slope"),
+    Mutation("T (mechanism)", "serial", RATIO, "T=value", "T=1.01 * value"),
+    Mutation("U_s (mechanism)", "serial", RATIO, "setting_torque=slope", "setting_torque=1.01 * slope"),
+    Mutation("T_p (mechanism)", "serial", RATIO, "T_p=value", "T_p=1.01 * value"),
+    Mutation("T_s (mechanism)", "serial", RATIO, "T_s=slope", "T_s=1.01 * slope"),
     *(
-        Mutation(f"{name} of a mechanism", "serial", RATIO, f"{name}=", f"{name}=1.01 * ")
+        Mutation(f"{name} (mechanism)", "serial", RATIO, f"{name}=", f"{name}=1.01 * ")
         for name in ("T_pp", "T_ps", "T_ss", "T_ppp", "T_pps", "T_pss")
     ),
-    Mutation("energy of a mechanism", "serial", RATIO, "energy=value", "energy=1.01 * value"),
+    Mutation("energy (mechanism)", "serial", RATIO, "energy=value", "energy=1.01 * value"),
     Mutation(
         "torque against motor 2",
         "serial",
