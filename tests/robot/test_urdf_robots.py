@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
-import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
