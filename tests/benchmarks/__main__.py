@@ -1,8 +1,7 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
 Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts each
-part, as soon as it is there, into docs/performance.md, docs/performance-notes.md or docs/codegen.md;
-`--only growth,startup` measures parts.
+part, as soon as it is there, into one of the `PAGES` of docs; `--only growth,startup` measures parts.
 """
 
 from __future__ import annotations
@@ -37,7 +36,9 @@ from subjects import ROOT
 
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 
-PAGES = tuple(ROOT / "docs" / name for name in ("performance.md", "performance-notes.md", "codegen.md"))
+PAGES = tuple(
+    ROOT / "docs" / name for name in ("performance.md", "performance-notes.md", "codegen-performance.md")
+)
 FIGURE = ROOT / "docs" / "images" / "performance-growth.png"
 PART = re.compile(r"(<!-- measured: (?P<name>\S+) -->\n).*?(<!-- end of measured part -->)", re.DOTALL)
 
