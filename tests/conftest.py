@@ -5,13 +5,29 @@ from __future__ import annotations
 import contextlib
 import io
 import signal
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from samples.command_line import ROBOT, Outcome, rest_to_rest
+from samples.marks import spread
 
 from vsacli.cli.main import run
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the slow cases of a test beyond those that its mark `cases` asks for as exhaustive."""
+    cases: defaultdict[object, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("cases") and item.get_closest_marker("slow"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    for found in cases.values():
+        kept = spread(found, found[0].get_closest_marker("cases").args[0])
+        for item in found:
+            if item not in kept:
+                item.add_marker("exhaustive")
 
 
 @pytest.fixture(scope="session", autouse=True)

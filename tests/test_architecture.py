@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 import vsacli
 
 REPOSITORY = Path(__file__).parents[1]
@@ -220,6 +222,7 @@ sys.exit(' '.join(loaded) if code == 0 else 'the job failed')
     return loaded
 
 
+@pytest.mark.slow
 def test_the_main_job_imports_nothing_that_it_does_not_use(tmp_path: Path) -> None:
     assert loaded_by_the_main_job(tmp_path) & set(NOT_FOR_THE_MAIN_JOB) == set()
 

@@ -65,6 +65,7 @@ def insert(path: Path, anchor: str, text: str) -> None:
     path.write_text("".join([*lines[: place + 1], text, *lines[place + 1 :]]), encoding="utf-8")
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("recipe", slow_but({"A limit with a flag"}, RECIPES))
 def test_a_recipe_works_as_it_stands(recipe: str, tmp_path: Path) -> None:
     folder, command, output = applied(recipe, tmp_path)

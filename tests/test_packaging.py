@@ -82,6 +82,7 @@ def test_the_examples_in_the_wheel_are_those_of_the_repository(wheel: zipfile.Pa
     assert packed == (REPOSITORY / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_what_is_installed_lists_and_copies_its_examples(wheel: zipfile.Path, tmp_path: Path) -> None:
     wheel.root.extractall(tmp_path / "installed")
     command = [sys.executable, "-m", "vsacli", "examples"]

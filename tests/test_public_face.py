@@ -95,6 +95,7 @@ def test_notebooks_get_html_in_which_names_are_text(robot: Robot, trajectory: Tr
     assert "a&lt;b" in shown
 
 
+@pytest.mark.slow
 def test_a_report_prints_as_the_command_does(result: Result, vsacli_out: str) -> None:
     assert str(result.report) == vsacli_out
 

@@ -93,6 +93,7 @@ def test_lower_end_jumps_where_the_outermost_piece_splits():
         assert lower[index] == pytest.approx(curve.stiffness(curve.fold(nodes=3000)), rel=1e-9)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("pairs", [10, slow(150)])
 @pytest.mark.parametrize("decades", [1e-8, 1e-3, 0.05, 0.5, 2, 4])
 def test_corridor_ends_where_a_dense_scan_says(decades: float, pairs: int):
@@ -191,6 +192,7 @@ def test_below_reach_the_deflections_are_those_of_the_end():
 # Anything goes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decades", [0.05, slow(1), slow(2)])
 def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
     rng = np.random.default_rng(3)

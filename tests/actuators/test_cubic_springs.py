@@ -126,6 +126,7 @@ def test_solution_satisfies_14_down_to_the_smallest_margin(kind):
     assert residuals((SPRING, SPRING), found, tau_e, stiffness) <= 20 * EPS
 
 
+@pytest.mark.slow
 def test_closed_form_lies_on_the_branch():
     tau_e, stiffness = loads_and_demands(100_000, least_margin=1e-9)
     found = CubicTwins(SPRING).solve(tau_e, stiffness)

@@ -145,6 +145,7 @@ SCANNED = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", slow_but({"wavy"}, SCANNED))
 def test_the_corridor_is_what_a_dense_scan_of_the_branch_reaches(name: str) -> None:
     potential, positions, largest = SCANNED[name]
@@ -197,6 +198,7 @@ def random_potential(number: int) -> Potential:
     raise AssertionError("no state of this potential can be the start")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(3))
 def test_no_corridor_reaches_beyond_its_branch(number: int) -> None:
@@ -242,6 +244,7 @@ def test_a_sample_is_solved_as_if_it_were_alone() -> None:
             np.testing.assert_array_equal(mine, theirs[part])
 
 
+@pytest.mark.slow
 def test_the_last_torques_are_kept_and_no_others() -> None:
     tau_e, stiffness, q = Demand(2, (0.02, 5), samples=50).arrays
     fresh = [replace(MACCEPA).solve(torques, stiffness, q) for torques in (tau_e, -tau_e)]

@@ -117,6 +117,7 @@ def torques(case: Case, count: int, rng: np.random.Generator, beyond: float = 1.
     return drawn
 
 
+@pytest.mark.cases(8)
 def test_the_branch_is_that_of_a_dense_scan(case: Case):
     tau_e = torques(case, 30, np.random.default_rng(1), beyond=1.1)
     found = case.solve(tau_e, np.ones_like(tau_e))
@@ -141,6 +142,7 @@ def test_a_fold_of_the_built_device():
     assert above.phi_2[0] > found.phi_2[0]
 
 
+@pytest.mark.cases(3)
 def test_there_and_back(case: Case):
     """Deflections and pretensions come back but for rounding over the root of the margin to a fold."""
     rng = np.random.default_rng(2)

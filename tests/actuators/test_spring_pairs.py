@@ -111,6 +111,7 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
     )
 
 
+@pytest.mark.cases(50)
 @every_pair
 def test_there_and_back_on_the_branch(first: Spring, second: Spring):
     trip = round_trip(first, second, DRAWS)

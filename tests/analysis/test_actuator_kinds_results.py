@@ -209,6 +209,7 @@ def test_the_robot_is_stored_with_one_motor_or_two(stored: Path) -> None:
         ]
 
 
+@pytest.mark.slow
 def test_a_robot_with_one_motor_a_joint_is_stored_without_the_second(
     vsacli: Callable[..., Outcome], tmp_path: Path
 ) -> None:
@@ -268,6 +269,7 @@ def test_motor_two_is_drawn_where_it_exists() -> None:
     assert (len(first.lines), len(second.lines)) == (3, 1)
 
 
+@pytest.mark.slow
 def test_panels_without_a_motor_are_not_there() -> None:
     result = drawn(types="RRP")  # the antagonistic joint is the prismatic one
     figure = plot_stored(result)["motor-torque"]
@@ -326,6 +328,7 @@ def test_nothing_is_followed_where_no_joint_is_antagonistic(motion: Trajectory) 
     assert inverse_dynamics(robot, motion, deflection_solver=deflections).report.drifts == ()
 
 
+@pytest.mark.slow
 def test_the_profile_of_a_fix_is_of_the_antagonistic_joint_alone(robot: Robot, tmp_path: Path) -> None:
     soft = task(robot, tmp_path, ("end: {elbow: 1275}", "end: {elbow: 790}"))
     found = fixes(robot, soft)

@@ -253,6 +253,7 @@ def test_a_spike_between_coarse_steps() -> None:
     assert report.joints[0].margin == pytest.approx(1 - everywhere / stiffness, rel=KNOWN)
 
 
+@pytest.mark.slow
 def test_where_some_derivatives_are_given_the_samples_are_all_there_is() -> None:
     robot, trajectory = three_joints()
     motion = trajectory.block(0, trajectory.samples)

@@ -14,6 +14,7 @@ QUICK = "12 bits, zero-phase 20 Hz"
 """The color that is tried at every run of the tests."""
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
@@ -31,6 +32,8 @@ def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(color):
     assert not covered or 0.9 < np.mean(covered) < 0.99
 
 
+@pytest.mark.slow
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
@@ -41,6 +44,8 @@ def test_torques_of_steps_of_velocity_are_right_or_unreliable(color):
             assert each.verdict == "unreliable"
 
 
+@pytest.mark.slow
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )

@@ -141,6 +141,7 @@ def test_torques_that_are_not_determined_make_a_run_unreliable():
     assert Report.from_json(json.loads(json.dumps(report.as_json()))) == report
 
 
+@pytest.mark.slow
 def test_it_is_what_was_asked_for_that_must_be_determined():
     def verdict(*asked):
         run = Run(vsa_3r(), swinging(SHAKY), asked=asked)

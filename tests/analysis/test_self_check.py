@@ -161,6 +161,7 @@ def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     assert ladder(*load("7R")) == whole
 
 
+@pytest.mark.slow
 def test_bound_follows_rounding_where_sampling_is_fast():
     trajectory = fast_recording()
     error, bound = ladder(vsa_3r(), trajectory)
@@ -170,6 +171,7 @@ def test_bound_follows_rounding_where_sampling_is_fast():
     assert error < bound / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
 @pytest.mark.parametrize("defect", [slow(1e-2), 1e-6])
 def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: float, monkeypatch):

@@ -49,6 +49,7 @@ def report_by_blocks(robot: Robot, trajectory: Trajectory, block_samples: int) -
     return run.report()
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_blocks():
     robot, trajectory = troubled()
     whole = inverse_dynamics(robot, trajectory)

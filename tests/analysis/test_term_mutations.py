@@ -60,6 +60,7 @@ def terms_noticed_by(parts: str) -> list[str]:
     return row[1].split("; ") if row else []
 
 
+@pytest.mark.cases(26)
 @pytest.mark.parametrize("mutation", slow_but(QUICK, MUTATIONS), ids=lambda each: each.term)
 def test_a_wrong_term_fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
     assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch))
@@ -71,6 +72,8 @@ def test_a_wrong_term_fails_in_compiled_code(mutation: Mutation, monkeypatch: py
     assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch, "c"))
 
 
+@pytest.mark.slow
+@pytest.mark.cases(9)
 @pytest.mark.parametrize("seed", [*range(7), *map(slow, range(7, 60))])
 def test_a_valid_run_is_not_refused(seed: int) -> None:
     """Infeasible steps are possible where a mechanism cannot carry its load."""
@@ -80,6 +83,7 @@ def test_a_valid_run_is_not_refused(seed: int) -> None:
     assert check.ladder_bound < 1e-2
 
 
+@pytest.mark.slow
 def test_the_noise_of_stiff_springs_hides_no_wrong_term(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a potential of 1e8 N m/rad that computes its deflection as a difference."""
     robot, trajectory = valid_run(STIFF)

@@ -172,6 +172,7 @@ def test_200_megabytes_of_noise_are_refused_within_seconds(tmp_path, name):
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
+@pytest.mark.slow
 def test_installed_command_refuses_bad_input_without_a_traceback(tmp_path):
     edited(ROBOT, tmp_path / "r.yaml", ("mass: 9.0478", "mass: heavy"))
     done = installed("invdyn", "r.yaml", REST_TO_REST, folder=tmp_path)

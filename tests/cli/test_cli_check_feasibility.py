@@ -11,6 +11,7 @@ from samples.command_line import ROBOT, contents, installed
 from vsacli import Flag, open_result
 
 
+@pytest.mark.slow
 def test_installed_command_says_yes(tmp_path, motion):
     done = installed("check-feasibility", ROBOT, motion, folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -66,6 +66,7 @@ def test_compare(vsacli: Command, tmp_path: Path) -> None:
     assert "not compared, as the result has none of that name: frame, voltage" in str(found["notes"])
 
 
+@pytest.mark.slow
 def test_identify(vsacli: Command, tmp_path: Path) -> None:
     lab = load_robot(ROBOT).replace({"joints.base.actuator.spring.k": 380})
     excited(lab, MOTION).noisy(seed=0).write(tmp_path / "plain.csv", lab)

@@ -62,6 +62,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     return installed(*EXAMPLE, folder=tmp_path_factory.mktemp("usual")).stdout
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("case", slow_but(QUICK, product(ENVIRONMENTS, COMMANDS)), ids=" - ".join)
 def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path: Path) -> None:
     environment, command = case
@@ -72,6 +73,7 @@ def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path:
     assert (tmp_path / "r.h5").is_file() == ("-o" in COMMANDS[command])
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("cache", ["relative", slow("/dev/null/cache")])
 def test_compiled_code_without_a_cache_folder_of_ones_own(cache: str, tmp_path: Path) -> None:
@@ -94,6 +96,7 @@ def closing(*streams: int) -> Any:
     return close
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("streams", [slow((0,)), (1,), slow((2,)), slow((1, 2)), slow((0, 1, 2))], ids=str)
 @pytest.mark.parametrize("command", ["invdyn", slow("invdyn --plot"), slow("check-feasibility")])
 def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) -> None:
@@ -120,6 +123,7 @@ def test_the_report_needs_no_disk(command: str, report: str, tmp_path: Path) -> 
 NO_TEMPORARY = "folder for temporary files: cannot be used: No usable temporary directory"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -143,6 +147,7 @@ def test_full_disks(arguments: tuple[object, ...], code: int, message: str, tmp_
     assert not contents(here)
 
 
+@pytest.mark.slow
 def test_figures_without_a_folder_for_what_matplotlib_keeps(feasible_result: Path, tmp_path: Path) -> None:
     homeless = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "XDG_CONFIG_HOME": "/dev/null"}
     changes = {**homeless, "MPLCONFIGDIR": None}

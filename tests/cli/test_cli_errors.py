@@ -185,6 +185,8 @@ def test_head_of_a_table(printing):
 CLOSED = "standard output: cannot be written: it is closed\n"
 
 
+@pytest.mark.slow
+@pytest.mark.cases(5)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -207,18 +209,21 @@ def test_what_a_closed_standard_output_loses_is_told(printing, arguments):
     assert (done.returncode, done.stderr) == (4, CLOSED)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("arguments", ["export result.h5 -o t.csv -q", slow("plot result.h5 -q -o .")])
 def test_a_command_that_prints_nothing_needs_no_standard_output(printing, arguments):
     done = shell(f"{COMMAND} {arguments} >&-", printing)
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_result_is_whole_although_its_report_is_lost(tmp_path, motion):
     done = shell(f"{COMMAND} invdyn {ROBOT} {motion} -o r.h5 >&-", tmp_path)
     assert (done.returncode, done.stderr) == (4, CLOSED)
     assert shell(f"{COMMAND} validate r.h5", tmp_path).returncode == 0
 
 
+@pytest.mark.slow
 def test_what_a_library_prints_never_goes_into_a_file(tmp_path):
     """A file would get the number of the standard output that was closed."""
     code = (
@@ -249,6 +254,7 @@ def test_full_stderr_does_not_change_the_exit_code(tmp_path, motion, arguments, 
         assert installed(*arguments, folder=tmp_path, stderr=full).returncode == code
 
 
+@pytest.mark.slow
 def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     edited(ROBOT, tmp_path / "r.yaml", ("name: vsa-3r", "name: φ-arm"))
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}

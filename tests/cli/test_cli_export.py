@@ -28,6 +28,7 @@ def stored(path, name):
         return file[name][:]
 
 
+@pytest.mark.slow
 def test_installed_command_prints_the_torques_to_send(tmp_path, feasible_result):
     done = installed("export", feasible_result, folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -48,6 +48,7 @@ def shaded(axes, label: str = "infeasible") -> list[tuple[float, float]]:
     return [(path.get_extents().x0, path.get_extents().x1) for path in paths]
 
 
+@pytest.mark.slow
 def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, monkeypatch):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
@@ -58,6 +59,7 @@ def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, monkeypatch):
     assert not any((tmp_path / "temporary").iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--json"], ["--stop-on-infeasible"]], ids=" ".join)
 def test_report_is_the_same_with_a_figure(vsacli, too_soft, options):
     plain = vsacli("check-feasibility", ROBOT, too_soft, *options)
@@ -65,6 +67,7 @@ def test_report_is_the_same_with_a_figure(vsacli, too_soft, options):
     assert (drawn.code, drawn.out) == (plain.code, plain.out)
 
 
+@pytest.mark.slow
 def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures", "--json")
     (figure,) = figures
@@ -78,6 +81,7 @@ def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
     assert labels(figure) == ["attainable", "infeasible"]
 
 
+@pytest.mark.slow
 def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
     def short(robot, trajectory) -> IntegratedDeflections:
         """As if the shoulder could be followed for 1 s only."""
@@ -101,6 +105,7 @@ def test_existing_figure_is_refused_before_computing(vsacli, too_soft, tmp_path,
     assert figure.read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_existing_figure_is_replaced_on_request(vsacli, too_soft, tmp_path):
     (tmp_path / "figures").mkdir()
     (tmp_path / FIGURE).write_text("old")
@@ -115,6 +120,7 @@ def test_folder_that_is_a_file_is_refused(vsacli, too_soft, tmp_path):
     assert done.err.startswith("figures: is a file")
 
 
+@pytest.mark.slow
 def test_seven_joints_have_a_panel_each(vsacli, tmp_path, figures):
     motion = seven_joint_motion(tmp_path / "reach.yaml", rate=100)
     assert vsacli("check-feasibility", SEVEN_JOINTS, motion, "--plot", ".").code == 0

@@ -95,6 +95,7 @@ def written(vsacli, robot, task, text, kind):
     return found["fixes"][numbers[0] - 1]["text"], (task.parent / "fixed.yaml").read_text()
 
 
+@pytest.mark.slow
 def test_values_change_where_they_stand(tmp_path, vsacli):
     said, text = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_offset")
     assert said.startswith("raise the stiffness of base by")
@@ -121,6 +122,8 @@ def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
     assert vsacli("export", "fixed.h5", "--rate", 500, "-o", "fixed.csv").code == 0
 
 
+@pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("rate", "start", "derivatives", "asked"),
     [
@@ -167,6 +170,7 @@ def test_a_slower_recording_keeps_its_rate_over_whole_periods(
         np.testing.assert_allclose(moved, expected, rtol=0, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_another_profile_leaves_the_rest_of_the_file(tmp_path, vsacli):
     _, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_profile")
     assert "  end: [90 deg, 45 deg, -60 deg]  # as in the paper" in fixed

@@ -34,6 +34,7 @@ def test_fixes_follow_the_report(vsacli, too_soft):
     assert profile.startswith("1. reshape the stiffness of base by up to +18.")
 
 
+@pytest.mark.slow
 def test_json_has_them_under_one_key(vsacli, too_soft):
     plain = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json").out)
     report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--fixes").out)
@@ -50,6 +51,7 @@ def test_json_has_them_under_one_key(vsacli, too_soft):
     assert changes["base"]["largest"] == pytest.approx(offsets["base"], abs=0.05)
 
 
+@pytest.mark.slow
 def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
     fast = edited(
         motion, tmp_path / "fast.yaml", ("duration: 4.0", "duration: 0.4"), ("rate: 100 ", "rate: 1000 ")
@@ -80,6 +82,7 @@ def test_nothing_needs_to_change(vsacli, motion):
     }
 
 
+@pytest.mark.slow
 def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, *WRITE)
     assert (done.code, done.err) == (
@@ -93,6 +96,7 @@ def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     assert "near-singular" not in run.out
 
 
+@pytest.mark.slow
 def test_recorded_trajectory_is_fixed(vsacli, too_soft):
     vsacli("invdyn", ROBOT, too_soft, "-o", "soft.h5")
     vsacli(
@@ -125,6 +129,7 @@ def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
     assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}
 
 
+@pytest.mark.slow
 def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 2, "-o", "fixed.yaml")
     assert (done.code, done.err) == (3, "fix 2 goes to fixed.yaml\nwrote fixed.yaml\n")
@@ -134,6 +139,7 @@ def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
     assert "motors move" not in again.out
 
 
+@pytest.mark.slow
 def test_number_of_no_fix(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 9, "-o", "fixed.yaml")
     assert (done.code, done.err) == (
@@ -158,6 +164,7 @@ def test_number_of_a_fix_and_its_file_need_each_other(vsacli, tmp_path, too_soft
     assert contents(tmp_path).keys() == {"soft.yaml"}
 
 
+@pytest.mark.slow
 def test_files_that_exist_are_kept(vsacli, tmp_path, too_soft):
     (tmp_path / "fixed.csv").write_text("mine")
     done = vsacli("check-feasibility", ROBOT, too_soft, *WRITE)
@@ -197,6 +204,7 @@ def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
     assert verdict == "ok"
 
 
+@pytest.mark.slow
 def test_fixes_keep_the_margin_that_is_asked_for(vsacli, motion):
     done = vsacli("check-feasibility", ROBOT, motion, "--min-margin", "0.1", *WRITE)
     assert "a margin of at least 10 %" in done.out

@@ -35,6 +35,7 @@ def record(own_folder: Path) -> Path:
     return excited(lab, MOTION).noisy(seed=0).write(own_folder / "record.csv", lab)
 
 
+@pytest.mark.slow
 def test_the_file_written_is_that_of_the_robot_found(vsacli: Command, record: Path) -> None:
     found = vsacli(
         "identify", ROBOT, record, "--fit", "springs,motors,friction", "-o", "fitted.yaml", "--json"
@@ -76,6 +77,7 @@ def test_figures_and_report(vsacli: Command, record: Path) -> None:
     assert "filtered to " in found.out
 
 
+@pytest.mark.slow
 def test_a_page_of_report_and_records(vsacli: Command, record: Path) -> None:
     found = vsacli("identify", ROBOT, record, *SPRINGS, "--plot", "figures", "--format", "html")
     assert found.code == 3

@@ -64,6 +64,7 @@ def target(request, tmp_path):
     return {} if request.param is None else {"r.h5": request.param}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "target"),
     [(signal.SIGINT, OLD), slow(signal.SIGTERM, OLD), slow(signal.SIGHUP, None)],
@@ -78,6 +79,7 @@ def test_ended_run_leaves_the_target_and_nothing_else(tmp_path, target, writing,
     assert left == target
 
 
+@pytest.mark.slow
 def test_killed_run_leaves_the_target_and_does_not_disturb_the_next(tmp_path, target, writing, motion):
     writing.kill()
     out, err = writing.communicate(timeout=PATIENCE)
@@ -100,6 +102,7 @@ def test_interrupt_without_a_file(tmp_path):
     assert (process.returncode, out, err.strip()) == (130, "", "interrupted")
 
 
+@pytest.mark.slow
 def test_signals_that_the_parent_ignores_stay_ignored(tmp_path, motion):
     """As under `nohup`: signals from 0.05 s on, past the start of Python, change nothing."""
     command = [COMMAND, "invdyn", ROBOT, motion, "-o", "r.h5"]
@@ -145,6 +148,7 @@ main()
 """A command that Ctrl-C reaches when h5py is imported by half, into which HDF5 would call at the end."""
 
 
+@pytest.mark.slow
 def test_interrupt_while_h5py_is_imported(tmp_path, motion):
     command = [sys.executable, "-c", HALFWAY, "invdyn", str(ROBOT), str(motion), "-o", "r.h5"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

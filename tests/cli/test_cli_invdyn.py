@@ -36,6 +36,7 @@ def lowest_stiffness(torque):
     return 2 * SPRING + 6 * HARDENING * deflection**2
 
 
+@pytest.mark.slow
 def test_installed_command_does_the_shipped_example(tmp_path):
     done = installed("invdyn", ROBOT, REST_TO_REST, folder=tmp_path)
     assert done.returncode == 0
@@ -81,6 +82,7 @@ def test_stiffness_below_reach_is_named_with_joint_time_and_what_is_reachable(vs
     assert f"increase it ({count} samples, from {first:.3f} s)" in done.out
 
 
+@pytest.mark.slow
 def test_installed_command_exits_with_3_where_a_step_is_infeasible(tmp_path, too_soft):
     done = installed("invdyn", ROBOT, too_soft, folder=tmp_path)
     assert done.returncode == 3

@@ -19,6 +19,7 @@ def test_installed_command_draws_a_result(tmp_path, feasible_result):
     assert contents(tmp_path).keys() == {f"figures/result-{name}.png" for name in NAMES}
 
 
+@pytest.mark.slow
 def test_format(vsacli, tmp_path, infeasible_result):
     assert vsacli("plot", infeasible_result, "--format", "svg").code == 0
     files = contents(tmp_path)
@@ -26,6 +27,7 @@ def test_format(vsacli, tmp_path, infeasible_result):
     assert all(content.startswith(b"<?xml") for content in files.values())
 
 
+@pytest.mark.slow
 def test_two_results_are_compared(vsacli, tmp_path, feasible_result, infeasible_result):
     soft = shutil.copy(infeasible_result, tmp_path / "soft.h5")
     done = vsacli("plot", feasible_result, soft, "-o", "both", "--format", "svg")
@@ -102,6 +104,7 @@ def test_unknown_format_is_a_usage_error(vsacli, feasible_result):
     assert "'gif' is not one of 'png', 'pdf', 'svg'" in done.err
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense"])
 def test_the_backend_of_a_notebook_does_not_matter(tmp_path, feasible_result, backend, monkeypatch):

@@ -34,12 +34,14 @@ def test_a_recording_is_drawn(vsacli, log, robot):
     assert (done.code, done.out, done.err) == (0, "", "wrote drawn/log-recording.svg\n")
 
 
+@pytest.mark.slow
 def test_positions_alone_are_drawn_of_a_robot_that_takes_a_stiffness(vsacli, log):
     rows = np.loadtxt(log, delimiter=",", skiprows=1)[:, [0, 1, 3, 5]]
     np.savetxt("q.csv", rows, delimiter=",", header="time,q1,q2,q3", comments="")
     assert vsacli("plot", "q.csv", "--robot", ROBOT, "--joints", "elbow", "--format", "svg").code == 0
 
 
+@pytest.mark.slow
 def test_a_trajectory_with_recorded_signals_is_drawn(vsacli, log, own_folder):
     text = f"format: vsacli-trajectory/1\nname: half\nposition: {{type: csv, file: {log.name}}}\n"
     (own_folder / "half.yaml").write_text(text + "stiffness: {type: constant, value: 1300}\n")
@@ -47,6 +49,7 @@ def test_a_trajectory_with_recorded_signals_is_drawn(vsacli, log, own_folder):
     assert (done.code, done.err) == (0, "wrote half-recording.svg\n")
 
 
+@pytest.mark.slow
 def test_a_result_of_a_recording_shows_it_as_invdyn_does_and_as_the_recording_itself(vsacli, log, own_folder):
     done = vsacli("invdyn", ROBOT, log.name, "-o", "log.h5", "--plot", "with", "-q")
     assert done.code in {0, 3}
@@ -66,6 +69,7 @@ def result(vsacli, log):
     return "r.h5"
 
 
+@pytest.mark.slow
 def test_a_result_of_another_version_says_why_its_recording_is_not_drawn(vsacli, result):
     with h5py.File(result, "r+") as file:
         file.attrs["generated_by"] = "vsacli 0.0.1"
@@ -76,6 +80,7 @@ def test_a_result_of_another_version_says_why_its_recording_is_not_drawn(vsacli,
     assert "recording.svg" not in done.err
 
 
+@pytest.mark.slow
 def test_variables_of_a_result_leave_its_recording_out(vsacli, result):
     done = vsacli("plot", result, "--variables", "q", "--format", "svg")
     assert (done.code, done.err) == (0, "wrote r-q.svg\n")

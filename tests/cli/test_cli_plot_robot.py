@@ -10,6 +10,7 @@ from samples.command_line import REPOSITORY, ROBOT, SEVEN_JOINTS, contents
 NAMES = ("arm", "actuators", "stiffness")
 
 
+@pytest.mark.slow
 def test_a_robot_is_drawn(vsacli, tmp_path):
     done = vsacli("plot", ROBOT, "-o", "figures", "--format", "svg")
     assert done.code == 0
@@ -55,6 +56,7 @@ def test_an_invalid_robot_is_refused_with_the_line(vsacli, tmp_path):
     assert "revolving" in done.err
 
 
+@pytest.mark.slow
 def test_a_page_has_the_figures_parameters_and_file_of_a_robot(vsacli):
     assert vsacli("plot", ROBOT, "-o", "arm.html").code == 0
     page = Path("arm.html").read_text(encoding="utf-8")

@@ -79,6 +79,7 @@ def test_a_simulation_always_shows_one(vsacli: Callable[..., Any], motion: Path)
     assert "computing" in shown.getvalue()
 
 
+@pytest.mark.slow
 def test_searches_for_fixes_and_identifications_have_a_line_now_and_then_if_verbose(
     vsacli: Callable[..., Any], own_folder: Path, too_soft: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

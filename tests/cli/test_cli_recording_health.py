@@ -29,11 +29,13 @@ def recorded(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_clean_recording_is_not_doubted(vsacli, recorded):
     report = json.loads(vsacli("invdyn", ROBOT, recorded(positions()), "--json").out)
     assert [text for text in report["warnings"] if "motion.csv" in text] == []
 
 
+@pytest.mark.slow
 def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded):
     q = positions()
     q[600, 1] += 6.2e-4
@@ -48,6 +50,7 @@ def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 1.7e9])
 def test_gap_frozen_sensor_and_stamps_since_1970(vsacli, recorded, start):
     q, kept = positions(), (TIME < 1) | (TIME >= 1.2)
@@ -86,6 +89,7 @@ def test_wrapped_angles_are_unwrapped_on_demand(vsacli, recorded, tmp_path):
     np.testing.assert_allclose(*peaks, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_degrees_and_milliseconds_without_unit_are_doubted(vsacli, recorded):
     q = np.degrees(positions())
     said = vsacli("check-feasibility", ROBOT, recorded(q, 1000 * TIME)).out
@@ -98,6 +102,7 @@ def test_degrees_and_milliseconds_without_unit_are_doubted(vsacli, recorded):
     assert "motion.csv" not in said
 
 
+@pytest.mark.slow
 def test_jittering_stamps_recommend_a_rate_also_where_torques_are_exported(vsacli, recorded):
     late = TIME + np.random.default_rng(1).uniform(0, 1e-3, len(TIME))
     done = vsacli("invdyn", ROBOT, recorded(positions(), late), "-o", "late.h5")

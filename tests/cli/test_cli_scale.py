@@ -78,6 +78,7 @@ class LineCount:
         gc.enable()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "loop", [lambda n: [-k for k in range(n)], lambda n: sum(-k for k in range(n))], ids=["list", "sum"]
 )
@@ -99,6 +100,7 @@ def executed_lines(motion: Path, *options: str) -> int:
     return count.lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end_stiffness", [2400, 1500], ids=["feasible", "infeasible"])
 def test_no_python_loop_runs_over_samples(tmp_path, monkeypatch, end_stiffness):
     monkeypatch.chdir(tmp_path)

@@ -47,6 +47,7 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         assert stored.report_json["format"] == "vsacli-simulation-report/2"
 
 
+@pytest.mark.slow
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with xarray.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as data:
@@ -57,6 +58,7 @@ def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
         assert data.q_ref.attrs["long_name"] == "commanded joint position"
 
 
+@pytest.mark.slow
 def test_feedback_from_a_poles_file(vsacli, quick, tmp_path):
     poles = tmp_path / "poles.yaml"
     rows = "".join(f"  - name: {name}\n    position: -25\n" for name in ("base", "shoulder", "elbow"))
@@ -125,12 +127,14 @@ def test_a_run_whose_budget_is_used_up_is_written_with_exit_code_3(vsacli, quick
     assert "INCOMPLETE" in vsacli("info", "s.h5").out
 
 
+@pytest.mark.slow
 def test_perturbed_runs_are_repeatable(vsacli, quick):
     arguments = ("simulate", ROBOT, quick, "--perturb", "0.02", "--json", "--overwrite", "-o", "s.h5")
     first, second, other = vsacli(*arguments), vsacli(*arguments), vsacli(*arguments, "--seed", "1")
     assert first.out == second.out != other.out
 
 
+@pytest.mark.slow
 def test_measured_positions_are_reported(vsacli, quick):
     fine = edited(
         quick, quick.with_name("fine.yaml"), ("rate: 25 ", "rate: 250 "), ("duration: 1.0", "duration: 0.8")

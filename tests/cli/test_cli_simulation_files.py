@@ -80,6 +80,7 @@ def test_installed_command_draws_the_figures_that_simulate_drew(tmp_path: Path, 
     assert contents(tmp_path / "later") == contents(simulated / "figures")
 
 
+@pytest.mark.slow
 def test_format_and_overwrite(vsacli: Callable[..., Any], tmp_path: Path, simulated: Path) -> None:
     (tmp_path / "s-motor-torque.svg").write_bytes(b"precious")
     done = vsacli("plot", simulated / "s.h5", "--format", "svg")
@@ -90,6 +91,7 @@ def test_format_and_overwrite(vsacli: Callable[..., Any], tmp_path: Path, simula
     assert all(content.startswith(b"<?xml") for content in files.values())
 
 
+@pytest.mark.slow
 def test_rigid_joints_have_no_stiffness_error(vsacli: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "arm.yaml").write_text(HEAD + "    actuator: {type: rigid, motor: {inertia: 0.1}}\n")
     (tmp_path / "move.yaml").write_text(MOVE)
@@ -102,6 +104,7 @@ def test_rigid_joints_have_no_stiffness_error(vsacli: Callable[..., Any], tmp_pa
     }
 
 
+@pytest.mark.slow
 def test_several_simulations_are_compared(
     vsacli: Callable[..., Any], tmp_path: Path, simulated: Path
 ) -> None:
@@ -139,6 +142,7 @@ def test_results_and_simulations_are_not_compared(
     )
 
 
+@pytest.mark.slow
 def test_installed_command_exports_what_happened(tmp_path: Path, simulated: Path) -> None:
     done = installed("export", simulated / "s.h5", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
@@ -247,6 +251,7 @@ def test_info_ends_with_what_simulate_printed(vsacli: Callable[..., Any], simula
     assert done.out.endswith("\n\n" + (simulated / "printed").read_text())
 
 
+@pytest.mark.slow
 def test_info_of_measured_positions_shows_what_they_cost(vsacli: Callable[..., Any], tmp_path: Path) -> None:
     feedback = ("--controller", "feedback-linearization", "--feedback", "positions")
     motion = edited(

@@ -18,12 +18,14 @@ def piped(content: bytes, *arguments: object, folder: Path) -> subprocess.Comple
     return subprocess.run(command, input=content, cwd=folder, capture_output=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_robot_from_a_pipe_is_the_robot_of_the_file(tmp_path: Path) -> None:
     from_file = installed("check-feasibility", ROBOT, REST_TO_REST, folder=tmp_path)
     done = piped(ROBOT.read_bytes(), "check-feasibility", "-", REST_TO_REST, folder=tmp_path)
     assert (done.returncode, done.stdout.decode()) == (0, from_file.stdout)
 
 
+@pytest.mark.slow
 def test_a_recording_from_a_pipe(tmp_path: Path, feasible_result: Path) -> None:
     table = installed("export", feasible_result, "--variables", "q,stiffness", "-o", "-", folder=tmp_path)
     done = piped(table.stdout.encode(), "invdyn", ROBOT, "-", folder=tmp_path)
@@ -31,6 +33,7 @@ def test_a_recording_from_a_pipe(tmp_path: Path, feasible_result: Path) -> None:
     assert set(contents(tmp_path)) == {"vsa_3r-stdin.h5"}
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_pipe_is_told_with_its_line(tmp_path: Path) -> None:
     wrong = ROBOT.read_bytes().replace(b"mass: 9.0478", b"mass: -9")
     done = piped(wrong, "validate", "-", folder=tmp_path)
@@ -39,6 +42,7 @@ def test_what_is_wrong_with_a_pipe_is_told_with_its_line(tmp_path: Path) -> None
     assert done.stdout.decode().startswith(f"-:{line}: mass: must be")
 
 
+@pytest.mark.slow
 def test_a_closed_standard_input(tmp_path: Path) -> None:
     done = subprocess.run(
         f"{COMMAND} validate - <&-", shell=True, cwd=tmp_path, capture_output=True, text=True, check=False
@@ -63,6 +67,7 @@ def test_binary_files_do_not(vsacli: Any, tmp_path: Path, command: str) -> None:
     assert contents(tmp_path) == {}
 
 
+@pytest.mark.slow
 def test_a_result_is_whole_although_nobody_reads_its_report(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)

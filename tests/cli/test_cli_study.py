@@ -85,6 +85,7 @@ def test_what_varies_is_a_coordinate_of_run(grid_table: Path) -> None:
         assert table.margin.sel(joint="elbow").where(table[PATHS[1]] == 1000).min() < 0.2
 
 
+@pytest.mark.slow
 def test_parts_make_the_same_table(vsacli: Any, grid_study: str, grid_table: Path) -> None:
     """Times and command lines aside; what is missing is named."""
     for part in (1, 2, 3):

@@ -34,6 +34,7 @@ def test_a_run_that_fails_is_a_row(vsacli: Any, own_folder: Path) -> None:
     assert "failed: joints.elbow.link.mass: must be zero or positive" in done.out
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on(vsacli: Any, grid_study: str, grid_table: Path) -> None:
     """From the rows in the journal, of which the last was cut off."""
     journal = Path("study.h5.journal")
@@ -137,6 +138,7 @@ def test_a_full_disk_costs_no_finished_row(
     assert content("study.h5") == content(grid_table)
 
 
+@pytest.mark.slow
 def test_a_study_that_is_edited_before_it_goes_on_computes_what_is_new(vsacli: Any, grid_study: str) -> None:
     """Rows whose values are still asked for stay; a robot that is edited leaves none."""
     journal = Path("study.h5.journal")

@@ -48,6 +48,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [40, slow(80), slow(200)])
 def test_a_report_is_as_wide_as_its_terminal(columns: int) -> None:
     wrong = (*CHECK, "--set", "stiffness.end=700")

@@ -33,6 +33,7 @@ def done(*words: object) -> None:
     assert run([*map(str, words), "-q"]) == 0
 
 
+@pytest.mark.slow
 def test_an_optimum_has_its_objective(titles: dict[str, str]) -> None:
     done("optimize", ROBOT, "coarse.yaml", "--set", "rate=10", "--plot", ".")
     assert titles == {"optimum": "optimum of vsa-3r, rest-to-rest: rms motor torque, before and after"}
@@ -59,6 +60,7 @@ def test_a_comparison_has_recording_and_result(titles: dict[str, str]) -> None:
     assert titles == {name: f"{title}: {name}" for name in ("q", "tau_motor")}
 
 
+@pytest.mark.slow
 def test_an_identification_is_a_fit_to_its_recording(titles: dict[str, str]) -> None:
     done("simulate", ROBOT, "coarse.yaml", "--sensor-noise", "2e-4,0.5", "-o", "moved.h5")
     done("export", "moved.h5", "--variables", "q_measured,theta_measured,tau_motor_measured", "-o", "log.csv")

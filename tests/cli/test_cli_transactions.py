@@ -221,6 +221,8 @@ TRIED = 1
 """Calls of each task and start, of some twenty to five hundred; all of them take hours."""
 
 
+@pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("case", slow_but(QUICK, CASES), ids=" - ".join)
 def test_all_is_new_or_nothing(stage: MakeStage, case: tuple[str, str]) -> None:
     there = stage(*case)

@@ -65,6 +65,7 @@ def test_a_fit_that_follows_the_noise_is_used_and_unreliable(vsacli, tmp_path, n
     assert "verdict unreliable" in shown.out
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_decides(vsacli, noisy):
     path = noisy("interpolate")
     assert vsacli("invdyn", ROBOT, path, "-o", "q.h5", "--variables", "q,q_std").code == 0

@@ -89,6 +89,7 @@ def files_with(text: str, folder: Path) -> dict[str, Path]:
     return files
 
 
+@pytest.mark.cases(20)
 @pytest.mark.parametrize("kind", slow_but({"markdown", "unprintable escape"}, TEXTS))
 def test_a_text_in_any_place_of_a_file_is_read_or_refused(command: Command, work: Path, kind: str) -> None:
     (work / "in").mkdir()
@@ -164,6 +165,8 @@ EVERYWHERE = ("shell", "markup", "letters", "long", "unprintable escape")
 """Texts that every command gets; the others differ from these by what a file that is read may hold."""
 
 
+@pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", slow_but({"shell"}, EVERYWHERE))
 def test_every_command_with_names_and_files_of_a_text(command: Command, work: Path, kind: str) -> None:
     text, stem = TEXTS[kind], stem_of(TEXTS[kind])

@@ -33,22 +33,26 @@ def test_every_command_that_draws_has_the_options_of_the_look(vsacli, name):
         assert option in printed
 
 
+@pytest.mark.slow
 def test_the_ending_of_a_name_is_the_format(vsacli, feasible_result):
     assert vsacli("plot", feasible_result, "-o", "figures/run.svg").code == 0
     assert {path.suffix for path in Path("figures").iterdir()} == {".svg"}
     assert Path("figures/run-motion.svg").is_file()
 
 
+@pytest.mark.slow
 def test_a_single_figure_has_just_the_name(vsacli, feasible_result):
     assert vsacli("plot", feasible_result, "--variables", "tau_motor", "-o", "torque.pdf").code == 0
     assert [path.name for path in Path().iterdir()] == ["torque.pdf"]
 
 
+@pytest.mark.slow
 def test_a_run_draws_in_any_format(vsacli):
     assert vsacli("invdyn", ROBOT, REST_TO_REST, "--set", "rate=50", "--plot", "run.pdf").code == 0
     assert Path("run-motor-torque.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_paper_is_a_column_and_a_slide_is_16_to_9(vsacli, feasible_result):
     for style in ("paper", "slide"):
         ran = vsacli("plot", feasible_result, "--variables", "q", "--style", style, "-o", f"{style}.png")

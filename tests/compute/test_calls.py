@@ -167,6 +167,7 @@ def rows_of(kernel: InverseDynamics, samples: int) -> list[FloatArray]:
     )
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     ("joints", "frame"),
@@ -222,6 +223,7 @@ def test_links_of_a_long_chain_agree_with_numpy():
     assert (np.abs(found - expected) <= 1e-13 * np.abs(expected).max(axis=0)).all()
 
 
+@pytest.mark.slow
 def test_joints_with_other_constants_need_no_other_code():
     chain = random_chain(6)
 

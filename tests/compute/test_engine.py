@@ -116,6 +116,7 @@ def test_measured_springs_agree():
     assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 def test_other_branch_and_followed_deflections_agree():
     robot = one_joint(ALIKE, ALIKE)
@@ -143,6 +144,7 @@ def test_wrench_counts_in_either_frame(frame: str):
     assert not np.allclose(found.tau_e, compute_block(robot, demands(robot, SAMPLES)).tau_e)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 def test_robots_that_differ_in_a_limit_alone_are_told_apart():
     """Springs compare equal whatever their limits, for pairs of them to be alike."""

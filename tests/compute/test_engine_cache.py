@@ -64,6 +64,7 @@ def test_library_is_kept_and_found(folder: Path):
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     "damage", ["changed", slow("truncated"), slow("without checksum"), "without library"]
@@ -95,6 +96,7 @@ def test_folder_that_cannot_be_made(tmp_path: Path):
     assert warning.endswith("; compiled code is not kept")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_folder_that_others_may_write_to_is_not_trusted(folder: Path):
     warnings()
@@ -127,6 +129,7 @@ def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch):
         open_cache()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_full_disk_is_told_and_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch):
     def full(*_: object) -> None:
@@ -217,6 +220,7 @@ for number in range(60):
 """
 
 
+@pytest.mark.slow
 def test_processes_that_make_room_at_once(small: Path):
     command = [sys.executable, "-W", "error", "-c", CROWD, str(small)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -154,6 +154,7 @@ def test_link_torques_take_an_engine_that_was_chosen_before():
 # The command line
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
 def test_report_is_the_same_and_verbose_says_what_computes(vsacli, motion, command: str):
@@ -224,6 +225,7 @@ def test_without_a_folder_for_temporary_files(folder: str, monkeypatch: pytest.M
         choose("c", KERNEL, 1)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_cache_from_which_nothing_may_be_run(monkeypatch: pytest.MonkeyPatch, own_cache: Path):
     choose("c", KERNEL, 1)

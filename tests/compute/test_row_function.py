@@ -71,6 +71,7 @@ def test_rows_of_the_workspace_begin_at_whole_vectors_in_different_sets_of_a_cac
     assert [row.mean() for row in rows] == [0, 1, 0, 1, 0]  # none lies in another
 
 
+@pytest.mark.slow
 def test_a_kernel_with_loops_runs_as_it_is():
     robot = shipped_robot("measured_1r")
     kernel, rows = InverseDynamics(robot), demands(robot, 50)

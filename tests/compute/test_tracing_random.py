@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from samples.programs import carry_out, traced
@@ -65,6 +66,7 @@ def check(expression: Expression) -> None:
     np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.recursive(leaves([1.0, -1.0, 2.0, np.inf, np.nan, -3.5, -0.0]), larger, max_leaves=12))
 def test_random_expressions_keep_their_values(expression: Expression) -> None:

@@ -68,6 +68,7 @@ def self_test(name: str, folder: Path, *flags: str, compiler: str, precision: st
     return done.stdout
 
 
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("name", slow_but({"3R", "mixed", "sinh"}, ROBOTS))
 @pytest.mark.parametrize(
     "compiler", [pytest.param(name, marks=needs(name, name)) for name in ("gcc", "clang")]
@@ -85,12 +86,15 @@ def test_no_undefined_behavior(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
 
 
+@pytest.mark.cases(3)
 @needs_compiler
 @pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, compiler=COMPILERS[-1], precision="float") == "all values agree\n"
 
 
+@pytest.mark.slow
+@pytest.mark.cases(6)
 @needs_compiler
 @pytest.mark.parametrize("path", slow_but(["sliding_anchor_1r"], BUNDLED))
 @pytest.mark.parametrize("precision", slow_but(["float"], ["double", "float"]))
@@ -105,6 +109,7 @@ def test_every_bundled_robot_passes_its_own_test_in_both_precisions(
     assert (done.stdout, done.stderr) == ("all values agree\n", "")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_potential_in_single_precision_is_feasible_along_its_trajectory(tmp_path: Path) -> None:
     """Tolerances of the continuation lay below single precision: 908 of 1001 samples were infeasible."""
@@ -131,6 +136,7 @@ def test_no_number_changes_its_type_unsaid(name: str, precision: str, tmp_path: 
     compile_c(tmp_path, *STRICT, *flags, f"{prefix_of(ROBOTS[name])}.c")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_self_test_notices_a_wrong_number(tmp_path: Path) -> None:
     write_files(project("prismatic"), tmp_path)
@@ -250,6 +256,7 @@ def test_the_header_says_of_which_robot_and_by_which_vsacli() -> None:
     assert "ROBOT_SHA256" not in project("one joint").files[f"{prefix_of(ROBOTS['one joint'])}.h"]
 
 
+@pytest.mark.slow
 @needs("cmake", "cmake")
 def test_cmake_builds_the_library_and_its_test(tmp_path: Path) -> None:
     write_files(project("prismatic"), tmp_path)
@@ -348,6 +355,7 @@ def test_files_of_two_robots_do_not_go_together(tmp_path: Path) -> None:
         assert "this file and vsa_3r.h were not written together: generate both again" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit is not reached by any arm; the recursion of this one takes 4300, feedback 6300."""
     monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", 5800)

@@ -27,6 +27,8 @@ ROBOTS = {
 }
 
 
+@pytest.mark.slow
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["mixed", "cubic", slow("measured"), slow("chain")])
 @pytest.mark.parametrize("precision", ["double", slow("float")])
 def test_they_compute_the_same_bit_for_bit(

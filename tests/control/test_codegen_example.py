@@ -35,6 +35,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page_print_what_it_shows(folder: Path) -> None:
     (block,) = re.findall(r"^```console\n(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     lines = [line.removeprefix("$ ") for line in block.splitlines() if line.startswith("$ ")]
@@ -68,6 +69,7 @@ def final_error(folder: Path, source: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.slow
 def test_the_plant_of_the_example_is_that_of_the_tool(folder: Path) -> None:
     robot = load_robot(ROBOT)
     write_files(generate(robot), folder)

@@ -81,6 +81,7 @@ def close(found: Mapping[str, FloatArray], block: Block) -> None:
         np.testing.assert_allclose(values[there], expected[there], rtol=0, atol=atol, err_msg=name)
 
 
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but({"tendon"}, ROBOTS))
 def test_results_are_those_of_a_robot_with_these_numbers(name: str, tmp_path: Path) -> None:
@@ -107,6 +108,7 @@ def test_the_constant_holds_the_numbers_of_the_file(tmp_path: Path) -> None:
     assert module.NOMINAL_PARAMETERS.tolist() == tuple(each.value for each in chosen)
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("precision", ["double", "float"])
 def test_the_project_compiles_and_its_self_test_covers_two_sets(precision: str, tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ def with_device(name: str, gravity: float = -9.81) -> Robot:
     return replace(arm, gravity=(0.0, gravity, 0.0), joints=(joint,))
 
 
+@pytest.mark.cases(11)
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but(["variable_ratio, measured scale"], DEVICES))
 def test_every_mechanism_passes_its_own_test(name: str, tmp_path: Path) -> None:
@@ -63,6 +64,7 @@ def test_a_sine_passes_at_its_largest_torque(tmp_path: Path) -> None:
     assert self_test(overloaded, tmp_path) == "all values agree\n"
 
 
+@pytest.mark.cases(13)
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
@@ -75,6 +77,7 @@ def test_overloaded_mechanisms_pass_or_are_refused(name: str, tmp_path: Path) ->
     assert said == "all values agree\n" or re.search(REFUSED, said)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_what_is_refused_would_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     robot, _ = valid_run(DIFFERENCE)
@@ -153,6 +156,7 @@ def test_the_self_test_compares_every_bit() -> None:
     assert all(line.endswith(", 0.0);") for line in comparisons)
 
 
+@pytest.mark.slow
 def test_the_command_refuses_and_writes_nothing(vsacli: Callable[..., Outcome], tmp_path: Path) -> None:
     stiff = edited(
         REPOSITORY / "robots" / "sliding_anchor_1r.yaml",

@@ -87,6 +87,7 @@ def test_a_block_stops_and_stays():
     assert (dq[times > stop + 1e-9] == 0).all()  # at rest, not nearly so
 
 
+@pytest.mark.slow
 def test_a_block_is_held_until_the_force_is_too_large_and_slides_back():
     """A force that swings by more than the friction to one side alone, by the event times of the law."""
     mass, times = LINK_INERTIA + ROTOR, np.linspace(0, 4, 401)
@@ -143,6 +144,7 @@ def with_friction(robot: Robot, friction: Friction) -> Robot:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "friction", [SHARP, slow(Friction(coulomb=(3.0, 2.0), width=0.02))], ids=["sharp", "smooth"]
 )
@@ -170,6 +172,7 @@ def test_feedback_compensates_what_moves():
     np.testing.assert_allclose(past.q_error, plain.q_error, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_feedback_moves_a_block_only_if_the_error_demands_more_than_its_friction():
     """What slides is compensated, so that the error decays as without friction; what is held stays."""
     gains, poles, mass = Gains.from_poles([-20.0] * 2), [-20.0] * 2, LINK_INERTIA + ROTOR
@@ -196,6 +199,7 @@ def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():
     np.testing.assert_allclose(past.q, again.q, rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_held_torques_break_a_block_loose():
     """The controller acts at samples: what it asks for then may at once be more than friction can hold."""
     trajectory, gains = step_of(0.15, duration=0.5, rate=100), Gains.from_poles([-10.0] * 2)

@@ -118,6 +118,7 @@ def test_the_code_of_robots_that_differ_in_numbers_is_one():
         assert_agree(case, "c")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gains", [None, GAINS])
 def test_engines_find_the_same_motion(gains):
     conditions = {"gains": gains, "initial_error": InitialError(0.01 if gains else 0.0)}

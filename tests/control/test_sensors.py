@@ -95,6 +95,7 @@ def test_joints_without_springs_have_an_encoder_at_the_motor_too():
     assert not same.any()
 
 
+@pytest.mark.slow
 def test_perfect_sensors_change_nothing():
     conditions = {"gains": GAINS, "feedback": "positions"}
     plain = simulate(vsa_3r(), short_motion(3), **conditions).history
@@ -139,6 +140,7 @@ def test_sensors_that_cannot_be_are_refused(wrong, message):
         Sensors(**wrong)
 
 
+@pytest.mark.slow
 def test_a_recording_from_the_desk_is_as_far_off_as_its_noise(vsacli, tmp_path):
     arm, motion = REPOSITORY / "robots/planar_2r.yaml", REPOSITORY / "trajectories/planar_2r.yaml"
     assert vsacli("invdyn", arm, motion, "-o", tmp_path / "plan.h5").code == 0

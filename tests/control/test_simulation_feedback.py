@@ -63,6 +63,7 @@ def test_errors_obey_the_linear_dynamics(case):
     check_errors(robot, robot, trajectory, stiffness_error, np.ones(len(robot.joints), dtype=bool))
 
 
+@pytest.mark.slow
 def test_errors_obey_the_linear_dynamics_with_elastic_joints_among_others():
     check_errors(*mixed_3r(), short_motion(3), 20.0, np.array([True, False, True]))
 
@@ -81,6 +82,7 @@ def check_errors(robot, paired, trajectory, stiffness_error, has_stiffness):
     assert np.array_equal(fixed, np.full_like(fixed, 1200.0))
 
 
+@pytest.mark.slow
 def test_integral_action_adds_its_pole():
     position, stiffness = [*POSITION_POLES, -9], [*STIFFNESS_POLES, -11]
     past, _ = linearized_run(

@@ -67,6 +67,7 @@ def test_an_error_at_the_start_is_kept_open_loop():
     assert simulation.report.complete
 
 
+@pytest.mark.slow
 def test_the_course_does_not_depend_on_the_model_of_a_perfect_controller():
     robot, trajectory = vsa_3r(), short_motion(3)
     assert perturbed(robot, 0.0, seed=3) == robot

@@ -84,6 +84,7 @@ def test_stamps_since_1970_do_as_well_as_those_from_zero():
     np.testing.assert_allclose(late.history.q, zero.history.q, rtol=0, atol=4e-7)
 
 
+@pytest.mark.slow
 def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     """The stiffness is driven to 805, below what the loaded joints can have."""
     trajectory = motion((850.0,) * 3, (805.0,) * 3)

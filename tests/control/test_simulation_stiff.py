@@ -92,6 +92,7 @@ def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-7, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_controllers_with_encoders_can_be_stiff(monkeypatch):
     conditions = {"gains": GAINS, "feedback": "positions"}
     trajectory = short_motion(3, rate=100, duration=0.2)

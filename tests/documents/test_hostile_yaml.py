@@ -168,6 +168,7 @@ def problems_of(load, name):
     return ()
 
 
+@pytest.mark.slow
 @fuzz(150)
 @given(st.binary(max_size=300) | damaged(EXAMPLE, YAML).map(str.encode))
 def test_any_robot_is_read_or_refused(content):
@@ -175,6 +176,7 @@ def test_any_robot_is_read_or_refused(content):
     assert all(problem.file == "fuzz.yaml" for problem in problems_of(load_robot, "fuzz.yaml"))
 
 
+@pytest.mark.slow
 @fuzz(150)
 @given(damaged(TRAJECTORY, YAML).map(str.encode))
 def test_any_trajectory_is_read_or_refused(content):

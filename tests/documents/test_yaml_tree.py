@@ -124,6 +124,7 @@ def test_nesting_through_aliases_counts():
     ]
 
 
+@pytest.mark.slow
 def test_number_of_nodes_up_to_the_limit():
     assert len(parse("- 1\n" * (MAX_NODES - 1)).items) == MAX_NODES - 1
     (message,) = messages("- 1\n" * MAX_NODES)

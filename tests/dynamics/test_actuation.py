@@ -94,6 +94,7 @@ def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> I
         )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("case", slow_but({"3R", "R-P"}, CASES))
 def test_motors_do_what_a_scalar_recomputation_says(case: str):
     robot, trajectory = CASES[case]()

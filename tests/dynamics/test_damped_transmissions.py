@@ -150,6 +150,7 @@ def test_two_starts_approach_each_other_as_fast_as_the_slope_says() -> None:
     np.testing.assert_allclose(rate, (sigma**2 + 4 * torque**2) / (sigma * damping), rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_little_damping_tends_to_none(name: str) -> None:
     """Linearly in d, far from the start and its motion that dies away."""
@@ -221,6 +222,7 @@ def test_it_starts_where_the_robot_says() -> None:
     np.testing.assert_allclose(result.phi[-1, 0], at_rest.phi[-1, 0], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_beyond_the_largest_torque_it_is_unstable() -> None:
     """Sides that differ have a largest torque at a stiffness; it starts beyond, and comes back at once."""
     springs = Cubic(k=30, k_c=100), Cubic(k=30, k_c=900)

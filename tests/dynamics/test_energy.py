@@ -221,6 +221,7 @@ def test_what_is_spent_less_what_is_recovered_is_the_work():
         assert joint.energy.spent == pytest.approx(spent, rel=1e-5)  # the trapezoidal rule at 1 kHz
 
 
+@pytest.mark.slow
 def test_nothing_depends_on_the_blocks():
     robot = mixed("RPR", seed=5)
     regular = short_motion(3, rate=100, stiffness=(1900, 2100))

@@ -139,6 +139,7 @@ DRIVES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kinds",
     [("antagonistic", "elastic", "rigid"), slow(("rigid", "antagonistic", "elastic"))],

@@ -78,6 +78,7 @@ def test_integration_stays_at_the_root(case: str):
     assert result.report.verdict == "ok"
 
 
+@pytest.mark.slow
 def test_corridor_is_that_of_the_root():
     crossing = inverse_dynamics(ARM, softening(), deflection_solver=softened())
     root = inverse_dynamics(ARM, softening())

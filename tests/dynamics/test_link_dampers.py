@@ -45,6 +45,7 @@ def arm() -> Robot:
     return robot_of(ARM, list(ACTUATORS), DAMPERS)
 
 
+@pytest.mark.slow
 def test_the_full_model_follows() -> None:
     def pair(q: Any, *theta: Any) -> Any:
         return sum(200 * (x - q) ** 2 + 500 * (x - q) ** 4 for x in theta)

@@ -78,6 +78,7 @@ def drawn(robot, trajectory, time):
     return {name: np.std(getattr(block, name), axis=0) for name in COMPUTED}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "exerted"), [(vsa_3r(), False), (mixed(), False), (mixed(), True)], ids=["3r", "mixed", "push"]
 )
@@ -109,6 +110,7 @@ def test_what_is_given_has_no_deviation_and_counts_as_exact():
     assert (found["tau_e"][:, 1:] > 0).all()
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_what_depends_on_a_component_that_is_not_determined():
     trajectory = blurred(3)
     unknown = trajectory.commanded["stiffness"].covariances.copy()
@@ -131,6 +133,7 @@ def test_nothing_is_said_of_what_depends_on_a_component_that_is_not_determined()
     assert np.isfinite(found["q"][:, :2]).all()
 
 
+@pytest.mark.slow
 def test_near_the_end_of_the_corridor_the_side_counts_that_exists():
     # 800 N m/rad are the least that the base can have, and its stiffness has a deviation of about 0.5
     found = Uncertainty(vsa_3r(), blurred(3, stiffness=850.2)).at(np.linspace(*SPAN, 200))
@@ -152,6 +155,7 @@ def test_between_the_times_at_which_they_are_computed_deviations_are_linear(monk
         assert (np.abs(coarse[name] - found[name]) < 5e-3 * size).all(), name
 
 
+@pytest.mark.slow
 def test_every_variable_that_may_have_a_deviation_gets_one():
     found = Uncertainty(vsa_3r(), blurred(3, exerted=True)).at(TIMES)
     assert set(found) == {*(name for name in UNCERTAIN if vsa_3r().has(VARIABLES[name])), MARGIN}

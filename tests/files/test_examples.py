@@ -49,6 +49,7 @@ def test_example_says_where_its_numbers_come_from(example: Example):
     assert example.robot.description
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("example", "trajectory"),
     [run if run[0].name in QUICK else slow(*run) for run in RUNS],

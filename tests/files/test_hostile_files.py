@@ -57,24 +57,28 @@ def look_at(name: str, text: str) -> None:
     assert render(description)
 
 
+@pytest.mark.slow
 @fuzz(60)
 @given(damaged(RECORDING, CSV) | damaged(NUMBERED, CSV))
 def test_any_recording(text: str) -> None:
     look_at("motion.csv", text)
 
 
+@pytest.mark.slow
 @fuzz(60)
 @given(damaged(SPRING, CSV))
 def test_any_spring_table(text: str) -> None:
     look_at("spring.csv", text)
 
 
+@pytest.mark.slow
 @fuzz(60)
 @given(damaged(POLES, YAML))
 def test_any_poles(text: str) -> None:
     look_at("poles.yaml", text)
 
 
+@pytest.mark.slow
 @fuzz(60)
 @given(st.data())
 def test_any_trajectory_that_comes_along(data: Any) -> None:
@@ -83,6 +87,7 @@ def test_any_trajectory_that_comes_along(data: Any) -> None:
     look_at("move.yaml", data.draw(damaged(few, YAML)))
 
 
+@pytest.mark.slow
 @fuzz(100)
 @given(damaged(URDF, XML))
 def test_any_urdf(text: str) -> None:

@@ -236,6 +236,7 @@ def test_result_on_the_command_line(vsacli: Any, feasible_result: Path) -> None:
     assert vsacli("info", feasible_result, "--field", "report.joints.elbow.samples.infeasible").out == "0\n"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("end_stiffness", [1275, 790], ids=["feasible", "infeasible"])
 @pytest.mark.parametrize("options", ["", slow("--deflection-solver ode"), "--stop-on-infeasible"])
 def test_a_result_ends_with_what_invdyn_printed(

@@ -145,6 +145,7 @@ def test_a_trajectory_by_its_names_is_told_as_one(vsacli: Command, tmp_path: Pat
     assert json.loads(vsacli("info", "log.csv", "--json").out)["kind"] == "recording"
 
 
+@pytest.mark.slow
 def test_more_columns_than_are_read_at_a_time(tmp_path: Path) -> None:
     time, q = signal(200)
     described = recording(tmp_path, table(time, **{f"j{index}_pos": q for index in range(40)}))

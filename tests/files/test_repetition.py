@@ -54,6 +54,7 @@ def test_a_result_is_computed_again_bit_for_bit(vsacli: Any, run: str) -> None:
     assert (done.code, done.out.splitlines()[-1]) == (0, "r.h5: computed again, equal bit for bit")
 
 
+@pytest.mark.slow
 def test_its_inputs_may_have_gone(vsacli: Any, elsewhere: Path) -> None:
     """Large ones, too: all are in the result, and where they stand to each other."""
     assert vsacli("invdyn", "arms/arm.yaml", "arms/move.yaml", "-o", "r.h5", "-q").code == 0
@@ -90,6 +91,7 @@ def test_a_result_is_known_by_what_it_holds(vsacli: Any) -> None:
     assert (done.code, done.out) == (0, "result: computed again, equal bit for bit\n")
 
 
+@pytest.mark.slow
 def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert vsacli("invdyn", ROBOT, REST_TO_REST, "--engine", "numpy", "-o", "r.h5", "-q").code == 0
     with StoredResult.open("r.h5") as result:
@@ -104,6 +106,7 @@ def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert "engine: numpy" in vsacli("info", "r.h5").out.splitlines()
 
 
+@pytest.mark.slow
 def test_what_a_result_does_not_hold(vsacli: Any, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inputs, "LARGEST_STORED", 1000)
     assert vsacli("invdyn", "arms/arm.yaml", "arms/move.yaml", "-o", "r.h5", "-q").code == 0

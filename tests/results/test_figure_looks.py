@@ -133,6 +133,8 @@ def test_in_a_paper_every_figure_has_the_width_and_legible_texts_that_stay_apart
             assert collisions(figure) == [], name
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_on_a_slide_every_figure_has_the_size_and_texts_that_stay_apart(files: Path) -> None:
     with drawing_with(SLIDE):
         for name, figure in every_figure(files):
@@ -141,6 +143,8 @@ def test_on_a_slide_every_figure_has_the_size_and_texts_that_stay_apart(files: P
             assert collisions(figure) == [], name
 
 
+@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [6.0, 12.0, 18.3])
 def test_other_widths_are_kept(width: float) -> None:
     with drawing_with(replace(PAPER, width=width)):
@@ -155,6 +159,7 @@ def test_the_usual_look_leaves_figures_as_declared() -> None:
     assert drawn(sheet).get_size_inches() == pytest.approx(sheet.size)
 
 
+@pytest.mark.slow
 def test_a_font_size_alone_scales_a_figure() -> None:
     sheet = simulated(3)
     with drawing_with(Look(font_size=15.0)):
@@ -189,6 +194,7 @@ def side_by_side(figure: Figure) -> int:
     return len({round(x) for x, _ in places(figure).values()})
 
 
+@pytest.mark.slow
 def test_many_joints_fold_into_as_many_columns_as_fit() -> None:
     sheet = simulated(8)
     assert side_by_side(drawn(sheet)) == 4
@@ -198,6 +204,7 @@ def test_many_joints_fold_into_as_many_columns_as_fit() -> None:
     assert len(figure.axes) == 16
 
 
+@pytest.mark.slow
 def test_a_difference_stays_below_its_curves() -> None:
     with drawing_with(replace(PAPER, width=5.0)):
         figure = drawn(simulated(2, columns=3, rows=2))
@@ -220,6 +227,7 @@ def test_rows_that_are_too_wide_are_divided_after_their_first_panels() -> None:
     assert second[1] == pytest.approx(third[1])
 
 
+@pytest.mark.slow
 def test_figures_higher_than_a_page_have_more_panels_side_by_side() -> None:
     sheet = simulated(12, most_rows=12)
     with drawing_with(replace(PAPER, width=18.3)):
@@ -228,6 +236,7 @@ def test_figures_higher_than_a_page_have_more_panels_side_by_side() -> None:
     assert figure.get_figheight() * CM < 24
 
 
+@pytest.mark.slow
 def test_a_slide_has_the_arrangement_with_the_largest_font() -> None:
     with drawing_with(SLIDE):
         figure = drawn(simulated(7))

@@ -86,6 +86,7 @@ def small_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "r.h5"
 
 
+@pytest.mark.slow
 def test_any_bytes_are_read_or_refused(small_result: Path, tmp_path: Path) -> None:
     content, random_numbers = small_result.read_bytes(), random.Random(1)
     for case in range(CASES):

@@ -34,6 +34,7 @@ def curves_with_gaps(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
     return time, values
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(curves_with_gaps())
 def test_reduction_keeps_the_extremes_of_every_column(curve: tuple[np.ndarray, np.ndarray]) -> None:

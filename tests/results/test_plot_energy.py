@@ -39,6 +39,7 @@ def test_every_joint_has_its_energy_and_every_motor_its_work():
             np.testing.assert_array_equal(curves[label][joint], result.read("motor_energy")[:, joint, side])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("actuators", "labels"),
     [

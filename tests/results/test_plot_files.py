@@ -23,6 +23,7 @@ def motion() -> dict[str, Figure]:
     return {"motion": plot_stored(rest_to_rest())["motion"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file_format", slow_but({"png"}, FORMATS))
 def test_equal_results_give_equal_files(file_format: str, tmp_path: Path) -> None:
     first = save_figures(motion(), tmp_path / "first", "run", file_format)
@@ -54,6 +55,7 @@ def test_a_folder_that_is_a_file_is_a_storage_error(tmp_path: Path) -> None:
         save_figures({"a": Figure((1, 1))}, tmp_path / "file", "run")
 
 
+@pytest.mark.slow
 def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     with StoredResult.open(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
         figures = plot_stored(result)
@@ -64,6 +66,7 @@ def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     assert sum(title.startswith("minus the first, rms") for title in titles) == len(titles) / 2
 
 
+@pytest.mark.slow
 def test_no_display_is_needed() -> None:
     program = "import sys, vsacli.results.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -55,6 +56,7 @@ def test_strips_lie_below_all_curves() -> None:
     assert low + top * (high - low) < result.read("tau_e").min()
 
 
+@pytest.mark.slow
 def test_a_comparison_marks_failures_by_file() -> None:
     failing = rest_to_rest(401, path="b.h5")
     failing.read("flags")[100:151, 0] = Flag.INFEASIBLE
@@ -83,6 +85,7 @@ def _texts(figure: Figure) -> list[str]:
     return [text.get_text().replace("\n", " ") for text in figure.axes[0].texts]
 
 
+@pytest.mark.slow
 def test_folded_rows_of_different_length_stay_evenly_apart() -> None:
     figure = plot_stored(rest_to_rest(101, "R" * 7))["motion"]
     FigureCanvasAgg(figure).draw()
@@ -91,6 +94,7 @@ def test_folded_rows_of_different_length_stay_evenly_apart() -> None:
     np.testing.assert_allclose(np.diff(tops), np.diff(tops)[0], atol=0.005)  # rounded, and of a figure of 1
 
 
+@pytest.mark.slow
 def test_figures_of_a_simulation_say_controller_and_model_error(vsacli: Callable) -> None:
     arm, motion = (REPOSITORY / folder / "planar_2r.yaml" for folder in ("robots", "trajectories"))
     ran = vsacli("simulate", arm, motion, "--set", "rate=50", "--perturb", "5%", "-o", "sim.h5")

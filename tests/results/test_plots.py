@@ -64,6 +64,7 @@ def test_infeasible_steps_get_gray_bands_in_the_panels_that_show_the_joint() -> 
     assert red == green == blue < 0.9
 
 
+@pytest.mark.slow
 def test_a_single_infeasible_step_of_a_million_is_visible() -> None:
     result = rest_to_rest(100_001)
     result.read("flags")[50_000, 0] = 1
@@ -127,6 +128,7 @@ def test_a_step_alone_between_gaps_is_a_dot() -> None:
         np.testing.assert_array_equal(dot.get_xydata(), [[1.05, 7.0]])
 
 
+@pytest.mark.slow
 def test_a_run_of_one_step_can_be_drawn(tmp_path: Path) -> None:
     result = rest_to_rest(401)
     result.time = result.time[:1]
@@ -169,6 +171,7 @@ def test_title_and_legend_name_robot_trajectory_and_joints() -> None:
     assert legend_labels(figures["motion"])[4:] == ["attainable", "infeasible"]
 
 
+@pytest.mark.slow
 def test_a_name_that_robot_and_trajectory_share_stands_once() -> None:
     result = rest_to_rest()
     result.trajectory_name = result.robot_name
@@ -191,6 +194,7 @@ def test_revolute_and_prismatic_joints_get_axes_of_their_own() -> None:
     assert stiffness == 2 * [r"$\sigma$ [N m/rad]", r"$\sigma$ [N/m]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [1, 7, slow(20)])
 def test_many_joints_stay_apart(joints: int, tmp_path: Path) -> None:
     figures = plot_stored(rest_to_rest(types="R" * joints))
@@ -205,6 +209,7 @@ def test_many_joints_stay_apart(joints: int, tmp_path: Path) -> None:
     assert legend.get_window_extent().y1 <= min(axes.bbox.y0 for axes in panels(figures["motion"]))
 
 
+@pytest.mark.slow
 def test_names_are_taken_literally_and_cut(tmp_path: Path) -> None:
     result = rest_to_rest()
     result.trajectory_name = r"$\frac{$ " + 200 * "x"

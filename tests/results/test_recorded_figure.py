@@ -80,6 +80,7 @@ def test_a_spline_through_all_samples_has_no_band_and_no_residual() -> None:
     assert not spectrum.patches
 
 
+@pytest.mark.slow
 def test_a_joint_at_rest_is_said_to_be_so() -> None:
     nothing = Spectrum(FREQUENCIES, np.zeros(50), np.zeros(50), 1e-18, np.nan, np.nan)
     still = Curve(TIME, np.full(400, 0.3))
@@ -89,6 +90,7 @@ def test_a_joint_at_rest_is_said_to_be_so() -> None:
     assert signal.get_ylim() == pytest.approx((0.27, 0.33))
 
 
+@pytest.mark.slow
 def test_many_joints_begin_again_beside_the_first() -> None:
     figure = recorded_figure([curve(f"j{number}.q") for number in range(15)], "log")
     assert len(figure.axes) == 60

@@ -63,6 +63,7 @@ def test_an_unknown_precision(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_verdicts_near_thresholds_do_not_depend_on_it(tmp_path: Path) -> None:
     """The last step is 2e-9 of the stiffness below the corridor, of which single precision sees nothing."""
     arm = load_robot(ROBOT)
@@ -89,6 +90,7 @@ def stored(vsacli: Any, motion: Path) -> None:
     assert done.code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stored")
 def test_the_commands_read_it(vsacli: Any) -> None:
     assert "values stored in single precision" in vsacli("info", "r.h5").out.splitlines()

@@ -181,6 +181,7 @@ def test_chunks_hold_about_half_a_megabyte_or_less(tmp_path, joints, samples):
             assert chunks * file[name].chunks[0] - samples < chunks
 
 
+@pytest.mark.slow
 def test_xarray_opens_it_with_named_coordinates_and_no_warning(path, block):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -201,6 +202,7 @@ def test_xarray_opens_single_precision(tmp_path, block):
         np.testing.assert_array_equal(data.theta, block.theta.astype(np.float32), strict=True)
 
 
+@pytest.mark.slow
 def test_xarray_opens_the_groups_too(path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

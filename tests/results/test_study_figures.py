@@ -62,6 +62,7 @@ def table(path: Path) -> Iterator[StoredStudy]:
         yield opened
 
 
+@pytest.mark.slow
 def test_the_front_has_the_runs_of_which_none_is_better_in_both(table: StoredStudy) -> None:
     points = StudyPoints(table)
     assert points.cost is not None
@@ -76,6 +77,7 @@ def test_the_front_has_the_runs_of_which_none_is_better_in_both(table: StoredStu
     assert set(points.worst) == set(np.argsort(points.margin)[:3])
 
 
+@pytest.mark.slow
 def test_two_numbers_on_a_grid_are_a_map(table: StoredStudy) -> None:
     """Each value of the margin stands at its two numbers."""
     figures = study_figures(table)
@@ -116,6 +118,7 @@ def test_a_grid_has_no_intervals(table: StoredStudy) -> None:
     assert not figure.axes[0].get_title(loc="left")
 
 
+@pytest.mark.slow
 def test_random_draws_have_intervals_with_a_mark_in_the_legend(drawn: StoredStudy) -> None:
     figure = study_figures(drawn)["feasibility"]
     share, label = texts(figure)

@@ -121,6 +121,7 @@ def test_an_arm_whose_side_branches_are_held_anywhere(name, base, tip):
     check(BY_NAME[name], import_urdf(BY_NAME[name], base, tip, hold=held), held)
 
 
+@pytest.mark.cases(9)
 @pytest.mark.parametrize(("name", "base", "tip"), CHAINS)
 def test_an_arm_can_execute_its_new_trajectory(name, base, tip, tmp_path):
     """Its placeholders carry it, in the report's words: nothing is infeasible, singular or over a limit."""

@@ -16,21 +16,16 @@ def slow(*values: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
-def slow_but(quick: Collection[Any], cases: Iterable[Any], most: int | None = None) -> list[Any]:
-    """All cases, of which only some are quick.
-
-    Of the others `most` are slow, spread over them, and the rest exhaustive; without `most` all are slow.
-    """
+def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
+    """All cases, of which only some are quick."""
     whole = list(cases)
     assert set(quick) <= set(whole)
-    rest = [case for case in whole if case not in quick]
-    count = len(rest) if most is None else min(most, len(rest))
-    chosen = [rest[place * len(rest) // count] for place in range(count)]
-    exhaustive = [pytest.mark.slow, pytest.mark.exhaustive]
-    return [
-        case if case in quick else slow(case) if case in chosen else pytest.param(case, marks=exhaustive)
-        for case in whole
-    ]
+    return [case if case in quick else slow(case) for case in whole]
+
+
+def spread(items: list[Any], count: int) -> list[Any]:
+    """As many items as are asked for, at equal distances."""
+    return [items[place * len(items) // count] for place in range(min(count, len(items)))]
 
 
 def needs(command: str, package: str) -> Any:

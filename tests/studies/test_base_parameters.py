@@ -67,6 +67,7 @@ def test_standard_parameters_of_a_link_and_back() -> None:
     assert again.inertia.tensor == pytest.approx(link.inertia.tensor, abs=1e-14)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("name", "count"),
     [
@@ -82,6 +83,7 @@ def test_number_of_base_parameters(name: str, count: int) -> None:
     assert len(base_parameters(shipped_robot(name)).kept) == count
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("types", TYPES)
 def test_base_parameters_are_all_that_torques_tell(types: str) -> None:
     """As many as the rank of Pinocchio's regressor, and any change that leaves them leaves the torques."""

@@ -65,6 +65,7 @@ def test_cost_decides_what_is_changed():
     assert hasty.changes.keys() == {0, 1}
 
 
+@pytest.mark.slow
 def test_pointwise_change_is_smaller_than_a_constant():
     assert search(form=least_change).smallest().size < search().smallest().size
 
@@ -78,6 +79,7 @@ def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
     assert found.changes.keys() == {1}
 
 
+@pytest.mark.slow
 def test_too_fast_and_slightly_too_soft_takes_both():
     robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
     found = fixes(robot, rest_to_rest(1.0, 810.0))

@@ -90,6 +90,7 @@ def test_a_random_recording_is_compared_as_it_was_made(found: Callable[[int], Fo
     check(*found(seed))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_random_recordings_are_compared_as_they_were_made(found: Callable[[int], Found]) -> None:
     sizes, faults = [], 0

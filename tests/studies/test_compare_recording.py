@@ -59,6 +59,7 @@ def written(path, columns):
     return path
 
 
+@pytest.mark.slow
 def test_figures_of_known_errors_come_out(computed, tmp_path):
     columns = recorded(computed)
     noise = np.random.default_rng(3).standard_normal(len(columns["time"]))
@@ -75,6 +76,7 @@ def test_figures_of_known_errors_come_out(computed, tmp_path):
     assert signals["elbow.tau_motor_1"].offset == pytest.approx(2, abs=0.2)
 
 
+@pytest.mark.slow
 def test_a_signal_that_lags_behind_the_others_is_told(computed, tmp_path):
     columns = recorded(computed)
     columns["base.tau_motor_2"] = recorded(computed, delay=0.006)["base.tau_motor_2"]
@@ -110,6 +112,7 @@ SLIPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sentence", SLIPS)
 def test_slips_are_named(computed, tmp_path, sentence):
     columns = recorded(computed)
@@ -128,6 +131,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_column_moves_neither_the_alignment_nor_the_others(computed, tmp_path, wrong):
     columns = recorded(computed)
@@ -151,6 +155,7 @@ def test_a_wrong_column_moves_neither_the_alignment_nor_the_others(computed, tmp
             assert abs(signal.lag) <= 4 * signal.lag_error
 
 
+@pytest.mark.slow
 def test_exchanged_columns_are_found_though_one_lacks_rows(computed, tmp_path):
     columns = recorded(computed)
     swapped = columns["base.theta_1"], columns["elbow.theta_1"]
@@ -167,6 +172,7 @@ def test_exchanged_columns_are_found_though_one_lacks_rows(computed, tmp_path):
     assert follows == {"base.theta_1": "elbow.theta_1", "elbow.theta_1": "base.theta_1"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [["--json"], ["--plot", "figures"], ["--plot", "p", "--format", "html"]]
 )
@@ -233,6 +239,7 @@ def test_other_times_of_a_periodic_motion_are_listed(vsacli, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_what_agrees(computed, tmp_path):
     assert compare(tmp_path / "r.h5", written(tmp_path / "m.csv", recorded(computed))).notes == ()
 
@@ -265,6 +272,7 @@ def test_currents_are_compared(vsacli, tmp_path):
     assert found["base.current_2"].unit == "A"
 
 
+@pytest.mark.slow
 def test_report_figures_and_json(vsacli, computed, tmp_path):
     written(tmp_path / "m.csv", recorded(computed))
     done = vsacli("compare", "r.h5", "m.csv", "--plot", "figures")
@@ -369,6 +377,7 @@ def test_mistaken_units_and_signs_are_no_other_robot(computed, tmp_path):
     assert "base.q looks as if it is in degrees" in " ".join(found.notes)
 
 
+@pytest.mark.slow
 def test_joints_that_the_result_does_not_have_are_reported_unless_ignored(vsacli, computed, tmp_path):
     columns = recorded(computed)
     columns = {name.replace("elbow.", "wrist."): values for name, values in columns.items()}

@@ -29,6 +29,7 @@ def compared(run, result, recording):
     return {signal["column"]: signal for signal in report["signals"]}, report["notes"]
 
 
+@pytest.mark.slow
 def test_a_default_export_is_compared_with_its_plan(simulated):
     assert simulated("export", "lab.h5", "-o", "m.csv").code == 0
     signals, _ = compared(simulated, "plan.h5", "m.csv")
@@ -40,6 +41,7 @@ def test_a_default_export_is_compared_with_its_plan(simulated):
     assert signals["shoulder.q"]["rms"] > OFF
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("result", ["plan.h5", "lab.h5"])
 def test_what_sensors_read_goes_before_the_simulated_value_and_the_command(simulated, result):
     names = "q,q_ref,q_measured,tau_motor_cmd"
@@ -59,6 +61,7 @@ def test_what_sensors_read_goes_before_the_simulated_value_and_the_command(simul
     ]
 
 
+@pytest.mark.slow
 def test_commands_alone_are_nothing_to_compare(simulated):
     assert simulated("export", "lab.h5", "--variables", "q_ref", "-o", "m.csv").code == 0
     outcome = simulated("compare", "plan.h5", "m.csv")
@@ -69,6 +72,7 @@ def test_commands_alone_are_nothing_to_compare(simulated):
     )
 
 
+@pytest.mark.slow
 def test_a_simulation_says_what_happened_not_what_was_commanded(simulated):
     """A recorded q of the plan is off by as much as the simulated arm was, and that of the arm is not."""
     for file in ("plan", "lab"):
@@ -80,6 +84,7 @@ def test_a_simulation_says_what_happened_not_what_was_commanded(simulated):
     assert arm["shoulder.q"]["rms"] < 1e-12  # numbers are printed with all digits
 
 
+@pytest.mark.slow
 def test_the_report_names_the_variable(simulated):
     assert simulated("export", "lab.h5", "--variables", "q_measured", "-o", "m.csv").code == 0
     lines = simulated("compare", "plan.h5", "m.csv").out.splitlines()

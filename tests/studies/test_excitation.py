@@ -45,6 +45,7 @@ def _planned(_short_searches: None) -> Excitation:
     return plan_excitation(shipped_robot("rp_2"), duration=5)
 
 
+@pytest.mark.slow
 def test_it_keeps_a_margin_from_every_limit_between_steps_as_well(planned: Excitation) -> None:
     assert planned.report.verdict == "ok"
     time = np.linspace(0, 5, 3501)  # no multiple of the steps
@@ -148,6 +149,7 @@ def test_beside_the_users_own_motion_it_says_how_much_more_it_tells() -> None:
     assert "motion given" in str(found)
 
 
+@pytest.mark.slow
 def test_what_a_robot_has_no_limit_of_is_said_with_what_was_assumed() -> None:
     found = plan_excitation(shipped_robot("measured_1r"), duration=10)
     assert found.assumptions == (

@@ -63,6 +63,7 @@ def _short_searches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fisher, "RECORDS", 1)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_planned_moved_and_recorded_tells_springs_and_motors(
@@ -91,6 +92,7 @@ def test_what_is_planned_moved_and_recorded_tells_springs_and_motors(
 SEEDS = 20
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_numbers_scatter_by_what_was_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty records with noise of their own. Numbers that are held at zero half of the time do not count."""

@@ -41,11 +41,13 @@ def structure(told: Identification) -> list[str]:
     return [note for note in told.notes if "what is left" in note or "times those of the file" in note]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + 2))
 def test_nothing_is_said_of_records_whose_equations_hold(seed: int, tmp_path: Path) -> None:
     assert structure(found(seed, None, tmp_path)) == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_false_alarms_are_rare(tmp_path: Path) -> None:
     """Of 60 records one may be named by accident: 15 causes with a chance of 1e-4 each make 0.1 in 60."""
@@ -55,6 +57,7 @@ def test_false_alarms_are_rare(tmp_path: Path) -> None:
     assert np.mean([number.changed for number in numbers]) < 0.015  # 0.006 by Student's t of 24 cosines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", WORDS)
 def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> None:
     told = found(FIRST + 3, plant, tmp_path)
@@ -62,6 +65,7 @@ def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> No
     assert any(re.search(WORDS[plant], note) for note in told.notes), told.notes
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", WORDS)
 def test_most_are_named(plant: str, tmp_path: Path) -> None:
@@ -71,6 +75,7 @@ def test_most_are_named(plant: str, tmp_path: Path) -> None:
     assert sum(named) >= 9
 
 
+@pytest.mark.slow
 def test_damping_without_its_quadratic_part_is_told(tmp_path: Path) -> None:
     """It was 3 times too large with an error of 2 %; what it would be is told, and right."""
     case = random_case(FIRST + 3)
@@ -88,6 +93,7 @@ def test_damping_without_its_quadratic_part_is_told(tmp_path: Path) -> None:
 ARM = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by_gain", [True, False])
 def test_the_links_tell_a_gain_from_springs_and_rotors_that_differ(by_gain: bool, tmp_path: Path) -> None:
     arm = shipped_robot("vsa_3r")
@@ -108,6 +114,7 @@ def test_the_links_tell_a_gain_from_springs_and_rotors_that_differ(by_gain: bool
     assert note.endswith(end)
 
 
+@pytest.mark.slow
 def test_the_chance_of_an_effect_is_uniform_where_there_is_none() -> None:
     """By random equations with white noise: of 400 a share of 0.1 +- 0.015 lies below a tenth."""
     random, rows = np.random.default_rng(FIRST), 300

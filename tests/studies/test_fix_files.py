@@ -46,6 +46,7 @@ def test_slower_and_stiffer_formulas_stay_formulas(tmp_path: Path, name: str) ->
     np.testing.assert_array_equal(stiffness, [[0.0, 12.5, 0.0]])
 
 
+@pytest.mark.slow
 def test_slower_recordings_have_scaled_derivatives_and_wrench(tmp_path: Path) -> None:
     robot, declared = load_robot(ROBOT), shipped("vsa_3r_pick_and_place")
     motion = declared.block(0, declared.samples)

@@ -128,6 +128,7 @@ def check_written(paths, written, fix, joints):
     assert fine_joints(robot, finely(trajectory))[joints].all(), fix["text"]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", slow_but(QUICK, (*INFEASIBLE, *FURTHER)))
 def test_every_fix_works_and_none_is_missed(tmp_path, vsacli, seed):
     paths = random_task(np.random.default_rng(seed), tmp_path)

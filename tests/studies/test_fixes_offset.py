@@ -60,6 +60,7 @@ def peak_load(robot, trajectory):
     return np.abs(block.tau_e).max(axis=0)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (0.5, 850.0), (0.3, 850.0)])
 def test_offset_reaches_the_closed_bound(duration, stiffness):
@@ -71,12 +72,14 @@ def test_offset_reaches_the_closed_bound(duration, stiffness):
     assert (found > 0).tolist() == (needed > 0).tolist()
 
 
+@pytest.mark.slow
 def test_only_the_joint_in_trouble_is_changed():
     found = offsets(vsa_3r(), rest_to_rest(4.0, (850.0, 820.0, 850.0)))
     assert found["shoulder"] > 0
     assert found["base"] == found["elbow"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "limits", "expected"),
     [(950.0, (0.0, 900.0), -50.0), (850.0, (871.25, 2000.0), 21.25), (850.0, (900.0, 900.0), 50.0)],
@@ -86,6 +89,7 @@ def test_stiffness_limit_is_met_exactly(stiffness, limits, expected):
     assert offsets(robot, rest_to_rest(4.0, (850.0, stiffness, 850.0)))["shoulder"] == expected
 
 
+@pytest.mark.slow
 def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
     limit = 0.1
     robot = changed(0, robot=pendulum(), spring=(dataclasses.replace(CUBIC, max_deflection=limit),) * 2)
@@ -97,6 +101,7 @@ def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
     assert offsets(robot, still)["swing"] == pytest.approx(ceiling - 950.0, abs=UNIT)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("motor", "duration"),
@@ -132,6 +137,7 @@ def test_steps_between_the_watched_ones_count():
     assert not accepted(robot, trajectory, MARGIN)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "spring",
@@ -151,6 +157,7 @@ def test_other_springs(spring):
         assert accepted(robot, rest_to_rest(0.4, values), MARGIN) is expected
 
 
+@pytest.mark.slow
 def test_prismatic_joint_has_its_unit():
     found = fixes(pendulum(letter="P"), rest_to_rest(1.0, 800.0, start=(0.0,), end=(0.3,)))
     assert found.stiffness_offset.sentence.startswith("raise the stiffness of lift by ")
@@ -248,6 +255,7 @@ class ShortCubic(Cubic):
         return None
 
 
+@pytest.mark.slow
 def test_upper_end_of_the_corridor_has_its_margin_too():
     robot = dataclasses.replace(pendulum(ShortCubic(k=K, k_c=K_C)), gravity=(0.0, 0.0, 0.0))
     still = rest_to_rest(1.0, 1300.0, start=(0.0,), end=(0.0,))

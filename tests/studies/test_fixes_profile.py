@@ -120,6 +120,8 @@ def test_bounds_too_fast_for_any_spline_are_refused():
         nearest_spline(Bounds(time, middle - 0.1, middle + 0.1), 0.1)
 
 
+@pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("duration", "stiffness"), [slow(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), slow(0.3, 850.0)]
 )

@@ -75,6 +75,7 @@ def fixed(trajectory):
     return fix
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
     robot, fix = vsa_3r(), fixed(TASKS[task])
@@ -98,6 +99,7 @@ def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
     assert all(joint.samples["near_singular"] == 0 for joint in report.joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", Constant)])
 def test_position_stays_a_formula(tmp_path, task, kind):
     robot = vsa_3r()

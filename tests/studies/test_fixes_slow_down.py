@@ -61,6 +61,7 @@ def test_a_controller_can_run_what_is_slowed_down(rate):
     assert slower.duration > trajectory.duration
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("duration", [0.5, slow(0.4)])
 def test_slow_down_agrees_with_a_dense_scan(duration):

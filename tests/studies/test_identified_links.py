@@ -112,6 +112,7 @@ def fitted(robot: Robot, found: list[Solution]) -> Robot:
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("case", slow_but((), CASES))
 def test_base_parameters_are_within_two_standard_errors(case: str, tmp_path: Path) -> None:
     """19 of 20, were errors known exactly; of so few draws, whose numbers go together, 0.88 to 1."""
@@ -167,6 +168,7 @@ def written(robot: Robot, run: Result, joints: Sequence[str], folder: Path, **fu
     return file
 
 
+@pytest.mark.slow
 def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     robot, trajectory = motion_of("RP", tmp_path)
     run = inverse_dynamics(robot, trajectory)

@@ -93,6 +93,7 @@ def test_springs_and_motors_come_out(name: str) -> None:
             assert error < 0.01 * abs(truth)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_standard_errors_say_how_far_off_numbers_are(name: str) -> None:
@@ -131,6 +132,7 @@ def test_identify_reports_what_a_record_tells(tmp_path: Path) -> None:
             assert residual.residual < 0.01 * residual.torque
 
 
+@pytest.mark.slow
 def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) -> None:
     record = excited(joint(), JOINT._replace(swing=[0])).noisy(seed=3).write(tmp_path / "record.csv", joint())
     told = identify(joint({"joints.*.actuator.spring.k": 350}), record, fit=["springs", "motors"])
@@ -142,6 +144,7 @@ def test_at_constant_stiffness_both_numbers_of_a_spring_are_one(tmp_path: Path) 
     assert all(residual.residual < 1.5 * residual.noise for residual in base.residuals)
 
 
+@pytest.mark.slow
 def test_late_torques_are_told_and_fixed(tmp_path: Path) -> None:
     exact = excited(joint(), JOINT)
     late = exact._replace(tau_motor=np.concatenate((exact.tau_motor[:1], exact.tau_motor[:-1])))
@@ -200,6 +203,7 @@ def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Pat
     assert identify(serial, record, fit=["motors", "joints.*.mechanism.k"]).verdict == "ok"
 
 
+@pytest.mark.slow
 def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
     exact = excited(joint(), JOINT)
     turned, biased = (
@@ -225,6 +229,7 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
         assert abs(float(off) - size) < 3 * float(error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", ["torques of shafts", "currents"])
 def test_records_may_be_of_the_other_side_of_the_gear(torque: str, tmp_path: Path) -> None:
     ratio, constant = -50, 0.1

@@ -75,6 +75,7 @@ def test_exact_equations_give_back_their_numbers() -> None:
     assert fit.unexcited.size == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [white, red, derivative])
 def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
     """95.4 % if errors were known exactly; of 200 draws the share of one unknown strays by 1.5 %."""
@@ -86,6 +87,7 @@ def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
     assert np.all(np.abs(np.mean(off, axis=0)) < 4 / math.sqrt(DRAWS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [blue, slow(low_passed)])
 def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(noise: Noise) -> None:
     """They have nothing at frequency zero but what neighboring frequencies let in."""
@@ -186,6 +188,7 @@ def noisy_columns(random: np.random.Generator, true: FloatArray, noise: float) -
     return found._replace(noise=lambda: (0 * measured, second))
 
 
+@pytest.mark.slow
 def test_noise_in_the_columns_counts_as_an_error() -> None:
     """It makes unknowns too small, by more than the residuals alone would say."""
     true = columns(600) / np.linalg.norm(columns(600), axis=0)

@@ -56,6 +56,8 @@ def cost(robot, trajectory, criterion, pace):
     return math.sqrt(np.trapezoid((torques**2).mean(axis=-1), run.time) / DURATION)
 
 
+@pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("criterion", ["torque", slow("energy"), slow("peak")])
 def test_no_pace_of_a_dense_family_is_better(swing, criterion):
     """Slower at the ends than between, or the other way; the grid is refined about its best four times."""
@@ -126,6 +128,7 @@ def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
     assert found.trajectory.duration == pytest.approx(0.25, rel=1e-12)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("criterion", ["torque", "time"])
 def test_ends_that_move_go_on_as_commanded(tmp_path, criterion):

@@ -184,6 +184,7 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
     assert np.abs(result.ddstiffness[[0, -1]]).max() < 1e-3  # of some 1e3 N m/rad in 0.1 s^2
 
 
+@pytest.mark.slow
 def test_implausible_values_are_reported(vsacli):
     implausible = ("--set", "joints.elbow.link.com=[0,0,150]", "--set", "rate=20")
     done = vsacli(
@@ -193,6 +194,7 @@ def test_implausible_values_are_reported(vsacli):
     assert "\nwarning: joints.elbow.link.com.2 (z) = 150 m is " in done.out
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
 def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):

@@ -68,6 +68,7 @@ def check_routes(robot: Robot, found: Any, criterion: str, folder: Path, margin:
     assert min(joint.margin for joint in report.joints) >= margin
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "criterion"), [(8, "torque"), (8, "energy"), (10, "peak"), (12, "peak"), (20, "peak")]
@@ -84,6 +85,7 @@ def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion
     check_routes(robot, found, criterion, tmp_path, MARGIN)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("criterion", "vary"), [("peak", "timing"), ("torque", "both"), ("time", "timing")])
 def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str) -> None:
@@ -137,6 +139,7 @@ def test_limits_hold_between_samples_of_random_motions() -> None:
     assert kept >= 6
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("shorter", "slow_down"), [(0.62, 1.0), (0.3, 2.66)])
 def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: float, slow_down: float) -> None:

@@ -135,6 +135,7 @@ def test_columns_with_little_time_in_common_stop_the_fit(
         identify(arm, path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -153,6 +154,7 @@ def test_unknown_joints_are_unreliable(
     assert f"ignored columns: {name}.q, {name}.theta_1" in found.notes[0]
 
 
+@pytest.mark.slow
 def test_a_recording_of_another_robot_is_unreliable(arm: Robot, record: Recorded, tmp_path: Path) -> None:
     path = record.write(tmp_path / "record.csv", arm)
     springs = {f"joints.*.actuator.spring.{name}": 10 * value for name, value in (("k", 400), ("k_c", 2000))}
@@ -229,6 +231,7 @@ DOUBTS = {
 """Likewise of those that only make the numbers unreliable."""
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("fault", slow_but(("torques in mN m", "motors exchanged"), DOUBTS))
 def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_path: Path) -> None:
     change, words = DOUBTS[fault]
@@ -239,6 +242,7 @@ def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_
     assert any(re.search(words, doubt) for doubt in told_of), told_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exchanged", [True, False])
 def test_torques_that_pull_against_each_other_are_exchanged_or_reversed_not_both(
     exchanged: bool, arm: Robot, tmp_path: Path

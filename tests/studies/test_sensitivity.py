@@ -70,6 +70,7 @@ def test_published_figures_of_the_papers_arm(vsacli):
     assert rows["joints.elbow.link.mass"][3:5] == ["shoulder", "0.18"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_drawn_robots_agree_with_the_first_order(arm):
     """With 1000 draws a deviation is known to 2 %; the rest is what first order leaves out."""
@@ -212,6 +213,7 @@ def test_the_file_has_the_derivatives_over_time(vsacli, tmp_path, arm):
             assert dims == ["time", "parameter", "joint", "motor"][: stored.ndim]
 
 
+@pytest.mark.slow
 def test_figures_show_ranking_and_bands(vsacli, tmp_path):
     rest_to_rest(tmp_path / "coarse.yaml")
     assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--tolerances", "2%", "--plot", "figures").code == 0
@@ -224,6 +226,7 @@ def test_figures_show_ranking_and_bands(vsacli, tmp_path):
     assert [path.name for path in (tmp_path / "others").iterdir()] == ["vsa_3r-coarse-ranking.png"]
 
 
+@pytest.mark.slow
 def test_plot_draws_the_ranking_of_a_file(vsacli, tmp_path):
     """The same figure as `sensitivity --plot`; the bands need curves that the file does not have."""
     rest_to_rest(tmp_path / "coarse.yaml")

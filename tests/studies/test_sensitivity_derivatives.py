@@ -181,6 +181,7 @@ def check_actuator(actuator, demand):
             np.testing.assert_array_equal(np.isnan(found.by_numbers[name][at]), np.isnan(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", slow_but(["cubic", "exponential", "table"], SPRINGS))
 def test_pairs_by_every_number(law):
     (first, _), (second, _) = SPRINGS[law]
@@ -196,6 +197,7 @@ def test_elastic_springs_by_every_number(law):
     check_actuator(actuator, command(actuator))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", slow_but(["awas"], DEVICES))
 def test_mechanisms_by_every_number(name):
     device = DEVICES[name]
@@ -204,6 +206,7 @@ def test_mechanisms_by_every_number(name):
     )
 
 
+@pytest.mark.slow
 def test_torques_of_motors_by_numbers_of_links_and_springs_at_once():
     robot, trajectory = loaded("vsa_3r", "vsa_3r_via")
     run = SensitivityRun(robot, trajectory, ["joints.elbow.*", "gravity.*"])

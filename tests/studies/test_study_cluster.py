@@ -101,6 +101,7 @@ def test_workers_compute_the_rows_of_one_process(tmp_path: Path) -> None:
         assert content(tmp_path / "study.h5") == content(tmp_path / "alone.h5")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", ["interrupt", "scheduler"])
 def test_what_ends_it_costs_no_finished_row(tmp_path: Path, ending: str) -> None:
@@ -135,6 +136,7 @@ sys.meta_path.insert(0, Lacking())
 """
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("preload", "message"),

@@ -91,6 +91,7 @@ def test_what_cannot_be_optimized(vsacli: Any, own_folder: Path, text: str, mess
     assert (done.code, message in done.err) == (2, True), done.err
 
 
+@pytest.mark.slow
 def test_what_cannot_be_minimized_of_a_robot_is_a_row_that_says_so(vsacli: Any, own_folder: Path) -> None:
     done = vsacli("study", str(study(own_folder, "optimize: {minimize: copper_loss}\n")))
     assert (done.code, column("study.h5", "verdict").tolist()) == (3, ["failed"])

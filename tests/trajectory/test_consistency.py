@@ -40,6 +40,7 @@ def test_true_derivatives_follow(noise, step):
         assert complaints(*true, noise=noise, time=time, method="interpolate") == []
 
 
+@pytest.mark.slow
 def test_true_derivatives_follow_a_slow_motion_on_a_few_knots():
     s = TIME[:, None] / 4 * np.ones(2)
     course = np.polynomial.Polynomial([0, 0, 0, 0, 35, -84, 70, -20])

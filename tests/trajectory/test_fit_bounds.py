@@ -20,6 +20,7 @@ def stepwise():
     return fit_samples(made.time, made.values[None], 7, 4, SMOOTH)
 
 
+@pytest.mark.slow
 def test_a_component_that_is_not_resolved_has_no_covariance_but_a_bound(stepwise):
     (part,) = stepwise.parts
     assert not part.smoothing.resolved
@@ -49,6 +50,7 @@ def test_impulses_where_jerk_jumps_are_within_the_bound(rate):
     assert error < stated < 2.5 * error
 
 
+@pytest.mark.slow
 def test_steps_of_velocity_that_are_smooth_have_no_impulses():
     made = record(MOTIONS["velocity steps, 200 ms"], "white, 1e-5 rad", 4, 250)
     (part,) = fit_samples(made.time, made.values[None], 7, 4, SMOOTH).parts

@@ -85,6 +85,7 @@ def test_full_digits_are_interpolated(rate):
     np.testing.assert_allclose(fit.at(time, 1)[0, 0], values, rtol=0, atol=100 * EPS)
 
 
+@pytest.mark.slow
 def test_full_digits_at_a_very_high_rate_are_noisy():
     """At 20 kHz rounding alone spoils the fourth derivative of an interpolating spline."""
     time = np.arange(40001) / 20000

@@ -45,6 +45,7 @@ def loaded(name: str) -> Trajectory | None:
         return None
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(with_odd_numbers())
 def test_any_numbers_are_read_or_refused_with_their_file(text):

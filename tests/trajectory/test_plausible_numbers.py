@@ -122,6 +122,7 @@ def test_positions_within_the_limits_of_the_joint_may_be_meant(tmp_path):
     assert len(load_trajectory(motion, load_robot(ROBOT)).warnings) == 1
 
 
+@pytest.mark.slow
 def test_with_several_robots_the_one_counts_that_it_suits_best(vsacli):
     robots = sorted((REPOSITORY / "robots").glob("*.yaml"))
     done = vsacli("validate", REPOSITORY / "trajectories" / "tendon_1r.yaml", *robots)

@@ -84,6 +84,7 @@ def test_a_stage_filters_as_scipy_does_once_its_transient_is_over():
     np.testing.assert_allclose(np.fft.irfft(gain * np.fft.rfft(values), period), expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_oracle_is_better_the_smaller_the_noise_is():
     recording = draw(0)
     position = recording.position

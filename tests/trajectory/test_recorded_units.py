@@ -169,6 +169,7 @@ def test_noisy_record_runs_and_reports_its_fit(robot):
     )
 
 
+@pytest.mark.slow
 def test_fast_and_rounded_records_have_a_meaningful_fourth_derivative():
     time = np.arange(20001) / 10000
     trajectory = Trajectory.from_samples(time, np.round(motion(0, time), 6))

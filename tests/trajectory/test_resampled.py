@@ -18,6 +18,7 @@ def fitted(row, truth):
     return part, np.sqrt(np.mean((found - truth[inside]) ** 2) / np.mean(truth[inside] ** 2))
 
 
+@pytest.mark.cases(8)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["linear", "cubic"])
 @pytest.mark.parametrize("name", ["sines", "sweep to 4 Hz"])
@@ -44,6 +45,7 @@ def test_side_bands_of_hum_are_hum(swing):
     assert error < 0.02
 
 
+@pytest.mark.slow
 def test_a_pair_of_vibrations_stays_one():
     truth = MOTIONS["sines"](TIME, 0)[0]
     row = truth + 3e-4 * (np.sin(2 * np.pi * 23 * TIME) + np.sin(2 * np.pi * 27 * TIME))

@@ -201,6 +201,7 @@ def test_lines_of_a_residual():
     assert 0.4 < lines.share < 0.7  # 2 of 3.5
 
 
+@pytest.mark.slow
 def test_what_is_said():
     time, values, _ = record(pauses, "12 bits, zero-phase 50 Hz", 0)
     trajectory = Trajectory.from_samples(time, values[:, None], fit="smooth")
@@ -223,6 +224,7 @@ def test_short_records(count):
     assert np.abs(fit.at(time, 1)[0, 1] - 0.3).max() < 100 * EPS
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 def test_vibration_that_may_be_motion_is_kept_by_default_and_said(noise):
@@ -255,6 +257,7 @@ def test_vibration_that_may_be_motion_is_kept_by_default_and_said(noise):
     assert np.sqrt(np.mean((smooth.at(time, 5)[4, 0] - fourth)[inside] ** 2)) < 0.05 * size
 
 
+@pytest.mark.slow
 def test_a_bandwidth_says_what_is_motion():
     of = record(sines, "17-bit encoder", 4)
     rate = 2 * np.pi * 15
@@ -294,6 +297,7 @@ def test_a_stiffness_with_filtered_noise():
         assert np.sqrt(np.mean(error**2)) < 0.03 * 400 / np.sqrt(2)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("color", COLORS)
 def test_no_record_is_wrong_in_silence(color):
@@ -329,6 +333,7 @@ def test_bins_of_half_the_resolution_are_those_of_the_samples():
     np.testing.assert_allclose(bins.design, sums, rtol=0, atol=1000 * EPS)
 
 
+@pytest.mark.slow
 def test_long_records_start_from_stretches(monkeypatch):
     """With stretches as short as a second the search ends where that of the whole does."""
     for motion in (pauses, sweep):
@@ -373,6 +378,7 @@ def test_a_bandwidth_says_which_lines_are_noise():
         assert fit.parts[0].smoothing.lines.others == pytest.approx(lines, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [4001, 6001])
 def test_hum_of_mains_is_not_followed_where_knots_are_close_enough(samples):
     """At 2 kHz there are four to a period, and two resolutions agree on it as on a motion."""
@@ -392,6 +398,7 @@ def test_the_bias_is_measured_over_a_wide_band():
     assert 0.85 < np.mean((off < 2 * np.sqrt(fit.covariance(of.time)[0, 4, 4]))[inside]) < 0.99
 
 
+@pytest.mark.slow
 def test_fitting_tells_how_far_it_is():
     of = record(sines, "white, 1e-4 rad", 0)
     values = np.array([of.values, of.truth[0], np.full(len(of.time), np.nan)])

@@ -275,6 +275,7 @@ def test_from_samples_needs_samples():
         Trajectory.from_samples([], np.zeros((0, 2)), np.ones((0, 2)))
 
 
+@pytest.mark.slow
 def test_scipy_is_loaded_only_for_splines():
     script = """
 import sys

@@ -53,6 +53,7 @@ def test_a_page_says_verdict_and_report_before_anything_else(page: Page) -> None
     assert body.index("self-check passed") < body.index("Inputs and provenance")
 
 
+@pytest.mark.slow
 def test_headings_are_the_titles_of_figures(vsacli: Any, tmp_path: Path, feasible_result: Path) -> None:
     """Of simulations with controller and model error; of several files with what distinguishes them."""
     motion = edited(rest_to_rest(tmp_path / "m.yaml"), tmp_path / "short.yaml", ("rate: 100 ", "rate: 10 "))
@@ -76,6 +77,7 @@ def test_provenance_is_in_words(vsacli: Any, motion: Path) -> None:
     assert "stop_on_infeasible = false, min_margin = 0.01" in text
 
 
+@pytest.mark.slow
 def test_findings_come_before_the_table_and_values_after_it(vsacli: Any, too_soft: Path) -> None:
     assert vsacli("invdyn", ROBOT, too_soft, "-o", "soft.h5").code == 3
     page = page_of(vsacli, "soft.h5")
@@ -135,6 +137,7 @@ def test_limits_are_those_of_the_robot(vsacli: Any) -> None:
     assert limits == [{"joint": 2, "value": value} for value in slide]
 
 
+@pytest.mark.slow
 def test_stretches_are_those_where_steps_fail(vsacli: Any, infeasible_result: Path) -> None:
     page = page_of(vsacli, infeasible_result)
     [file] = page.data["files"]
@@ -214,6 +217,7 @@ def test_scripts_are_those_that_the_policy_names_and_nothing_leads_outside(page:
     assert not [tag for tag, attributes in page.tags if any(map(leading_or_acting.fullmatch, attributes))]
 
 
+@pytest.mark.cases(19)
 @pytest.mark.parametrize("kind", slow_but(("markdown", "markup", "unprintable bidirectional"), TEXTS))
 def test_no_text_of_a_file_acts(vsacli: Any, page: Page, feasible_result: Path, kind: str) -> None:
     """Of files that were made by other means, or hold such texts as paths and command lines."""
@@ -307,6 +311,7 @@ def test_a_report_of_another_form_is_refused_with_a_sentence(
     assert not Path("odd.html").exists()
 
 
+@pytest.mark.slow
 def test_infinities_of_a_run_that_diverged_are_gaps(vsacli: Any, feasible_result: Path) -> None:
     """Without a warning, which is an error in tests."""
     shutil.copy(feasible_result, "far.h5")

@@ -40,6 +40,7 @@ def soft(vsacli: Any, too_soft: Path) -> Path:
     return too_soft.with_suffix(".h5")
 
 
+@pytest.mark.slow
 def test_the_fixes_are_those_of_check_feasibility(vsacli: Any, soft: Path, too_soft: Path) -> None:
     """And the command that stands below them writes the first."""
     page, notes = page_of(vsacli, soft)
@@ -56,6 +57,7 @@ def test_the_fixes_are_those_of_check_feasibility(vsacli: Any, soft: Path, too_s
     assert {"fixed.yaml", "fixed.csv"} < contents(too_soft.parent).keys()
 
 
+@pytest.mark.slow
 def test_each_file_has_its_own_and_one_that_is_fine_has_none(
     vsacli: Any, soft: Path, feasible_result: Path
 ) -> None:
@@ -69,6 +71,7 @@ def test_each_file_has_its_own_and_one_that_is_fine_has_none(
     assert notes == ""
 
 
+@pytest.mark.slow
 def test_changed_inputs_are_searched_as_they_were_changed(vsacli: Any, motion: Path) -> None:
     change = "stiffness.end=[790, 1000, 1000]"
     assert vsacli("invdyn", ROBOT, motion, "--set", change, "-o", "r.h5", "-q").code == 3
@@ -112,6 +115,7 @@ def test_without_its_inputs_a_note_says_why_there_are_none(
     assert note.startswith(f"{soft}: no fixes on its page: {reason.format(soft=too_soft)}")
 
 
+@pytest.mark.slow
 def test_no_path_of_an_input_acts(vsacli: Any, soft: Path) -> None:
     """On the page, nor as an option of the command that it shows."""
     page, _ = page_of(vsacli, soft)
