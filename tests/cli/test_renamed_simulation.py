@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT
+from samples.marks import slow
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result, simulate
 from vsacli.base.renamed import RENAMINGS, successor
@@ -75,10 +76,10 @@ def test_an_actual_variable_is_refused_with_the_simulated_one(vsacli, files, nam
     ("new", "old"),
     [
         ("base.q", "base.q_actual"),
-        ("base.q", "base.q_actual [rad]"),
-        ("base.tau_motor_1", "base.tau_motor_actual_1"),
-        ("base.tau_transmission_2", "base.tau_spring_2"),
-        ("base.stiffness_min", "base.stiffness_lower"),
+        slow("base.q", "base.q_actual [rad]"),
+        slow("base.tau_motor_1", "base.tau_motor_actual_1"),
+        slow("base.tau_transmission_2", "base.tau_spring_2"),
+        slow("base.stiffness_min", "base.stiffness_lower"),
         ("q1", "q_actual1"),
     ],
 )

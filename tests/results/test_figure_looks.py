@@ -124,6 +124,7 @@ def smallest(figure: Figure) -> float:
     return min(text.get_fontsize() for text, _ in shown_texts(figure))
 
 
+@pytest.mark.slow
 def test_in_a_paper_every_figure_has_the_width_and_legible_texts_that_stay_apart(files: Path) -> None:
     with drawing_with(PAPER):
         for name, figure in every_figure(files):

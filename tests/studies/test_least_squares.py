@@ -97,6 +97,7 @@ def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(nois
     assert np.all(np.std(off, axis=0) > 0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [red, derivative, blue])
 def test_errors_by_white_residuals_would_not(noise: Noise) -> None:
     """The noise of the cases above is colored enough to tell: the usual errors are off."""
