@@ -23,7 +23,14 @@ from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import apart
-from vsacli.studies.search.interior_point import LAST_GAP, WARM_GAP, Minimum, Problem, minimize
+from vsacli.studies.search.interior_point import (
+    FIRST_GAP,
+    WARM_GAP,
+    Minimum,
+    Problem,
+    minimize,
+    minimize_all,
+)
 from vsacli.studies.search.loads import Load
 from vsacli.studies.sensitivities.joint_derivatives import ImplicitSolution
 from vsacli.trajectory.trajectory import Trajectory
@@ -381,14 +388,32 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
         gap: increase of the cost by the bounds at the first barrier; above `WARM_GAP` the search is cold.
         costed: parts of the problem with these costs, all with the same criterion.
     """
-    smoothings = costed[0].criterion.smoothings
-    cold = gap > WARM_GAP
-    for smoothing in smoothings if cold else smoothings[-1:]:
-        for each in costed:
-            each.scale = each.scale._replace(smoothing=smoothing)
-        last = WARM_GAP if smoothing != smoothings[-1] else ROUGH_GAP if cold else LAST_GAP
-        found = minimize(problem, start, gap, last)
-        start, gap = found.unknowns, WARM_GAP
-    if not cold and not found.found:  # steps became short; with new multipliers they are long again
-        found = minimize(problem, start, gap, last)
+    if gap > WARM_GAP:
+        return rough_minima(problem, [start], costed, gap)[0]
+    _smooth(costed, costed[0].criterion.smoothings[-1])
+    found = minimize(problem, start, gap)
+    if not found.found:  # steps became short; with new multipliers they are long again
+        found = minimize(problem, found.unknowns, WARM_GAP)
     return found
+
+
+def rough_minima(
+    problem: Problem, starts: Sequence[FloatArray], costed: Sequence[Costed], gap: float = FIRST_GAP
+) -> list[Minimum]:
+    """Return a minimum near each of several starts, as accurate as their comparison requires.
+
+    See `smoothed_minimum`; only a cold search smooths the cost more than in the end.
+    """
+    smoothings = costed[0].criterion.smoothings
+    found: list[Minimum] = []
+    for smoothing in smoothings if gap > WARM_GAP else smoothings[-1:]:
+        _smooth(costed, smoothing)
+        last = ROUGH_GAP if smoothing == smoothings[-1] else WARM_GAP
+        found = minimize_all(problem, starts, gap, last)
+        starts, gap = [each.unknowns for each in found], WARM_GAP
+    return found
+
+
+def _smooth(costed: Sequence[Costed], smoothing: float) -> None:
+    for each in costed:
+        each.scale = each.scale._replace(smoothing=smoothing)

@@ -191,7 +191,7 @@ class PacedJoint:
         self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
         self._carrying = (
-            made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders, moving_corridor=True)
+            made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
             if self._joint.actuator.sprung
             else apart(self._joint)
         )

@@ -345,7 +345,7 @@ class TimingSearch(PacedSearch):
 
         def kept(groups: Sequence[Group], factor: float) -> bool:
             unknowns = spaces.even(self._s, factor, stiffness)
-            _, bounds = SeparableProblem(groups).values(unknowns)
+            ((_, bounds),) = SeparableProblem(groups).values([unknowns])
             return bool(np.all(bounds < 0))
 
         factor = FASTEST
@@ -366,7 +366,7 @@ class TimingSearch(PacedSearch):
         """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""
         for share in SLOWER:
             unknowns = spaces.slowed(found.unknowns, share)
-            cost, bounds = SeparableProblem(every).values(unknowns)
+            ((cost, bounds),) = SeparableProblem(every).values([unknowns])
             if np.all(bounds <= CLEARANCE / 2):
                 return replace(found, unknowns=unknowns, cost=cost)
         return None
@@ -451,7 +451,8 @@ class CheapestPaceSearch(PacedSearch):
 
     def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
         every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
-        return bool(np.all(every.values(unknowns)[1] < 0))
+        ((_, bounds),) = every.values([unknowns])
+        return bool(np.all(bounds < 0))
 
     def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
         """Return unknowns with a level appended that bounds its values, if the cost is a level."""
@@ -469,5 +470,5 @@ class CheapestPaceSearch(PacedSearch):
         return smoothed_minimum(problem, start, gap, self._joints)
 
     def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        _, bounds = SeparableProblem(every).values(found.unknowns)
+        ((_, bounds),) = SeparableProblem(every).values([found.unknowns])
         return found if np.all(bounds <= CLEARANCE / 2) else None

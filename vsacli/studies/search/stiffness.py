@@ -24,15 +24,17 @@ from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range, checked_range
 from vsacli.studies.search.criteria import (
     ENDS_OF_CORRIDOR,
+    ROUGH_GAP,
     Criterion,
     Scale,
     limit_bounds,
     limit_names,
     made_to_carry,
+    rough_minima,
     smoothed_minimum,
     trapezoidal,
 )
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
+from vsacli.studies.search.interior_point import WARM_GAP, Minimum, minimize
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
@@ -139,23 +141,34 @@ def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -
 
 
 def nearest_profile(
-    space: SplineSpace, time: FloatArray, target: FloatArray, admissible: Range
+    basis: FloatArray, time: FloatArray, target: FloatArray, admissible: Range
 ) -> FloatArray | None:
-    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None."""
+    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None.
+
+    Args:
+        basis: splines per unit of each coefficient, (instants, shapes).
+        time: instants, (instants,) in s.
+        target: target, (instants,).
+        admissible: range in which the spline must lie at the instants.
+    """
     size = float(np.median(admissible.low))
     clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
     within = Range(admissible.low + clearance, admissible.high - clearance)
+    fitted: FloatArray = np.linalg.lstsq(basis, np.clip(target, *within), rcond=None)[0]
+    near = basis @ fitted
+    if np.all((within.low < near) & (near < within.high)):
+        return fitted
     group = Group(
         functions=_Distance(target, within, size),
         instants=np.arange(len(time)),
-        basis=space.basis(time, 1),
-        unknowns=np.arange(space.size),
+        basis=basis[None],
+        unknowns=np.arange(basis.shape[1]),
         weights=trapezoidal(time)[None] / (time[-1] - time[0]),
         there=np.isfinite(np.stack(within)),
         scales=np.array([size]),
     )
     problem = SeparableProblem([group])
-    start = interior(problem, space.fitted(time, np.clip(target, *within)))
+    start = interior(problem, fitted)
     return None if start is None else minimize(problem, start).unknowns
 
 
@@ -219,15 +232,16 @@ Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
 
 
 class _Attempt(NamedTuple):
-    """A minimum among the splines of a space, and the instants at which its bounds were kept."""
+    """A minimum among the splines of a space, the instants at which its bounds were kept, and its start."""
 
     space: SplineSpace
     minimum: Minimum
     instants: IndexArray
+    start: FloatArray
 
-    def in_space(self, space: SplineSpace, time: FloatArray) -> FloatArray:
-        """Return the coefficients of the profile in another space, (shapes,)."""
-        return space.fitted(time, self.space.basis(time, 1)[0] @ self.minimum.unknowns[: self.space.size])
+    def reaches(self, other: _Attempt) -> bool:
+        """Return whether the cost is that of another attempt, or lower."""
+        return self.minimum.cost <= other.minimum.cost + SAME_COST * abs(other.minimum.cost)
 
 
 class StiffnessSearch:
@@ -264,6 +278,7 @@ class StiffnessSearch:
         self._spaces, self._seed, self._progress = spaces, seed, progress
         self._span = float(load.time[0]), float(load.time[-1])
         self._steps = load.time[load.steps]
+        self._bases: dict[SplineSpace, FloatArray] = {}
         self._most = min(MOST_PIECES, len(self._steps) - 1)
         self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
@@ -276,30 +291,68 @@ class StiffnessSearch:
         pieces, starts = self._starts()
         space = self._space(pieces)
         self._scale_by(space, starts[0])
-        kept: list[tuple[_Attempt, FloatArray]] = []
-        for start in starts:
-            # most starts reach the same optimum, where the same instants are needed to keep the bounds
-            attempt = self._attempt(space, pieces, start, known=kept[-1][0].instants if kept else None)
-            if attempt is not None:
-                kept.append((attempt, start))
-        if not kept:
-            raise ImpossibleError(
-                f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
-            )
-        best, start = min(kept, key=lambda pair: pair[0].minimum.cost)
-        least = best.minimum.cost
-        agreeing = sum(attempt.minimum.cost <= least + SAME_COST * abs(least) for attempt, _ in kept)
-        return self._profile(self._refined(best, pieces, start), len(starts), agreeing)
+        roughly = self._roughly(space, evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1), starts)
+        best, rough = self._best_of(roughly)
+        agreeing = sum(each.reaches(rough) and rough.reaches(each) for each in roughly)
+        return self._profile(self._accurate(self._refined(best, pieces)), len(starts), agreeing)
 
     def best_constant(self) -> Profile | None:
         """Return the best constant as a profile; None if no constant keeps all bounds."""
         space = SplineSpace.constant(self._span)
-        start = nearest_profile(space, self._load.time, self._asked, self._admissible)
-        if start is None:
+        low, high = float(self._admissible.low.max()), float(self._admissible.high.min())
+        if low >= high:
             return None
+        clearance = min(INSIDE * low, (high - low) / 4)
+        start = np.clip(self._asked.mean(keepdims=True), low + clearance, high - clearance)
         self._scale_by(space, start)
-        found = self._attempt(space, FIRST_PIECES, start)
-        return None if found is None else self._profile(found, 1, 1)
+        instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
+        for rough in self._roughly(space, instants, [start]):
+            found = self._completed(rough)
+            return None if found is None else self._profile(self._accurate(found), 1, 1)
+        return None
+
+    def _roughly(
+        self, space: SplineSpace, instants: IndexArray, starts: Sequence[FloatArray]
+    ) -> list[_Attempt]:
+        """Return the minima that starts lead to if bounds are kept at some instants only, best first."""
+        every = self._group(space, np.arange(len(self._load.time)))
+        problem = SeparableProblem([self._group(space, instants)])
+        begun: list[tuple[FloatArray, FloatArray]] = []
+        for start in starts:
+            inside = self._with_level(every, start)
+            unknowns = interior(problem, inside, inside)
+            if unknowns is not None:
+                begun.append((start, unknowns))
+        found = rough_minima(problem, [unknowns for _, unknowns in begun], [self._whole])
+        self._progress()
+        attempts = [
+            _Attempt(space, minimum, instants, start)
+            for (start, _), minimum in zip(begun, found, strict=True)
+        ]
+        return sorted(attempts, key=lambda each: each.minimum.cost)
+
+    def _best_of(self, roughly: Sequence[_Attempt]) -> tuple[_Attempt, _Attempt]:
+        """Return the best minimum that keeps all bounds, and the rough one from which it was completed.
+
+        Raises:
+            ImpossibleError: no start led to any.
+        """
+        best: tuple[_Attempt, _Attempt] | None = None
+        tried: list[_Attempt] = []
+        for rough in roughly:
+            # bounds at further instants only raise a cost, so that no later start is better
+            if best is not None and best[0].reaches(rough):
+                break
+            if not any(rough.reaches(other) for other in tried):
+                tried.append(rough)
+                found = self._completed(rough)
+                if found is not None and (best is None or found.minimum.cost < best[0].minimum.cost):
+                    best = found, rough
+        if best is None:
+            raise ImpossibleError(
+                f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
+            )
+        return best
 
     @property
     def _asked(self) -> FloatArray:
@@ -316,12 +369,24 @@ class StiffnessSearch:
         wanted = [target[chosen] for target in targets(self._asked, self._admissible, time, self._seed)]
         for pieces in self._finer_than(coarsest // 2):
             space = self._space(pieces)
-            found = [nearest_profile(space, time[chosen], target, admissible) for target in wanted]
+            basis = self._basis(space)[0, chosen]
+            found = [nearest_profile(basis, time[chosen], target, admissible) for target in wanted]
             if starts := [amounts for amounts in found if amounts is not None]:
                 return pieces, starts
         raise ImpossibleError(
             f"what {self._joint.name} may have is too narrow, or changes too fast, for a smooth profile"
         )
+
+    def _basis(self, space: SplineSpace) -> FloatArray:
+        """Return the shapes with two derivatives at all instants, (3, instants, shapes), computed once."""
+        if space not in self._bases:
+            self._bases[space] = space.basis(self._load.time, STIFFNESS.orders)
+        return self._bases[space]
+
+    def _fitted(self, space: SplineSpace, values: FloatArray) -> FloatArray:
+        """Return the coefficients of the spline nearest to values at all instants, (shapes,)."""
+        fitted: FloatArray = np.linalg.lstsq(self._basis(space)[0], values, rcond=None)[0]
+        return fitted
 
     def _finer_than(self, pieces: int) -> Iterator[int]:
         """Yield numbers of pieces, each twice the previous one, up to the largest allowed."""
@@ -332,54 +397,48 @@ class StiffnessSearch:
     def _scale_by(self, space: SplineSpace, amounts: FloatArray) -> None:
         """Scale the cost by the cost of a profile."""
         every = np.arange(len(self._load.time))
-        driven = self._whole.driven(space.basis(self._load.time, STIFFNESS.orders) @ amounts, every)
+        driven = self._whole.driven(self._basis(space) @ amounts, every)
         size = self._criterion.size(self._joint, driven, self._load.time)
         self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
 
-    def _attempt(
-        self,
-        space: SplineSpace,
-        pieces: int,
-        start: FloatArray,
-        nearby: _Attempt | None = None,
-        known: IndexArray | None = None,
-    ) -> _Attempt | None:
-        """Search from a start, adding instants until all bounds are kept; return None if that fails.
+    def _completed(self, attempt: _Attempt, *, accurate: bool = False) -> _Attempt | None:
+        """Return an attempt that keeps all bounds at all instants, or None.
 
         Args:
-            space: space of the splines.
-            pieces: number of pieces of a spline.
-            start: coefficients of an admissible spline.
-            nearby: minimum among coarser splines from which to continue.
-            known: instants that another search needed.
+            attempt: minimum with bounds at some instants, to which those where it violates bounds are added.
+            accurate: whether the minimum is searched to the last barrier.
         """
-        instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1)
-        if known is not None:
-            instants = np.union1d(instants, known)
+        space, found, instants, start = attempt
         every = self._group(space, np.arange(len(self._load.time)))
-        inside = unknowns = self._with_level(every, start)
-        if nearby is not None:
-            instants = np.union1d(instants, nearby.instants)
-            unknowns = self._with_level(every, nearby.in_space(space, self._load.time))
-        gap = FIRST_GAP if nearby is None else WARM_GAP
+        inside = self._with_level(every, start)
+        searched = not accurate
         for _ in range(MOST_ROUNDS):
+            missed = self._missed(every, found.unknowns)
+            if searched and not missed.size:
+                return _Attempt(space, found, instants, start)
+            unknowns = found.unknowns
+            if missed.size:
+                instants, unknowns = np.union1d(instants, missed), self._with_level(every, unknowns[: space.size])
             problem = SeparableProblem([self._group(space, instants)])
             begun = interior(problem, unknowns, inside)
             if begun is None:
                 return None
-            found, gap = smoothed_minimum(problem, begun, gap, [self._whole]), WARM_GAP
+            if accurate:
+                found = smoothed_minimum(problem, begun, WARM_GAP if missed.size else ROUGH_GAP, [self._whole])
+            else:
+                found = rough_minima(problem, [begun], [self._whole], WARM_GAP)[0]
+            searched = True
             self._progress()
-            missed = self._missed(every, found.unknowns)
-            if not missed.size:
-                return _Attempt(space, found, instants)
-            instants = np.union1d(instants, missed)
-            unknowns = self._with_level(every, found.unknowns[: space.size])
         return None
+
+    def _accurate(self, attempt: _Attempt) -> _Attempt:
+        """Return a rough minimum searched to the last barrier, if that succeeds."""
+        return self._completed(attempt, accurate=True) or attempt
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:
         """Return cost and bounds at some instants as a group of the separable problem."""
         time = self._load.time[instants]
-        basis, levels = space.basis(time, STIFFNESS.orders), self._criterion.levels
+        basis, levels = self._basis(space)[:, instants], self._criterion.levels
         if levels:
             of_levels = np.zeros((levels, *basis.shape[1:]))
             alone = np.zeros((len(basis) + levels, len(time), levels))
@@ -412,13 +471,14 @@ class StiffnessSearch:
         missed[len(self._whole.bound_names) :] -= SAME_LEVEL
         return missed_instants(missed)
 
-    def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
+    def _refined(self, best: _Attempt, pieces: int) -> _Attempt:
         """Return the attempt refined with finer pieces, as long as these lower the cost."""
-        coarse = best.space
+        time = self._load.time
+        inside = self._basis(best.space)[0] @ best.start
         for finer_pieces in self._finer_than(pieces):
             space = self._space(finer_pieces)
-            inside = space.fitted(self._load.time, coarse.basis(self._load.time, 1)[0] @ start)
-            finer = self._attempt(space, finer_pieces, inside, best)
+            instants = np.union1d(evenly(len(time), INSTANTS_PER_PIECE * finer_pieces + 1), best.instants)
+            finer = self._near(space, instants, best, self._fitted(space, inside))
             if finer is None or finer.minimum.cost > best.minimum.cost:
                 break
             gained, best = best.minimum.cost - finer.minimum.cost, finer
@@ -426,9 +486,24 @@ class StiffnessSearch:
                 break
         return best
 
+    def _near(
+        self, space: SplineSpace, instants: IndexArray, coarse: _Attempt, start: FloatArray
+    ) -> _Attempt | None:
+        """Return a minimum among finer splines near one among coarser splines, or None."""
+        every = self._group(space, np.arange(len(self._load.time)))
+        problem = SeparableProblem([self._group(space, instants)])
+        profile = self._basis(coarse.space)[0] @ coarse.minimum.unknowns[: coarse.space.size]
+        near = self._with_level(every, self._fitted(space, profile))
+        begun = interior(problem, near, self._with_level(every, start))
+        if begun is None:
+            return None
+        (found,) = rough_minima(problem, [begun], [self._whole], WARM_GAP)
+        self._progress()
+        return self._completed(_Attempt(space, found, instants, start))
+
     def _profile(self, attempt: _Attempt, starts: int, agreeing: int) -> Profile:
         amounts = attempt.minimum.unknowns[: attempt.space.size]
-        rows = attempt.space.basis(self._load.time, STIFFNESS.orders) @ amounts
+        rows = self._basis(attempt.space) @ amounts
         return Profile(
             rows=rows,
             steps=self._load.steps,
