@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
-from vsacli.analysis.run import inverse_dynamics
+from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, TORQUE, Quantity
@@ -36,7 +36,7 @@ from vsacli.studies.sensitivities.joint_derivatives import ImplicitSolution
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from vsacli.analysis.result import Result
+    from vsacli.dynamics.energy import JointEnergy
 
 
 Values = Dual | FloatArray
@@ -56,6 +56,36 @@ class Scale(NamedTuple):
 
 
 UNSCALED = Scale()
+
+
+class MotorsOfRun(NamedTuple):
+    """The variables of a run on which costs depend; there is no self-check, which would take longer.
+
+    Attributes:
+        robot: robot.
+        time: times of the samples, (samples,) in s.
+        tau_motor: motor torques, (samples, joints, 2), N m (N).
+        elastic_energy: energy in the springs, (samples, joints), J.
+        energies: energy of each joint over the run.
+    """
+
+    robot: Robot
+    time: FloatArray
+    tau_motor: FloatArray
+    elastic_energy: FloatArray
+    energies: Sequence[JointEnergy]
+
+    @classmethod
+    def of(cls, robot: Robot, trajectory: Trajectory) -> MotorsOfRun:
+        """Return the variables of a run along a trajectory."""
+        run = Run(robot, trajectory)
+        rows = [(block.time, block.tau_motor, block.elastic_energy) for block in run]
+        return cls(robot, *map(np.concatenate, zip(*rows, strict=True)), run.energies())
+
+    def torques(self, index: int) -> FloatArray:
+        """Return the torques of the motors that a joint has, (motors, samples)."""
+        torques: FloatArray = self.tau_motor[:, index].T[: self.robot.joints[index].actuator.motor_count]
+        return torques
 
 
 @dataclass(frozen=True)
@@ -121,7 +151,7 @@ class Criterion:
         """Return a scale for the cost from its value for some motion."""
         return self.of(joint, driven, time)
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the cost of a joint, by index, over a run; NaN if any sample is infeasible."""
         raise NotImplementedError
 
@@ -172,10 +202,10 @@ class Torque(Criterion):
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the rms torque, N m (N), by the trapezoidal rule."""
-        square = np.mean(_torques_of(result, index) ** 2, axis=0)
-        return math.sqrt(float(self.weights(result.time)[0] @ square))
+        square = np.mean(run.torques(index) ** 2, axis=0)
+        return math.sqrt(float(self.weights(run.time)[0] @ square))
 
     def together(self, costs: Sequence[float]) -> float:
         """Return the root mean square of the costs."""
@@ -205,9 +235,9 @@ class CopperLoss(Criterion):
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the heat in the report of the run, J."""
-        heat = result.report.joints[index].energy.copper_loss
+        heat = run.energies[index].copper_loss
         return math.nan if heat is None else heat
 
 
@@ -240,10 +270,10 @@ class Energy(Criterion):
         spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven["motor_power"]))
         return float(np.sum(self.weights(time) * np.stack([spent, driven["elastic_energy"]])))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the positive work in the report of the run and the initial spring energy, J."""
-        spent = result.report.joints[index].energy.spent
-        return spent if self.repeating else spent + float(result.elastic_energy[0, index])
+        spent = run.energies[index].spent
+        return spent if self.repeating else spent + float(run.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
@@ -284,9 +314,9 @@ class Peak(Criterion):
         """Return the peak torque, N m (N)."""
         return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven["tau_motor"])))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the peak torque, N m (N)."""
-        return float(np.abs(_torques_of(result, index)).max())
+        return float(np.abs(run.torques(index)).max())
 
     def together(self, costs: Sequence[float]) -> float:
         """Return the largest cost."""
@@ -347,16 +377,10 @@ def _of_motors(joint: Joint, variable: Any) -> list[Any]:
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
 
 
-def _torques_of(result: Result, index: int) -> FloatArray:
-    """Return the motor torques of a joint over a run, (motors, samples)."""
-    torques: FloatArray = result.tau_motor[:, index].T[: result.robot.joints[index].actuator.motor_count]
-    return torques
-
-
 def run_costs(robot: Robot, trajectory: Trajectory, criteria: Mapping[int, Criterion]) -> dict[int, float]:
     """Return the costs of a run, by joint index; NaN for a joint with an infeasible sample."""
-    result = inverse_dynamics(robot, trajectory)
-    return {index: criterion.of_run(result, index) for index, criterion in criteria.items()}
+    run = MotorsOfRun.of(robot, trajectory)
+    return {index: criterion.of_run(run, index) for index, criterion in criteria.items()}
 
 
 def asked_size(joint: Joint, load: Load, criterion: Criterion) -> float:

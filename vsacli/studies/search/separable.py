@@ -56,8 +56,8 @@ class Sampled(NamedTuple):
 
     def shaped(self, shape: tuple[int, ...]) -> Sampled:
         """Return the same with the instants divided into several axes."""
-        functions, rows = self.gradients.shape[:2]
-        return Sampled(self.values.reshape(functions, *shape), self.gradients.reshape(functions, rows, *shape))
+        values, gradients = (each.reshape(*each.shape[:-1], *shape) for each in self)
+        return Sampled(values, gradients)
 
     def part(self, part: int) -> Sampled:
         """Return the functions at a part of the instants, an index of the first of their axes."""

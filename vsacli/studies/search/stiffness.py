@@ -413,20 +413,20 @@ class StiffnessSearch:
         inside = self._with_level(every, start)
         searched = not accurate
         for _ in range(MOST_ROUNDS):
-            missed = self._missed(every, found.unknowns)
+            missed, unknowns, gap = self._missed(every, found.unknowns), found.unknowns, ROUGH_GAP
             if searched and not missed.size:
                 return _Attempt(space, found, instants, start)
-            unknowns = found.unknowns
             if missed.size:
-                instants, unknowns = np.union1d(instants, missed), self._with_level(every, unknowns[: space.size])
+                instants, gap = np.union1d(instants, missed), WARM_GAP
+                unknowns = self._with_level(every, unknowns[: space.size])
             problem = SeparableProblem([self._group(space, instants)])
             begun = interior(problem, unknowns, inside)
             if begun is None:
                 return None
             if accurate:
-                found = smoothed_minimum(problem, begun, WARM_GAP if missed.size else ROUGH_GAP, [self._whole])
+                found = smoothed_minimum(problem, begun, gap, [self._whole])
             else:
-                found = rough_minima(problem, [begun], [self._whole], WARM_GAP)[0]
+                (found,) = rough_minima(problem, [begun], [self._whole], gap)
             searched = True
             self._progress()
         return None
@@ -479,10 +479,11 @@ class StiffnessSearch:
             space = self._space(finer_pieces)
             instants = np.union1d(evenly(len(time), INSTANTS_PER_PIECE * finer_pieces + 1), best.instants)
             finer = self._near(space, instants, best, self._fitted(space, inside))
-            if finer is None or finer.minimum.cost > best.minimum.cost:
+            # of equal costs, that at more instants is the more accurate one
+            if finer is None or not finer.reaches(best):
                 break
             gained, best = best.minimum.cost - finer.minimum.cost, finer
-            if gained <= WORTH_HALVING * abs(best.minimum.cost):
+            if gained + ROUGH_GAP <= WORTH_HALVING * abs(best.minimum.cost):
                 break
         return best
 
