@@ -37,6 +37,10 @@ FOUND = 100.0
 PATIENCE, STALLED = 8, 1e-5
 """Number of steps, and the relative change of the cost within them below which the search has stalled."""
 
+CRAWLING, RAISED = 0.1, 10.0
+"""Share that no step of the last `PATIENCE` exceeds if a start is far from the path of its barrier problems, and
+the factor by which the barrier is raised then."""
+
 TO_BOUNDARY = 0.995
 """Share of the way to a zero of a slack or a multiplier that a step may cover."""
 
@@ -172,8 +176,11 @@ def _search(
     point = yield _Wanted(unknowns, derivatives=True)
     count = max(len(point.bounds), 1)
     multipliers = gap / count / -point.bounds
-    costs = [point.cost]
+    costs, shares = [point.cost], [1.0]
     for _ in range(MOST_STEPS):
+        if len(shares) >= PATIENCE and max(shares[-PATIENCE:]) < CRAWLING and gap < FIRST_GAP:
+            gap, shares = min(RAISED * gap, FIRST_GAP), [1.0]
+            multipliers = gap / count / -point.bounds
         newton = _Newton(point, multipliers)
         if newton.factor is None:
             return Minimum(unknowns, point.cost, found=False)
@@ -187,7 +194,9 @@ def _search(
         moved = yield from _line_search(point, unknowns, step, gap / count, direct=direct)
         if moved is None:
             break
-        unknowns, point, direct = moved
+        unknowns, point, halvings = moved
+        direct = not halvings
+        shares.append(0.5**halvings)
         multipliers = _moved(multipliers, step.multipliers, gap / count / -point.bounds)
         costs.append(point.cost)
     return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
@@ -253,7 +262,7 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 
 def _line_search(
     point: Point, unknowns: FloatArray, step: _Step, barrier: float, *, direct: bool
-) -> Generator[_Wanted, Any, tuple[FloatArray, Point, bool] | None]:
+) -> Generator[_Wanted, Any, tuple[FloatArray, Point, int] | None]:
     """Return the unknowns after a share of the step that lowers the barrier function inside the bounds.
 
     Args:
@@ -264,7 +273,7 @@ def _line_search(
         direct: whether the first trial is expected to succeed, so that its derivatives are evaluated at once.
 
     Returns:
-        The unknowns, cost and bounds there, and whether the first trial succeeded; None if no share did.
+        The unknowns, cost and bounds there, and the number of halvings of the share; None if no share did.
     """
     merit = point.cost - barrier * float(np.log(-point.bounds).sum())
     rounding = 1e-14 * max(1.0, abs(merit))
@@ -275,19 +284,19 @@ def _line_search(
         there = cost - barrier * float(np.log(-bounds).sum())
         return there <= merit - ARMIJO * share * step.gain + rounding
 
-    first = share = _share_to_boundary(-point.bounds, -point.changes(step.unknowns))
+    share, halvings = _share_to_boundary(-point.bounds, -point.changes(step.unknowns)), 0
     while share > SHORTEST_STEP:
         tried = unknowns + share * step.unknowns
-        if direct and share == first:
+        if direct and not halvings:
             there = yield _Wanted(tried, derivatives=True)
             if lower(there.cost, there.bounds, share):
-                return tried, there, True
+                return tried, there, 0
         else:
             values = yield _Wanted(tried, derivatives=False)
             if lower(*values, share):
                 there = yield _Wanted(tried, derivatives=True)
-                return tried, there, share == first
-        share /= 2
+                return tried, there, halvings
+        share, halvings = share / 2, halvings + 1
     return None
 
 

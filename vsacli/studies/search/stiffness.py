@@ -187,6 +187,9 @@ WORTH_HALVING = 1e-3
 SAME_COST = 1e-4
 """Relative difference of costs up to which two starts reached the same optimum."""
 
+CLOSE_COST = 1e-2
+"""Relative difference of costs with bounds at some instants up to which all bounds may change the order."""
+
 MOST_ROUNDS = 12
 """Limit on rounds that add instants of violated bounds; one or two are usual, seven were needed once."""
 
@@ -239,9 +242,9 @@ class _Attempt(NamedTuple):
     instants: IndexArray
     start: FloatArray
 
-    def reaches(self, other: _Attempt) -> bool:
-        """Return whether the cost is that of another attempt, or lower."""
-        return self.minimum.cost <= other.minimum.cost + SAME_COST * abs(other.minimum.cost)
+    def reaches(self, other: _Attempt, share: float = SAME_COST) -> bool:
+        """Return whether the cost is that of another attempt but for a share of it, or lower."""
+        return self.minimum.cost <= other.minimum.cost + share * abs(other.minimum.cost)
 
 
 class StiffnessSearch:
@@ -292,9 +295,14 @@ class StiffnessSearch:
         space = self._space(pieces)
         self._scale_by(space, starts[0])
         roughly = self._roughly(space, evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1), starts)
-        best, rough = self._best_of(roughly)
-        agreeing = sum(each.reaches(rough) and rough.reaches(each) for each in roughly)
-        return self._profile(self._accurate(self._refined(best, pieces)), len(starts), agreeing)
+        for rough in self._in_order(roughly):
+            best = self._completed_one_of(self._refined(rough, pieces))
+            if best is not None:
+                agreeing = sum(each.reaches(rough) and rough.reaches(each) for each in roughly)
+                return self._profile(best, len(starts), agreeing)
+        raise ImpossibleError(
+            f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
+        )
 
     def best_constant(self) -> Profile | None:
         """Return the best constant as a profile; None if no constant keeps all bounds."""
@@ -307,8 +315,8 @@ class StiffnessSearch:
         self._scale_by(space, start)
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
         for rough in self._roughly(space, instants, [start]):
-            found = self._completed(rough)
-            return None if found is None else self._profile(self._accurate(found), 1, 1)
+            found = self._completed_one_of([rough])
+            return None if found is None else self._profile(found, 1, 1)
         return None
 
     def _roughly(
@@ -331,28 +339,25 @@ class StiffnessSearch:
         ]
         return sorted(attempts, key=lambda each: each.minimum.cost)
 
-    def _best_of(self, roughly: Sequence[_Attempt]) -> tuple[_Attempt, _Attempt]:
-        """Return the best minimum that keeps all bounds, and the rough one from which it was completed.
+    def _in_order(self, roughly: Sequence[_Attempt]) -> Iterator[_Attempt]:
+        """Yield different minima that keep bounds at some instants, the best with all bounds first.
 
-        Raises:
-            ImpossibleError: no start led to any.
+        Bounds at further instants only raise a cost: a start that is worse without them is not completed.
         """
-        best: tuple[_Attempt, _Attempt] | None = None
-        tried: list[_Attempt] = []
+        different: list[_Attempt] = []
         for rough in roughly:
-            # bounds at further instants only raise a cost, so that no later start is better
-            if best is not None and best[0].reaches(rough):
-                break
-            if not any(rough.reaches(other) for other in tried):
-                tried.append(rough)
-                found = self._completed(rough)
-                if found is not None and (best is None or found.minimum.cost < best[0].minimum.cost):
-                    best = found, rough
-        if best is None:
-            raise ImpossibleError(
-                f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
-            )
-        return best
+            if not any(rough.reaches(other) for other in different):
+                different.append(rough)
+        close = [each for each in different if each.reaches(different[0], CLOSE_COST)]
+        if len(close) > 1:
+            costs = [self._cost_with_all_bounds(each) for each in close]
+            close = [close[index] for index in np.argsort(costs, kind="stable")]
+        yield from close
+        yield from different[len(close) :]
+
+    def _cost_with_all_bounds(self, rough: _Attempt) -> float:
+        found = self._completed(rough)
+        return np.inf if found is None else found.minimum.cost
 
     @property
     def _asked(self) -> FloatArray:
@@ -420,7 +425,7 @@ class StiffnessSearch:
                 instants, gap = np.union1d(instants, missed), WARM_GAP
                 unknowns = self._with_level(every, unknowns[: space.size])
             problem = SeparableProblem([self._group(space, instants)])
-            begun = interior(problem, unknowns, inside)
+            begun = interior(problem, unknowns, inside) if missed.size else unknowns
             if begun is None:
                 return None
             if accurate:
@@ -431,9 +436,15 @@ class StiffnessSearch:
             self._progress()
         return None
 
-    def _accurate(self, attempt: _Attempt) -> _Attempt:
-        """Return a rough minimum searched to the last barrier, if that succeeds."""
-        return self._completed(attempt, accurate=True) or attempt
+    def _completed_one_of(self, attempts: Sequence[_Attempt]) -> _Attempt | None:
+        """Return the last attempt that keeps all bounds once they count, searched to the last barrier."""
+        for attempt in reversed(attempts):
+            rough = self._completed(attempt)
+            if rough is not None:
+                found = self._completed(rough, accurate=True)
+                better = found is not None and (found.minimum.found or not rough.minimum.found)
+                return found if better or found is not None and not rough.reaches(found) else rough
+        return None
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:
         """Return cost and bounds at some instants as a group of the separable problem."""
@@ -471,21 +482,27 @@ class StiffnessSearch:
         missed[len(self._whole.bound_names) :] -= SAME_LEVEL
         return missed_instants(missed)
 
-    def _refined(self, best: _Attempt, pieces: int) -> _Attempt:
-        """Return the attempt refined with finer pieces, as long as these lower the cost."""
-        time = self._load.time
-        inside = self._basis(best.space)[0] @ best.start
+    def _refined(self, coarse: _Attempt, pieces: int) -> list[_Attempt]:
+        """Return the attempt, and those with finer pieces as long as these lower the cost.
+
+        Bounds are kept at some instants, among them those at which the coarser splines violate them.
+        """
+        time, found = self._load.time, [coarse]
+        inside = self._basis(coarse.space)[0] @ coarse.start
         for finer_pieces in self._finer_than(pieces):
-            space = self._space(finer_pieces)
-            instants = np.union1d(evenly(len(time), INSTANTS_PER_PIECE * finer_pieces + 1), best.instants)
+            best, space = found[-1], self._space(finer_pieces)
+            every = self._group(best.space, np.arange(len(time)))
+            needed = np.union1d(best.instants, self._missed(every, best.minimum.unknowns))
+            instants = np.union1d(evenly(len(time), INSTANTS_PER_PIECE * finer_pieces + 1), needed)
             finer = self._near(space, instants, best, self._fitted(space, inside))
             # of equal costs, that at more instants is the more accurate one
-            if finer is None or not finer.reaches(best):
+            if finer is None or not finer.reaches(best, WORTH_HALVING):
                 break
-            gained, best = best.minimum.cost - finer.minimum.cost, finer
-            if gained + ROUGH_GAP <= WORTH_HALVING * abs(best.minimum.cost):
+            found.append(finer)
+            gained = best.minimum.cost - finer.minimum.cost
+            if gained + ROUGH_GAP <= WORTH_HALVING * abs(finer.minimum.cost):
                 break
-        return best
+        return found
 
     def _near(
         self, space: SplineSpace, instants: IndexArray, coarse: _Attempt, start: FloatArray
@@ -500,7 +517,7 @@ class StiffnessSearch:
             return None
         (found,) = rough_minima(problem, [begun], [self._whole], WARM_GAP)
         self._progress()
-        return self._completed(_Attempt(space, found, instants, start))
+        return _Attempt(space, found, instants, start)
 
     def _profile(self, attempt: _Attempt, starts: int, agreeing: int) -> Profile:
         amounts = attempt.minimum.unknowns[: attempt.space.size]
