@@ -52,7 +52,10 @@ class Program:
         cost = casadi.mtimes(casadi.sum1(torques * torques) / 2, casadi.DM(self.weights))
         most = self.joint.actuator.motors[0].max_torque
         bounded = [rows[0]] + ([casadi.vec(torques)] if np.isfinite(most) else [])
-        ends = [np.append(each, np.full(torques.numel() * np.isfinite(most), end)) for each, end in self._ends(most)]
+        ends = [
+            np.append(each, np.full(torques.numel() * np.isfinite(most), end))
+            for each, end in self._ends(most)
+        ]
         scale = float(cost_of(cost, unknowns, self.start / size)) or 1.0
         program = {"x": unknowns, "f": cost / scale, "g": casadi.vertcat(*bounded)}
         found = casadi.nlpsol("solver", "ipopt", program, QUIET)(

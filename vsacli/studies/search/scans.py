@@ -234,7 +234,8 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     """
     low, high = _bounds(acceptance, joint, load)
     raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
-    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, -low)
+    most = -low if raised is None else min(-low, raised)
+    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, most)
     found = [offset for offset in (raised, lowered) if offset is not None]
     if found:
         return min(found, key=abs)
@@ -291,6 +292,10 @@ class OffsetCandidates:
         ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
         start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
         stop = math.floor(min(high, ratio * self._softest) / unit + GRID_ROUNDING)
+        if start > stop:
+            return None
+        if self.confirms(start):  # mostly, since few motions come near the limits of the motors
+            return self.value(start)
         near = self._scan_start(start, stop)
         number = None if near is None else smallest_confirmed(self, near, stop)
         return None if number is None else self.value(number)
