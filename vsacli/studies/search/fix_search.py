@@ -270,7 +270,7 @@ def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
-    if CombinedSearch(alone, branches=True).smallest() is not None:
+    if CombinedSearch(alone, branches=True).possible():
         return True
     with suppress(ImpossibleError):
         alone.with_profiles(AS_IT_IS)

@@ -208,6 +208,9 @@ LARGEST_RATIO = 100
 OFFSETS_AT_ONCE = 64
 """Offsets evaluated in one call, which costs hardly more than a single one."""
 
+FEWEST_STEPS = 5
+"""Samples that are checked first at offsets far from the bound of the range."""
+
 OFFSET_DIGITS = 4
 """Decimal places of an offset after the leading digit of the stiffness: the grid of printed values."""
 
@@ -331,15 +334,23 @@ class OffsetCandidates:
 
     def _first_accepted(self, numbers: Sequence[int], first: int, steps: IndexArray) -> int:
         """Return the index, from `first` on, of a number that these samples accept, or len(numbers)."""
-        for begin in range(first, len(numbers), OFFSETS_AT_ONCE):
-            tried = numbers[begin : begin + OFFSETS_AT_ONCE]
-            load = self._load.at(np.tile(steps, len(tried)))
-            values = np.repeat([self.value(number) for number in tried], len(steps))
-            refused = self._acceptance.refused_steps(self._joint, load.changed(values))
-            accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+        near = np.arange(first, min(first + OFFSETS_AT_ONCE, len(numbers)))
+        accepted = self._accepted(numbers, near, steps)
+        far = np.arange(first + OFFSETS_AT_ONCE, len(numbers))
+        if not accepted.size and far.size:  # mostly refused, too: a few samples tell
+            far = self._accepted(numbers, far, steps[evenly(len(steps), FEWEST_STEPS)])
+        for begin in range(0, len(far), OFFSETS_AT_ONCE):
             if accepted.size:
-                return begin + int(accepted[0])
-        return len(numbers)
+                break
+            accepted = self._accepted(numbers, far[begin : begin + OFFSETS_AT_ONCE], steps)
+        return int(accepted[0]) if accepted.size else len(numbers)
+
+    def _accepted(self, numbers: Sequence[int], tried: IndexArray, steps: IndexArray) -> IndexArray:
+        """Return the indices, among those tried, of the numbers that these samples accept."""
+        load = self._load.at(np.tile(steps, len(tried)))
+        values = np.repeat([self.value(numbers[index]) for index in tried], len(steps))
+        refused = self._acceptance.refused_steps(self._joint, load.changed(values))
+        return tried[~refused.reshape(len(tried), -1).any(axis=1)]
 
     def stride(self, number: int) -> int:
         """Return 1 % of the changed stiffness."""
