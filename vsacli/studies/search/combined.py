@@ -59,6 +59,7 @@ class CombinedSearch:
         self._factors = Factors.of(task.trajectory)
         self._watch(watched)
         self._impossible = task.impossible.setdefault((form, branches), set())
+        self._impossible_paths = task.impossible.setdefault(None, set())
 
     @property
     def exchangeable(self) -> bool:
@@ -164,7 +165,7 @@ class CombinedSearch:
 
         None may also mean that its cost is not below a limit.
         """
-        if number in self._impossible:
+        if number in self._impossible or number in self._impossible_paths:
             return None
         if number not in self._found:
             try:
@@ -182,7 +183,9 @@ class CombinedSearch:
 
         The bound of the constants is that of a few samples at all factors at once.
         """
-        numbers = [number for number in self._scanned() if number not in self._impossible]
+        self._rule_out_paths()
+        ruled_out = self._impossible | self._impossible_paths
+        numbers = [number for number in self._scanned() if number not in ruled_out]
         least = [self.task.cost.of_factor(self._factors.factor(number)) for number in numbers]
         # limits allow for the noise of a recording, which the admissible range does not know
         if self.form is constant_change and not self.task.trajectory.estimates and numbers:
@@ -242,21 +245,42 @@ class CombinedSearch:
                 impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
         return impossible
 
+    def _loads(self, factor: float) -> list[Load]:
+        """Return the load of each joint at the watched samples, slowed down by a factor.
+
+        Raises:
+            ImpossibleError: a joint exceeds a limit of position or velocity.
+        """
+        watched, acceptance = self._watched, self.task.acceptance
+        instants = Instants(watched.motion.time, watched.factor * factor)
+        commands = self._path.at(Speeds.even(factor, len(instants.time)))
+        loads = [Load(instants.time, command, instants) for command in commands]
+        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
+            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
+                raise ImpossibleError(reason)
+        return loads
+
+    def _rule_out_paths(self) -> None:
+        """Note the scanned factors at which the path is too fast; faster ones than such a factor are, too."""
+        numbers = [number for number in self._scanned() if number not in self._impossible_paths]
+        refused, accepted = -1, len(numbers)
+        middle = 0  # mostly, no factor is refused
+        while accepted - refused > 1:
+            try:
+                self._loads(self._factors.factor(numbers[middle]))
+                accepted = middle
+            except ImpossibleError:
+                refused = middle
+            middle = (accepted + refused) // 2
+        self._impossible_paths |= set(numbers[: refused + 1])
+
     def _fixed(self, factor: float, below: float) -> Combination | None:
         """Return the changes of all joints at a factor, or None if their cost is not below a limit.
 
         Raises:
             ImpossibleError: some joint is refused at any stiffness.
         """
-        acceptance = self.task.acceptance
-        watched = self._watched
-        instants = Instants(watched.motion.time, watched.factor * factor)
-        commands = self._path.at(Speeds.even(factor, len(instants.time)))
-        loads = [Load(instants.time, command, instants) for command in commands]
-        joints = list(enumerate(zip(self._choices, loads, strict=True)))
-        for index, (choices, load) in joints:
-            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
-                raise ImpossibleError(reason)
+        joints = list(enumerate(zip(self._choices, self._loads(factor), strict=True)))
         sizes, found = [self.task.cost.of_factor(factor)], []
         for index, (choices, load) in joints:
             found.append(self._of_joint(index, choices, load))
