@@ -395,9 +395,9 @@ difference within which two starts count as equal."""
 
 
 class Costed(Protocol):
-    """A part of a problem with a cost that can be smoothed."""
+    """A part of a problem with a cost that can be smoothed, in successive searches by `smoothings`."""
 
-    criterion: Criterion
+    smoothings: Sequence[float]
     scale: Scale
 
 
@@ -414,7 +414,7 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
     """
     if gap > WARM_GAP:
         return rough_minima(problem, [start], costed, gap)[0]
-    _smooth(costed, costed[0].criterion.smoothings[-1])
+    _smooth(costed, costed[0].smoothings[-1])
     found = minimize(problem, start, gap)
     if not found.found:  # steps became short; with new multipliers they are long again
         found = minimize(problem, found.unknowns, WARM_GAP)
@@ -428,7 +428,7 @@ def rough_minima(
 
     See `smoothed_minimum`; only a cold search smooths the cost more than in the end.
     """
-    smoothings = costed[0].criterion.smoothings
+    smoothings = costed[0].smoothings
     found: list[Minimum] = []
     for smoothing in smoothings if gap > WARM_GAP else smoothings[-1:]:
         _smooth(costed, smoothing)

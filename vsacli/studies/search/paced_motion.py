@@ -200,6 +200,11 @@ class PacedJoint:
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
 
     @property
+    def smoothings(self) -> Sequence[float]:
+        """Smoothings of the cost in successive searches."""
+        return self.criterion.smoothings
+
+    @property
     def name(self) -> str:
         """Name of the joint."""
         return self._joint.name

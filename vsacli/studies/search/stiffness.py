@@ -7,12 +7,14 @@ long as these lower the cost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.motor import SHAFT
 from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.flags import MIN_MARGIN
@@ -25,6 +27,7 @@ from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range,
 from vsacli.studies.search.criteria import (
     ENDS_OF_CORRIDOR,
     ROUGH_GAP,
+    SMOOTHINGS,
     Criterion,
     Scale,
     limit_bounds,
@@ -70,7 +73,9 @@ class FixedMotion:
         self.joint, self.load, self.admissible = joint, load, admissible
         self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
         self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
-        self._carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
+        self.smoothings = SMOOTHINGS if _has_sharp_friction(joint) else criterion.smoothings
+        self._speed = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
+        self._smoothed: dict[float, tuple[Joint, Joint]] = {}
         self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
 
     @property
@@ -99,10 +104,37 @@ class FixedMotion:
     def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
         """Return the variables of the motors for a stiffness and its derivatives."""
         load = self.load.at(instants).command
+        plain, carrying = self._joints(self.scale.smoothing)
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
-        joint = self._carrying if isinstance(rows[0], Dual) else self.joint
+        joint = carrying if isinstance(rows[0], Dual) else plain
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
+
+    def _joints(self, smoothing: float) -> tuple[Joint, Joint]:
+        """Return the joint with its sharp friction smoothed, and a copy that carries derivatives."""
+        if smoothing not in self._smoothed:
+            width = smoothing * self._speed
+            joint = _with_friction_of(self.joint, width) if _has_sharp_friction(self.joint) else self.joint
+            carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
+            self._smoothed[smoothing] = joint, carrying
+        return self._smoothed[smoothing]
+
+
+def _has_sharp_friction(joint: Joint) -> bool:
+    return any(motor.friction is not None and motor.friction.sharp for motor in joint.actuator.motors)
+
+
+def _with_friction_of(joint: Joint, width: float) -> Joint:
+    """Return a joint whose motors' friction changes its sign over a width of their velocity at the joint.
+
+    A sharp change would make a sum over instants jump wherever a motor stops at another one.
+    """
+    motors = []
+    for motor in joint.actuator.motor:  # type: ignore[attr-defined]  # of all that have a stiffness to choose
+        ratio = abs(motor.gear_ratio or 1.0) if motor.side == SHAFT else 1.0
+        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, ratio * width))
+        motors.append(replace(motor, friction=friction))
+    return replace(joint, actuator=replace(joint.actuator, motor=tuple(motors)))  # type: ignore[call-arg]
 
 
 INSIDE = 1e-3
@@ -404,7 +436,7 @@ class StiffnessSearch:
         every = np.arange(len(self._load.time))
         driven = self._whole.driven(self._basis(space) @ amounts, every)
         size = self._criterion.size(self._joint, driven, self._load.time)
-        self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
+        self._whole.scale = Scale(size, self._span[1] - self._span[0], self._whole.smoothings[0])
 
     def _completed(self, attempt: _Attempt, *, accurate: bool = False) -> _Attempt | None:
         """Return an attempt that keeps all bounds at all instants, or None.
