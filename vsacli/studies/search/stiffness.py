@@ -110,6 +110,19 @@ class FixedMotion:
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
+    def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
+        """Return the cost of each of some constants, (constants,); infinite if a limit of a motor is missed."""
+        asked, still = np.repeat(constants, len(instants)), np.zeros(len(constants) * len(instants))
+        driven = self.driven([asked, still, still], np.tile(instants, len(constants)))
+        excess = np.max([still - 1, *limit_bounds(self._limits, driven, self._clearance)], axis=0)
+        kept = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
+        time, costs = self.load.time[instants], np.full(len(constants), np.inf)
+        for number in np.flatnonzero(kept).tolist():
+            part = slice(number * len(instants), (number + 1) * len(instants))
+            own = {name: variable[..., part] for name, variable in driven.items()}
+            costs[number] = self.criterion.of(self.joint, own, time)
+        return np.where(np.isnan(costs), np.inf, costs)
+
     def _joints(self, smoothing: float) -> tuple[Joint, Joint]:
         """Return the joint with its sharp friction smoothed, and a copy that carries derivatives."""
         if smoothing not in self._smoothed:
@@ -228,6 +241,12 @@ MOST_ROUNDS = 12
 SAME_LEVEL = 1e-5
 """Share of a level by which values may exceed it at some instants: a tenth of `SAME_COST`."""
 
+GRID, SAME_CONSTANT = 33, 1e-6
+"""Constants that are compared at once, and the relative width of their range at which the search ends."""
+
+STIFFEST = 100.0
+"""Largest constant that is tried, as a multiple of the smallest admissible one."""
+
 FIRST_LEVEL = 1.05
 """Initial level, as a multiple of the largest value that it bounds."""
 
@@ -338,18 +357,40 @@ class StiffnessSearch:
 
     def best_constant(self) -> Profile | None:
         """Return the best constant as a profile; None if no constant keeps all bounds."""
-        space = SplineSpace.constant(self._span)
-        low, high = float(self._admissible.low.max()), float(self._admissible.high.min())
+        space, stiffness = SplineSpace.constant(self._span), self._whole.stiffness
+        low = float(self._admissible.low.max()) + CLEARANCE * stiffness
+        high = min(float(self._admissible.high.min()) - CLEARANCE * stiffness, STIFFEST * low)
         if low >= high:
             return None
-        clearance = min(INSIDE * low, (high - low) / 4)
-        start = np.clip(self._asked.mean(keepdims=True), low + clearance, high - clearance)
-        self._scale_by(space, start)
+        self._scale_by(space, np.array([low]))
+        every = self._group(space, np.arange(len(self._load.time)))
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
-        for rough in self._roughly(space, instants, [start]):
-            found = self._completed_one_of([rough])
-            return None if found is None else self._profile(found, 1, 1)
+        for _ in range(MOST_ROUNDS):
+            found = self._zoomed(low, high, instants)
+            self._progress()
+            if found is None:
+                return None
+            constant, cost = found
+            unknowns = np.array([constant, cost / self._whole.scale.cost])[: 1 + self._criterion.levels]
+            missed = np.setdiff1d(self._missed(every, unknowns), instants)
+            if not missed.size:
+                minimum = Minimum(unknowns, cost / self._whole.scale.cost, found=True)
+                return self._profile(_Attempt(space, minimum, instants, unknowns[:1]), 1, 1)
+            instants = np.union1d(instants, missed)
         return None
+
+    def _zoomed(self, low: float, high: float, instants: IndexArray) -> tuple[float, float] | None:
+        """Return the best constant between two and its cost, with bounds at some instants; None without any."""
+        best, grid = None, np.geomspace(low, high, GRID)
+        while best is None or grid[-1] - grid[0] > SAME_CONSTANT * best[0]:
+            costs = self._whole.costs_of_constants(grid, instants)
+            at = int(costs.argmin())
+            if costs[at] == np.inf:
+                return best
+            if best is None or costs[at] <= best[1]:
+                best = float(grid[at]), float(costs[at])
+            grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, GRID - 1)], GRID)
+        return best
 
     def _roughly(
         self, space: SplineSpace, instants: IndexArray, starts: Sequence[FloatArray]
