@@ -37,10 +37,6 @@ FOUND = 100.0
 PATIENCE, STALLED = 8, 1e-5
 """Number of steps, and the relative change of the cost within them below which the search has stalled."""
 
-CRAWLING, RAISED = 0.1, 10.0
-"""Share that no step of the last `PATIENCE` exceeds if a start is far from the path of its barrier problems, and
-the factor by which the barrier is raised then."""
-
 TO_BOUNDARY = 0.995
 """Share of the way to a zero of a slack or a multiplier that a step may cover."""
 
@@ -124,14 +120,18 @@ def minimize(
 
 
 def minimize_all(
-    problem: Problem, starts: Sequence[FloatArray], gap: float = FIRST_GAP, last: float = LAST_GAP
+    problem: Problem,
+    starts: Sequence[FloatArray],
+    gap: float = FIRST_GAP,
+    last: float = LAST_GAP,
+    stalled: float = STALLED,
 ) -> list[Minimum]:
     """Search for a minimum from each of several starts; see `minimize`.
 
     The searches take their steps together: evaluating a problem at several places costs little more than at
     one. No search depends on the others.
     """
-    return _together(problem, [_search(start, gap, last) for start in starts])
+    return _together(problem, [_search(start, gap, last, stalled) for start in starts])
 
 
 class _Wanted(NamedTuple):
@@ -168,7 +168,7 @@ def _search(
     start: FloatArray,
     gap: float,
     last: float,
-    stalled: float = STALLED,
+    stalled: float,
     enough: Callable[[FloatArray], bool] = lambda _: False,
 ) -> _Search:
     """Search from one start; see `minimize`."""
@@ -176,11 +176,8 @@ def _search(
     point = yield _Wanted(unknowns, derivatives=True)
     count = max(len(point.bounds), 1)
     multipliers = gap / count / -point.bounds
-    costs, shares = [point.cost], [1.0]
+    costs = [point.cost]
     for _ in range(MOST_STEPS):
-        if len(shares) >= PATIENCE and max(shares[-PATIENCE:]) < CRAWLING and gap < FIRST_GAP:
-            gap, shares = min(RAISED * gap, FIRST_GAP), [1.0]
-            multipliers = gap / count / -point.bounds
         newton = _Newton(point, multipliers)
         if newton.factor is None:
             return Minimum(unknowns, point.cost, found=False)
@@ -194,9 +191,7 @@ def _search(
         moved = yield from _line_search(point, unknowns, step, gap / count, direct=direct)
         if moved is None:
             break
-        unknowns, point, halvings = moved
-        direct = not halvings
-        shares.append(0.5**halvings)
+        unknowns, point, direct = moved
         multipliers = _moved(multipliers, step.multipliers, gap / count / -point.bounds)
         costs.append(point.cost)
     return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
@@ -262,7 +257,7 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 
 def _line_search(
     point: Point, unknowns: FloatArray, step: _Step, barrier: float, *, direct: bool
-) -> Generator[_Wanted, Any, tuple[FloatArray, Point, int] | None]:
+) -> Generator[_Wanted, Any, tuple[FloatArray, Point, bool] | None]:
     """Return the unknowns after a share of the step that lowers the barrier function inside the bounds.
 
     Args:
@@ -273,7 +268,7 @@ def _line_search(
         direct: whether the first trial is expected to succeed, so that its derivatives are evaluated at once.
 
     Returns:
-        The unknowns, cost and bounds there, and the number of halvings of the share; None if no share did.
+        The unknowns, cost and bounds there, and whether the first trial succeeded; None if no share did.
     """
     merit = point.cost - barrier * float(np.log(-point.bounds).sum())
     rounding = 1e-14 * max(1.0, abs(merit))
@@ -290,12 +285,12 @@ def _line_search(
         if direct and not halvings:
             there = yield _Wanted(tried, derivatives=True)
             if lower(there.cost, there.bounds, share):
-                return tried, there, 0
+                return tried, there, True
         else:
             values = yield _Wanted(tried, derivatives=False)
             if lower(*values, share):
                 there = yield _Wanted(tried, derivatives=True)
-                return tried, there, halvings
+                return tried, there, not halvings
         share, halvings = share / 2, halvings + 1
     return None
 

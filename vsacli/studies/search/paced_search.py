@@ -16,8 +16,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.search.criteria import smoothed_minimum, trapezoidal
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
+from vsacli.studies.search.criteria import rough_minima, smoothed_minimum, trapezoidal
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize_all
 from vsacli.studies.search.loads import Ends
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,
@@ -39,6 +39,9 @@ INSTANTS_PER_PIECE = 12
 MOST_ROUNDS = 12
 """Limit on rounds that add instants of violated bounds: a motion with two dwells, bounded only by the ends of
 its attainable ranges, required seven."""
+
+WORTH_COMPLETING = 1e-4
+"""Share of the best cost by which a start must be lower while bounds are kept at some instants only."""
 
 ACTIVE = 1e-2
 """Relative distance from a bound below which it is active; barriers keep a motion a thousandth away."""
@@ -107,8 +110,10 @@ class PacedSearch:
         """Return a start among finer splines, near the pace (key None) and the stiffness of joints."""
         raise NotImplementedError
 
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        """Return a minimum of the cost; the first barrier raises it by `gap`."""
+    def _minima(
+        self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
+    ) -> Sequence[Minimum]:
+        """Return a minimum of the cost near each start; the first barrier raises it by `gap`."""
         raise NotImplementedError
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
@@ -124,16 +129,15 @@ class PacedSearch:
         pieces, *further = self.pieces
         spaces = self._spaces(pieces)
         starts = self._starts(spaces)
-        attempts = [self._attempt(spaces, pieces, *start) for start in starts]
-        kept = [attempt for attempt in attempts if attempt is not None]
-        if not kept:
-            raise ImpossibleError(self.nothing_kept)
-        best = min(kept, key=lambda minimum: minimum.cost)
-        agreeing = sum(minimum.cost <= best.cost + self.same_cost * abs(best.cost) for minimum in kept)
+        best, agreeing = self._best_of(spaces, self._instants(pieces), starts)
         for pieces in further:
             finer = self._spaces(pieces)
-            refined = self._attempt(finer, pieces, *self._refined_start(finer, self._rows(spaces, best)))
-            if refined is None or refined.cost > best.cost:
+            start = self._refined_start(finer, self._rows(spaces, best))
+            try:
+                refined, _ = self._best_of(finer, self._instants(pieces), [start])
+            except ImpossibleError:
+                break
+            if refined.cost > best.cost:
                 break
             gained, spaces, best = best.cost - refined.cost, finer, refined
             if gained <= self.worth * abs(best.cost):
@@ -153,24 +157,55 @@ class PacedSearch:
         places = np.linspace(*self._span, LEVELS)
         return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
 
-    def _attempt(
-        self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
+    def _instants(self, pieces: int) -> IndexArray:
+        """Return the instants at which bounds of splines with this many pieces are kept at first."""
+        return evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
+
+    def _best_of(
+        self, spaces: PacedSpaces, instants: IndexArray, starts: Sequence[Start]
+    ) -> tuple[Minimum, int]:
+        """Return the best minimum that keeps all bounds, and the number of starts that reached it.
+
+        Bounds at further instants only raise a cost: starts whose minimum without them is no better than the
+        best result are discarded.
+
+        Raises:
+            ImpossibleError: no start led to any.
+        """
+        problem, best = SeparableProblem(self._groups(spaces, instants)), None
+        begun = [(interior(problem, wanted, inside), inside) for wanted, inside in starts]
+        inner = [(unknowns, inside) for unknowns, inside in begun if unknowns is not None]
+        roughly = self._minima(problem, [unknowns for unknowns, _ in inner], FIRST_GAP) if inner else []
+        self._progress()
+        pairs = zip(roughly, (inside for _, inside in inner), strict=True)
+        for rough, inside in sorted(pairs, key=lambda pair: pair[0].cost):
+            if best is not None and rough.cost > best[0].cost - WORTH_COMPLETING * abs(best[0].cost):
+                break
+            kept = self._completed(spaces, instants, rough, inside)
+            if kept is not None and (best is None or kept.cost < best[0].cost):
+                best = kept, rough.cost
+        if best is None:
+            raise ImpossibleError(self.nothing_kept)
+        found, least = best
+        return found, sum(each.cost <= least + self.same_cost * abs(least) for each in roughly)
+
+    def _completed(
+        self, spaces: PacedSpaces, instants: IndexArray, found: Minimum, inside: FloatArray | None
     ) -> Minimum | None:
-        """Search from a start, adding instants until all bounds are kept; return None if that fails."""
-        instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
-        every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
+        """Return a minimum after adding the instants at which it violates bounds, or None."""
+        every = self._groups(spaces, np.arange(len(self._s)))
         for _ in range(MOST_ROUNDS):
-            problem = SeparableProblem(self._groups(spaces, instants))
-            begun = interior(problem, wanted, inside)
-            if begun is None:
-                return None
-            found, gap = self._minimum(problem, begun, gap), WARM_GAP
-            self._progress()
             kept = self._accepted(spaces, every, found)
             if kept is not None:
                 return kept
             bounds = np.concatenate([group.bounds(group.rows(found.unknowns)) for group in every])
-            instants, wanted = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2)), found.unknowns
+            instants = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2))
+            problem = SeparableProblem(self._groups(spaces, instants))
+            begun = interior(problem, found.unknowns, inside)
+            if begun is None:
+                return None
+            (found,) = self._minima(problem, [begun], WARM_GAP)
+            self._progress()
         return None
 
     def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
@@ -220,6 +255,9 @@ FEW = 100
 
 SLOWEST, STRIDE = 1000.0, 1.1
 """Largest factor of a uniform slow-down that is tried, and the ratio of successive factors."""
+
+FACTORS_AT_ONCE = 16
+"""Factors that are tried in one call."""
 
 HALVINGS = 16
 """Bisections of the last stride, to 1e-6 of the factor."""
@@ -340,27 +378,41 @@ class TimingSearch(PacedSearch):
 
     def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
         """Return the smallest constant pace that keeps all bounds, or None."""
-        few = self._groups(spaces, evenly(len(self._s), FEW))
-        every = self._groups(spaces, np.arange(len(self._s)))
+        few = SeparableProblem(self._groups(spaces, evenly(len(self._s), FEW)))
+        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
+        even, pace = spaces.even(self._s, 1.0, stiffness), spaces.even(self._s, 2.0, stiffness)
+        pace -= even  # unknowns that make the pace faster by one
 
-        def kept(groups: Sequence[Group], factor: float) -> bool:
-            unknowns = spaces.even(self._s, factor, stiffness)
-            ((_, bounds),) = SeparableProblem(groups).values([unknowns])
-            return bool(np.all(bounds < 0))
+        def kept(problem: SeparableProblem, *factors: float) -> list[bool]:
+            found = problem.values([even + (factor - 1) * pace for factor in factors])
+            return [bool(np.all(bounds < 0)) for _, bounds in found]
 
-        factor = FASTEST
-        while not (kept(few, SLACK * factor) and kept(every, factor) and kept(every, SLACK * factor)):
-            factor *= STRIDE
-            if factor > SLOWEST:
-                return None
+        factors = FASTEST * STRIDE ** np.arange(math.ceil(math.log(SLOWEST / FASTEST) / math.log(STRIDE)))
+        for begin in range(0, len(factors), FACTORS_AT_ONCE):
+            tried = factors[begin : begin + FACTORS_AT_ONCE].tolist()
+            hopeful = kept(few, *(SLACK * factor for factor in tried))
+            factor = next(
+                (
+                    factor
+                    for factor, hope in zip(tried, hopeful, strict=True)
+                    if hope and all(kept(every, factor, SLACK * factor))
+                ),
+                None,
+            )
+            if factor is not None:
+                break
+        else:
+            return None
         refused = factor / STRIDE
         for _ in range(HALVINGS):
             middle = math.sqrt(refused * factor)
-            refused, factor = (refused, middle) if kept(every, middle) else (middle, factor)
+            refused, factor = (refused, middle) if kept(every, middle)[0] else (middle, factor)
         return factor
 
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        return minimize(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
+    def _minima(
+        self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
+    ) -> Sequence[Minimum]:
+        return minimize_all(problem, starts, gap, LAST_TIMING_GAP, STALLED_TIMING)
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""
@@ -466,8 +518,12 @@ class CheapestPaceSearch(PacedSearch):
         ]
         return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(over)).max()))
 
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        return smoothed_minimum(problem, start, gap, self._joints)
+    def _minima(
+        self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
+    ) -> Sequence[Minimum]:
+        if gap > WARM_GAP:
+            return rough_minima(problem, starts, self._joints, gap)
+        return [smoothed_minimum(problem, start, gap, self._joints) for start in starts]
 
     def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         ((_, bounds),) = SeparableProblem(every).values([found.unknowns])

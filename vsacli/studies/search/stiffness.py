@@ -111,7 +111,7 @@ class FixedMotion:
             return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
     def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
-        """Return the cost of each of some constants, (constants,); infinite if a limit of a motor is missed."""
+        """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""
         asked, still = np.repeat(constants, len(instants)), np.zeros(len(constants) * len(instants))
         driven = self.driven([asked, still, still], np.tile(instants, len(constants)))
         excess = np.max([still - 1, *limit_bounds(self._limits, driven, self._clearance)], axis=0)
@@ -347,8 +347,12 @@ class StiffnessSearch:
         self._scale_by(space, starts[0])
         roughly = self._roughly(space, evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1), starts)
         for rough in self._in_order(roughly):
-            best = self._completed_one_of(self._refined(rough, pieces))
+            levels = self._refined(rough, pieces)
+            best = self._completed_one_of(levels)
             if best is not None:
+                if len(self._whole.smoothings) > 1:  # the smoothed cost of finer splines may mislead
+                    kept = [best, *filter(self._keeps_all, levels[:-1])]
+                    best = min(kept, key=self._unsmoothed_cost)
                 agreeing = sum(each.reaches(rough) and rough.reaches(each) for each in roughly)
                 return self._profile(best, len(starts), agreeing)
         raise ImpossibleError(
@@ -411,6 +415,17 @@ class StiffnessSearch:
             for (start, _), minimum in zip(begun, found, strict=True)
         ]
         return sorted(attempts, key=lambda each: each.minimum.cost)
+
+    def _keeps_all(self, attempt: _Attempt) -> bool:
+        """Return whether an attempt keeps all bounds at all instants."""
+        every = self._group(attempt.space, np.arange(len(self._load.time)))
+        return not self._missed(every, attempt.minimum.unknowns).size
+
+    def _unsmoothed_cost(self, attempt: _Attempt) -> float:
+        """Return the cost over all instants without smoothing."""
+        rows = self._basis(attempt.space) @ attempt.minimum.unknowns[: attempt.space.size]
+        driven = self._whole.driven(rows, np.arange(len(self._load.time)))
+        return self._criterion.of(self._joint, driven, self._load.time)
 
     def _in_order(self, roughly: Sequence[_Attempt]) -> Iterator[_Attempt]:
         """Yield different minima that keep bounds at some instants, the best with all bounds first.
