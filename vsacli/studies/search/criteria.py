@@ -80,7 +80,8 @@ class MotorsOfRun(NamedTuple):
         """Return the variables of a run along a trajectory."""
         run = Run(robot, trajectory)
         rows = [(block.time, block.tau_motor, block.elastic_energy) for block in run]
-        return cls(robot, *map(np.concatenate, zip(*rows, strict=True)), run.energies())
+        time, tau_motor, elastic_energy = map(np.concatenate, zip(*rows, strict=True))
+        return cls(robot, time, tau_motor, elastic_energy, run.energies())
 
     def torques(self, index: int) -> FloatArray:
         """Return the torques of the motors that a joint has, (motors, samples)."""
@@ -397,8 +398,10 @@ difference within which two starts count as equal."""
 class Costed(Protocol):
     """A part of a problem with a cost that can be smoothed, in successive searches by `smoothings`."""
 
-    smoothings: Sequence[float]
     scale: Scale
+
+    @property
+    def smoothings(self) -> Sequence[float]: ...  # noqa: D102
 
 
 def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Sequence[Costed]) -> Minimum:

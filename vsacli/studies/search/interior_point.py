@@ -288,7 +288,8 @@ def _line_search(
                 return tried, there, True
         else:
             values = yield _Wanted(tried, derivatives=False)
-            if lower(*values, share):
+            cost, bounds = values
+            if lower(cost, bounds, share):
                 there = yield _Wanted(tried, derivatives=True)
                 return tried, there, not halvings
         share, halvings = share / 2, halvings + 1

@@ -1,221 +1,29 @@
 """The stiffness profile of one joint that minimizes a cost along a fixed motion.
 
-Cost and bounds are functions of the stiffness and its derivatives at each instant. An interior-point method
-starts from several smooth profiles inside the attainable range and refines the best with finer splines, as
-long as these lower the cost.
+An interior-point method starts from several smooth profiles inside the attainable range, with bounds at some
+instants. Starts that lead to a higher cost are discarded; the best is refined with finer splines, as long as
+these lower the cost, until it keeps the bounds at all instants.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.motor import SHAFT
-from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
-from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import driven_by
-from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range, checked_range
-from vsacli.studies.search.criteria import (
-    ENDS_OF_CORRIDOR,
-    ROUGH_GAP,
-    SMOOTHINGS,
-    Criterion,
-    Scale,
-    limit_bounds,
-    limit_names,
-    made_to_carry,
-    rough_minima,
-    smoothed_minimum,
-    trapezoidal,
-)
-from vsacli.studies.search.interior_point import WARM_GAP, Minimum, minimize
+from vsacli.studies.search.criteria import ROUGH_GAP, Criterion, Scale, rough_minima, smoothed_minimum
+from vsacli.studies.search.fixed_motion import CLEARANCE, FixedMotion, best_of_constants
+from vsacli.studies.search.interior_point import WARM_GAP, Minimum
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
-
-CLEARANCE = 1e-6
-"""Relative distance that a profile keeps from each bound, so that rounding does not cross it."""
-
-OF_MOTORS = ("phi", "dtheta", "tau_motor", "current", "voltage")
-"""Limited variables that depend on the stiffness."""
-
-
-class FixedMotion:
-    """The `Functions` of a stiffness and its first two derivatives, and of a level if the cost is one.
-
-    Args:
-        joint: joint whose stiffness varies.
-        load: load of the joint at all instants.
-        admissible: admissible stiffness at these instants.
-        criterion: objective.
-        scale: scale of the cost.
-        reserve: required clearance to the limits of the motors, as a share of each.
-    """
-
-    def __init__(
-        self,
-        joint: Joint,
-        load: Load,
-        admissible: Range,
-        criterion: Criterion,
-        scale: Scale,
-        reserve: float = 0.0,
-    ) -> None:
-        self.joint, self.load, self.admissible = joint, load, admissible
-        self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
-        self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
-        self.smoothings = SMOOTHINGS if _has_sharp_friction(joint) else criterion.smoothings
-        self._speed = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
-        self._smoothed: dict[float, tuple[Joint, Joint]] = {}
-        self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
-
-    @property
-    def bound_names(self) -> list[str]:
-        """Names of the first bounds; the bounds after these belong to levels."""
-        return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
-
-    @property
-    def further_bounds(self) -> int:
-        """Number of bounds after the two of the stiffness itself."""
-        return len(self.bound_names) - 2 + self.criterion.bound_count(self.joint)
-
-    def __call__(
-        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
-    ) -> tuple[list[Any], list[Any]]:
-        """Return integrands of the cost, and bounds; see `Functions`."""
-        driven = self.driven(rows[: STIFFNESS.orders], instants)
-        level = rows[STIFFNESS.orders] if self.criterion.levels else None
-        asked = (self.joint, driven, level, self.scale)
-        low, high = (row[instants] for row in self.admissible)
-        size = self.stiffness
-        bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
-        bounds += limit_bounds(self._limits, driven, self._clearance)
-        return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
-
-    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
-        """Return the variables of the motors for a stiffness and its derivatives."""
-        load = self.load.at(instants).command
-        plain, carrying = self._joints(self.scale.smoothing)
-        commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
-        joint = carrying if isinstance(rows[0], Dual) else plain
-        with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
-
-    def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
-        """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""
-        asked, still = np.repeat(constants, len(instants)), np.zeros(len(constants) * len(instants))
-        driven = self.driven([asked, still, still], np.tile(instants, len(constants)))
-        excess = np.max([still - 1, *limit_bounds(self._limits, driven, self._clearance)], axis=0)
-        kept = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
-        time, costs = self.load.time[instants], np.full(len(constants), np.inf)
-        for number in np.flatnonzero(kept).tolist():
-            part = slice(number * len(instants), (number + 1) * len(instants))
-            own = {name: variable[..., part] for name, variable in driven.items()}
-            costs[number] = self.criterion.of(self.joint, own, time)
-        return np.where(np.isnan(costs), np.inf, costs)
-
-    def _joints(self, smoothing: float) -> tuple[Joint, Joint]:
-        """Return the joint with its sharp friction smoothed, and a copy that carries derivatives."""
-        if smoothing not in self._smoothed:
-            width = smoothing * self._speed
-            joint = _with_friction_of(self.joint, width) if _has_sharp_friction(self.joint) else self.joint
-            carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
-            self._smoothed[smoothing] = joint, carrying
-        return self._smoothed[smoothing]
-
-
-def _has_sharp_friction(joint: Joint) -> bool:
-    return any(motor.friction is not None and motor.friction.sharp for motor in joint.actuator.motors)
-
-
-def _with_friction_of(joint: Joint, width: float) -> Joint:
-    """Return a joint whose motors' friction changes its sign over a width of their velocity at the joint.
-
-    A sharp change would make a sum over instants jump wherever a motor stops at another one.
-    """
-    motors = []
-    for motor in joint.actuator.motor:  # type: ignore[attr-defined]  # of all that have a stiffness to choose
-        ratio = abs(motor.gear_ratio or 1.0) if motor.side == SHAFT else 1.0
-        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, ratio * width))
-        motors.append(replace(motor, friction=friction))
-    return replace(joint, actuator=replace(joint.actuator, motor=tuple(motors)))  # type: ignore[call-arg]
-
-
-INSIDE = 1e-3
-"""Relative distance that a start keeps from the ends of the admissible range, if possible."""
-
-DRAWN, LEVELS = 2, 6
-"""Number of random targets, and of the random levels that each of them interpolates."""
-
-
-class _Distance:
-    """The `Functions` of the squared distance from a target stiffness, within bounds."""
-
-    def __init__(self, target: FloatArray, within: Range, size: float) -> None:
-        self._target, self._within, self._size = target, within, size
-
-    def __call__(
-        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
-    ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
-        """Return the square of the distance, and the excess over the bounds."""
-        low, high = (row[instants] for row in self._within)
-        missed = (rows[0] - self._target[instants]) / self._size
-        return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
-
-
-def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
-    """Yield targets for starts: the command, the lower end of the range, constants, random profiles."""
-    highest = float(admissible.low.max())
-    generator = np.random.default_rng(seed)
-    yield asked
-    yield 1.05 * admissible.low
-    yield np.full_like(time, 1.05 * highest)
-    yield np.full_like(time, 2 * highest)
-    places = np.linspace(time[0], time[-1], LEVELS)
-    for _ in range(DRAWN):
-        yield admissible.low * np.interp(time, places, generator.uniform(1.0, 2.0, LEVELS))
-
-
-def nearest_profile(
-    basis: FloatArray, time: FloatArray, target: FloatArray, admissible: Range
-) -> FloatArray | None:
-    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None.
-
-    Args:
-        basis: splines per unit of each coefficient, (instants, shapes).
-        time: instants, (instants,) in s.
-        target: target, (instants,).
-        admissible: range in which the spline must lie at the instants.
-    """
-    size = float(np.median(admissible.low))
-    clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
-    within = Range(admissible.low + clearance, admissible.high - clearance)
-    fitted: FloatArray = np.linalg.lstsq(basis, np.clip(target, *within), rcond=None)[0]
-    near = basis @ fitted
-    if np.all((within.low < near) & (near < within.high)):
-        return fitted
-    group = Group(
-        functions=_Distance(target, within, size),
-        instants=np.arange(len(time)),
-        basis=basis[None],
-        unknowns=np.arange(basis.shape[1]),
-        weights=trapezoidal(time)[None] / (time[-1] - time[0]),
-        there=np.isfinite(np.stack(within)),
-        scales=np.array([size]),
-    )
-    problem = SeparableProblem([group])
-    start = interior(problem, fitted)
-    return None if start is None else minimize(problem, start).unknowns
-
+from vsacli.studies.search.stiffness_starts import nearest_profile, targets
 
 INSTANTS_PER_PIECE = 8
 """Instants per piece of the spline at which the cost is integrated and bounds are kept."""
@@ -240,9 +48,6 @@ MOST_ROUNDS = 12
 
 SAME_LEVEL = 1e-5
 """Share of a level by which values may exceed it at some instants: a tenth of `SAME_COST`."""
-
-GRID, SAME_CONSTANT = 33, 1e-6
-"""Constants that are compared at once, and the relative width of their range at which the search ends."""
 
 STIFFEST = 100.0
 """Largest constant that is tried, as a multiple of the smallest admissible one."""
@@ -370,7 +175,7 @@ class StiffnessSearch:
         every = self._group(space, np.arange(len(self._load.time)))
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
         for _ in range(MOST_ROUNDS):
-            found = self._zoomed(low, high, instants)
+            found = best_of_constants(self._whole, low, high, instants)
             self._progress()
             if found is None:
                 return None
@@ -382,19 +187,6 @@ class StiffnessSearch:
                 return self._profile(_Attempt(space, minimum, instants, unknowns[:1]), 1, 1)
             instants = np.union1d(instants, missed)
         return None
-
-    def _zoomed(self, low: float, high: float, instants: IndexArray) -> tuple[float, float] | None:
-        """Return the best constant between two and its cost, with bounds at some instants; None without any."""
-        best, grid = None, np.geomspace(low, high, GRID)
-        while best is None or grid[-1] - grid[0] > SAME_CONSTANT * best[0]:
-            costs = self._whole.costs_of_constants(grid, instants)
-            at = int(costs.argmin())
-            if costs[at] == np.inf:
-                return best
-            if best is None or costs[at] <= best[1]:
-                best = float(grid[at]), float(costs[at])
-            grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, GRID - 1)], GRID)
-        return best
 
     def _roughly(
         self, space: SplineSpace, instants: IndexArray, starts: Sequence[FloatArray]
@@ -530,8 +322,11 @@ class StiffnessSearch:
             rough = self._completed(attempt)
             if rough is not None:
                 found = self._completed(rough, accurate=True)
-                better = found is not None and (found.minimum.found or not rough.minimum.found)
-                return found if better or found is not None and not rough.reaches(found) else rough
+                if found is None or (
+                    rough.minimum.found and not found.minimum.found and rough.reaches(found)
+                ):
+                    return rough
+                return found
         return None
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:

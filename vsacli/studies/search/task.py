@@ -43,8 +43,8 @@ from vsacli.studies.search.nearest_profile import Change, nearest_change
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
     smallest_offset,
-    smallest_transition,
 )
+from vsacli.studies.search.transitions import smallest_transition
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.times import ResampledTimes
 from vsacli.trajectory.trajectory import Trajectory
