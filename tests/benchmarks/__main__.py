@@ -22,6 +22,7 @@ import controllers
 import growth
 import kernel
 import one_sample
+import optimizations
 import page
 import recorders
 import sensitivities
@@ -72,6 +73,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "whole": lambda: page.whole_table(whole_runs.compare(2 * SAMPLES, 2 * repeats + 1)),
         "actuation": lambda: page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats)),
         "sensitivity": lambda: page.sensitivity_part(sensitivities.compare(3 * repeats)),
+        "search": lambda: page.search_table(optimizations.compare(3 * repeats)),
         "simulations": lambda: page.simulation_table(simulations.compare(repeats)),
         "startup": lambda: page.startup_table(commands.startup(3 * repeats)),
         "memory": lambda: page.memory_sentence(LONG_RUN, commands.peak_memory(LONG_RUN)),

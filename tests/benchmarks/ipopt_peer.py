@@ -19,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Range
 
-QUIET = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-7}}
+OPTIONS = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-7}}
 
 
 @dataclass(frozen=True)
@@ -44,37 +44,24 @@ class Program:
 
     def solved(self) -> float:
         """Build and solve the program; the root mean square of the motor torques."""
-        unknowns = casadi.MX.sym("c", len(self.start))
         size = float(np.abs(self.start).max())
+        begun = self.start / size
+        unknowns = casadi.MX.sym("c", len(begun))
         rows = [casadi.mtimes(casadi.DM(size * each), unknowns) for each in self.basis]
-        given = casadi.DM(np.stack(self._given))
-        torques = _torques(self.joint).map(given.shape[1])(casadi.horzcat(*rows).T, given)
-        cost = casadi.mtimes(casadi.sum1(torques * torques) / 2, casadi.DM(self.weights))
-        most = self.joint.actuator.motors[0].max_torque
-        bounded = [rows[0]] + ([casadi.vec(torques)] if np.isfinite(most) else [])
-        ends = [
-            np.append(each, np.full(torques.numel() * np.isfinite(most), end))
-            for each, end in self._ends(most)
-        ]
-        scale = float(cost_of(cost, unknowns, self.start / size)) or 1.0
-        program = {"x": unknowns, "f": cost / scale, "g": casadi.vertcat(*bounded)}
-        found = casadi.nlpsol("solver", "ipopt", program, QUIET)(
-            x0=self.start / size, lbg=ends[0], ubg=ends[1]
-        )
-        return float(np.sqrt(float(found["f"]) * scale))
-
-    @property
-    def _given(self) -> list[FloatArray]:
         command = self.command
-        return [command.tau_e, command.dtau_e, command.ddtau_e, command.dq, command.ddq]
-
-    def _ends(self, most: float) -> Any:
-        return (self.admissible.low, -most), (self.admissible.high, most)
-
-
-def cost_of(cost: casadi.MX, unknowns: casadi.MX, at: FloatArray) -> casadi.DM:
-    """Value of a cost."""
-    return casadi.Function("cost", [unknowns], [cost])(at)
+        given = np.stack([command.tau_e, command.dtau_e, command.ddtau_e, command.dq, command.ddq])
+        torques = _torques(self.joint).map(given.shape[1])(casadi.horzcat(*rows).T, casadi.DM(given))
+        cost = casadi.mtimes(casadi.sum1(torques * torques) / 2, casadi.DM(self.weights))
+        scale = float(casadi.Function("cost", [unknowns], [cost])(begun))
+        most = np.full(torques.numel(), self.joint.actuator.motors[0].max_torque)
+        bounded = casadi.vertcat(rows[0], casadi.vec(torques)) if np.isfinite(most[0]) else rows[0]
+        low, high = (
+            np.append(stiffness, bound) if np.isfinite(most[0]) else stiffness
+            for stiffness, bound in zip(self.admissible, (-most, most), strict=True)
+        )
+        program = {"x": unknowns, "f": cost / scale, "g": bounded}
+        solver = casadi.nlpsol("solver", "ipopt", program, OPTIONS)
+        return float(np.sqrt(scale * float(solver(x0=begun, lbg=low, ubg=high)["f"])))
 
 
 def _torques(joint: Joint) -> casadi.Function:

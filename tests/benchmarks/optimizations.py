@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from ipopt_peer import Program
 from subjects import ROBOTS, TRAJECTORIES
-from timing import cpu_seconds, medians
+from timing import Seconds, cpu_seconds, medians
 
 from vsacli import load_robot, load_trajectory, optimize
 from vsacli.base.arrays import evenly
@@ -21,11 +25,11 @@ from vsacli.studies.search.loads import joint_loads, periods, rests
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.trajectory.trajectory import Trajectory
 
-VSACLI, PEER = "`optimize`", "CasADi + IPOPT"
+VSACLI, PEER = "`vsacli optimize`", "CasADi + IPOPT"
 MARGIN = 0.01
 
 PIECES, INSTANTS_PER_PIECE = 24, 8
-"""Of the splines with which vsacli's searches end here, and of their bounds."""
+"""Of the splines with which the searches of these motions end, and of the instants with bounds."""
 
 SHAKE = """
 format: vsacli-trajectory/1
@@ -38,35 +42,38 @@ stiffness: {type: constant, value: 4000}
 
 
 class Optimized(NamedTuple):
-    """A search for the best stiffness.
+    """Searches for the best stiffness of all joints of a robot.
 
     Attributes:
         name: of robot and motion.
-        joints: number of joints.
-        seconds: by way.
-        costs: root mean squares of the motor torques of each joint, by way.
+        seconds: of processor time, by way.
+        costs: root mean squares of the motor torques of each joint, N m, by way.
     """
 
     name: str
-    joints: int
-    seconds: dict[str, float]
+    seconds: Seconds
     costs: dict[str, list[float]]
 
 
-def compare(repeats: int) -> Iterator[Optimized]:
-    """Time both in turn: with all starts, refinements and runs here, one start and no run there."""
-    for name, robot, trajectory in _subjects():
-        programs = _programs(robot, trajectory)
-        found = optimize(robot, trajectory, min_margin=MARGIN)
-        ways = {
-            VSACLI: cpu_seconds(lambda: optimize(robot, trajectory, min_margin=MARGIN)),
-            PEER: cpu_seconds(lambda: [each.solved() for each in programs]),
-        }
-        costs = {
-            VSACLI: [each.after for each in found.joints.values()],
-            PEER: [each.solved() for each in programs],
-        }
-        yield Optimized(name, len(programs), medians(ways, repeats), costs)
+def compare(repeats: int) -> list[Optimized]:
+    """Time both in turn, on one motion after the other, in one thread as the command does."""
+    line = [sys.executable, __file__, str(repeats)]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    printed = subprocess.run(line, check=True, capture_output=True, text=True, env=environment).stdout
+    return [Optimized(*each) for each in json.loads(printed)]
+
+
+def _compared(name: str, robot: Robot, trajectory: Trajectory, repeats: int) -> Optimized:
+    programs = programs_of(robot, trajectory)
+
+    def searched() -> list[float]:
+        return [each.after for each in optimize(robot, trajectory, min_margin=MARGIN).joints.values()]
+
+    def solved() -> list[float]:
+        return [program.solved() for program in programs]
+
+    seconds = medians({VSACLI: cpu_seconds(searched), PEER: cpu_seconds(solved)}, repeats)
+    return Optimized(name, seconds, {VSACLI: searched(), PEER: solved()})
 
 
 def _subjects() -> Iterator[tuple[str, Robot, Trajectory]]:
@@ -80,21 +87,24 @@ def _subjects() -> Iterator[tuple[str, Robot, Trajectory]]:
         yield "3R, shaken", arm, load_trajectory(path, arm)
 
 
-def _programs(robot: Robot, trajectory: Trajectory) -> list[Program]:
-    """The problem of each joint over one period, between the same bounds."""
+def programs_of(robot: Robot, trajectory: Trajectory) -> list[Program]:
+    """The problem of each joint over one period, within the bounds that vsacli keeps."""
     rule, joints = Acceptance(robot, MARGIN), list(range(len(robot.joints)))
     programs = []
     for joint, load in zip(robot.joints, joint_loads(robot, trajectory, joints), strict=True):
         repeating = 0 if rests(trajectory) else periods(load)
         last = (len(load.time) - 1) // max(repeating, 1)
         period = load.at(evenly(last + 1, INSTANTS_PER_PIECE * PIECES + 1))
-        space = (SplineSpace.periodic if repeating else SplineSpace.at_rest)(
-            (float(period.time[0]), float(period.time[-1])), PIECES
-        )
+        span = float(period.time[0]), float(period.time[-1])
+        space = (SplineSpace.periodic if repeating else SplineSpace.at_rest)(span, PIECES)
         admissible = checked_range(rule, joint, period)
         asked = np.clip(period.command.commanded["stiffness"], 1.05 * admissible.low, admissible.high)
-        weights = trapezoidal(period.time) / (period.time[-1] - period.time[0])
-        basis = space.basis(period.time, 3)
+        weights = trapezoidal(period.time) / (span[1] - span[0])
         start = space.fitted(period.time, asked)
+        basis = space.basis(period.time, 3)
         programs.append(Program(joint, period.command, admissible, basis, weights, start))
     return programs
+
+
+if __name__ == "__main__":
+    json.dump([_compared(*subject, int(sys.argv[1])) for subject in _subjects()], sys.stdout)

@@ -62,9 +62,9 @@ def nearest_profile(
     size = float(np.median(admissible.low))
     clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
     within = Range(admissible.low + clearance, admissible.high - clearance)
-    wanted: FloatArray = np.clip(target, *within)
-    fitted: FloatArray = np.linalg.lstsq(basis, wanted, rcond=None)[0]
-    near: FloatArray = basis @ fitted
+    wanted = np.minimum(np.maximum(target, within.low), within.high)
+    fitted = np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0], dtype=np.float64)
+    near = basis @ fitted
     if np.all((within.low < near) & (near < within.high)):
         return fitted
     group = Group(
