@@ -21,6 +21,7 @@ import controllers
 import growth
 import kernel
 import one_sample
+import optimizations
 import page
 import recorders
 import sensitivities
@@ -74,6 +75,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "whole": lambda: page.whole_table(whole_runs.compare(2 * SAMPLES, 2 * repeats + 1)),
         "actuation": lambda: page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats)),
         "sensitivity": lambda: page.sensitivity_part(sensitivities.compare(3 * repeats)),
+        "search": lambda: page.search_table(optimizations.compare(3 * repeats)),
         "simulations": lambda: page.simulation_table(simulations.compare(repeats)),
         "startup": lambda: page.startup_table(commands.startup(3 * repeats)),
         "waits": lambda: page.waits_table(waits.compare(repeats)),

@@ -11,6 +11,8 @@ from controllers import Controller
 from growth import SAMPLES_OF_CHAIN, Growth
 from kernel import CASADI, Kernel
 from one_sample import PEER
+from optimizations import PEER as IPOPT
+from optimizations import VSACLI, Optimized
 from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
 from simulations import COMPILED, RECORDED, TEXT, Simulated
@@ -213,6 +215,22 @@ def simulation_table(found: Iterable[Simulated]) -> str:
                 f"{each.seconds[TEXT] / each.seconds[COMPILED]:.2g}",
                 micro(each.seconds[COMPILED] / each.evaluations),
                 f"{each.first:.2g}",
+            ]
+            for each in found
+        ),
+    )
+
+
+def search_table(found: Iterable[Optimized]) -> str:
+    """Searches for the best stiffness, against IPOPT."""
+    return table(
+        ("stiffness of least torque", f"{VSACLI}, s", f"{IPOPT}, s", "ratio", "rms torques, N m", "of IPOPT"),
+        (
+            [
+                each.name,
+                *(f"{each.seconds[way]:.2g}" for way in (VSACLI, IPOPT)),
+                f"{each.seconds[VSACLI] / each.seconds[IPOPT]:.2g}",
+                *(", ".join(f"{cost:.5g}" for cost in each.costs[way]) for way in (VSACLI, IPOPT)),
             ]
             for each in found
         ),

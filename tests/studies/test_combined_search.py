@@ -13,7 +13,7 @@ from samples.robots import vsa_3r
 from vsacli import fixes
 from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
-from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.combined import CombinedSearch
 from vsacli.studies.search.scans import LARGEST_FACTOR, smallest_slow_down
 from vsacli.studies.search.task import RELATIVE_CHANGE, Task, least_change
@@ -146,3 +146,40 @@ def test_no_combination_is_slower_than_the_slowest_that_is_tried():
     found = search(robot, rest_to_rest(4.0, rate=10), form=least_change).smallest()
     assert found is not None
     assert found.factor <= LARGEST_FACTOR
+
+
+def test_discarded_factors_are_no_better():
+    """Each factor of the scan by itself; bounds of the costs are below the costs."""
+    searched, every = search(), search()
+    found = searched.smallest()
+    bounds = every._lower_bounds()
+    sizes = {number: each.size for number in bounds if (each := every._at(number)) is not None}
+    assert found.size <= min(sizes.values())
+    assert all(bounds[number] <= size for number, size in sizes.items())
+    assert len(searched._found) < len(sizes)
+
+
+def test_a_cost_that_is_not_below_a_limit_is_not_searched_further():
+    every = search()
+    number = every._factors.first
+    found = every._at(number)
+    assert search()._at(number, below=0.99 * found.size) is None
+    assert search()._at(number, below=1.01 * found.size).size == found.size
+
+
+def test_paths_that_are_too_fast_are_those_that_each_factor_shows():
+    limited = search(changed(BASE, limits=Limits(velocity=(-2.0, 2.0))), rest_to_rest(1.0, 810.0))
+    limited._rule_out_paths()
+    refused = set()
+    for number in limited._scanned():
+        try:
+            limited._loads(limited._factors.factor(number))
+        except ImpossibleError:
+            refused.add(number)
+    assert limited._impossible_paths == refused
+    assert refused
+
+
+def test_any_combination_is_enough_to_be_possible():
+    assert search().possible()
+    assert not search(changed(BASE, limits=Limits(stiffness=(100.0, 200.0)))).possible()

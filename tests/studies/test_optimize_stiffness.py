@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
 from samples.marks import slow
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
+from vsacli.actuators.friction import Friction
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.search.acceptance import Acceptance, admissible_stiffness
@@ -51,11 +53,14 @@ def load(arm, swing):
     return joint_loads(arm, swing, [SHOULDER])[0]
 
 
-def search(arm, load, criterion, space):
-    found = StiffnessSearch(
+def search_of(arm, load, criterion, space=SplineSpace.periodic):
+    return StiffnessSearch(
         Acceptance(arm, MARGIN), arm.joints[SHOULDER], load, criterion, space, 0, lambda: None
     )
-    return found.best()
+
+
+def search(arm, load, criterion, space):
+    return search_of(arm, load, criterion, space).best()
 
 
 def driven(robot, load, rows):
@@ -214,3 +219,31 @@ def test_what_cannot_be_minimized_is_refused(arm, swing):
     moved = load_trajectory(REPOSITORY / "trajectories" / "hardening_1r.yaml", elastic)
     with pytest.raises(InputError, match=r"no joint of .* has a stiffness to choose"):
         optimize(elastic, moved)
+
+
+@pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
+def test_no_constant_of_a_dense_grid_is_better(arm, load, criterion):
+    found = search_of(arm, load, CRITERIA[criterion]()).best_constant()
+    low, high = admissible_stiffness(arm.joints[SHOULDER], load.command, MARGIN)
+    grid = np.geomspace(low.max(), min(high.min(), 100 * low.max()), 2000)
+    rows = np.zeros((3, len(grid), len(load.time)))
+    rows[0] = grid[:, None]
+    best = costs(arm, load, criterion, found.rows[:, None])[0]
+    assert best <= (1 + 1e-5) * costs(arm, load, criterion, rows).min()
+    assert np.ptp(found.rows[0]) < 1e-9 * found.rows[0, 0]
+
+
+def test_sharp_friction_leaves_an_optimum(arm, load):
+    """Unsmoothed, sums over instants jump wherever a motor stops at another one, and a search gets stuck."""
+    shoulder = arm.joints[SHOULDER]
+    motors = tuple(
+        replace(motor, friction=Friction(coulomb=(60.0, 60.0))) for motor in shoulder.actuator.motor
+    )
+    rough = replace(shoulder, actuator=replace(shoulder.actuator, motor=motors))
+    robot = replace(arm, joints=(arm.joints[0], rough, arm.joints[2]))
+    without = search(arm, load, CRITERIA["torque"](), SplineSpace.periodic)
+    found = search(robot, load, CRITERIA["torque"](), SplineSpace.periodic)
+    assert found.found
+    assert found.agreeing == found.starts
+    before, after = (costs(robot, load, "torque", each.rows[:, None])[0] for each in (without, found))
+    assert after < before

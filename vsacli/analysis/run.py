@@ -28,7 +28,7 @@ from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.balances import BALANCES, BalancedDynamics
-from vsacli.dynamics.energy import RunEnergy
+from vsacli.dynamics.energy import JointEnergy, RunEnergy
 from vsacli.dynamics.inverse import block_of, fitted, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
@@ -210,6 +210,10 @@ class Run:
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
         )
+
+    def energies(self) -> Sequence[JointEnergy]:
+        """Return the energy of each joint over the blocks so far, as `report` does, without a self-check."""
+        return self._energy.report()
 
     def _uncertainties(self) -> Sequence[JointUncertainty | None]:
         return [None] * len(self._summaries) if self._uncertainty is None else self._uncertainty.report()

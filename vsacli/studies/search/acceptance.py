@@ -177,10 +177,11 @@ class Acceptance:
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
         flags = values["flags"]
-        if self.recorded is not None:
-            flags = self.recorded.flags(self.robot, joint, values, instants)
-        refused: BoolArray = (short < self.min_margin) | has(flags, Flag.INFEASIBLE | LIMITS)
-        return refused | self._near_limits(joint, values)
+        refused: BoolArray = (short < self.min_margin) | has(flags, Flag.INFEASIBLE)
+        refused |= self._near_limits(joint, values)
+        if self.recorded is not None:  # allowances take long, and matter only where nothing else refuses
+            flags = self.recorded.flags(self.robot, joint, values, instants, ~refused)
+        return refused | has(flags, LIMITS)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
         """Return a mask of the samples closer to a limit than the reserve, (samples,)."""
@@ -285,7 +286,14 @@ class RecordedLimits:
 
     trajectory: Trajectory
 
-    def flags(self, robot: Robot, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
+    def flags(
+        self,
+        robot: Robot,
+        joint: Joint,
+        values: OfJoint,
+        instants: Instants,
+        asked: BoolArray | bool = True,
+    ) -> FlagArray:
         """Return the flags of one joint, (samples,), with only the limits that are certainly exceeded.
 
         Args:
@@ -293,11 +301,12 @@ class RecordedLimits:
             joint: joint of the robot, perhaps on the other branch.
             values: variables of the joint, with `flags` that ignore the uncertainty.
             instants: times of the samples in the task.
+            asked: mask of the samples, (samples,), whose flags allow for the uncertainty.
         """
         flags: FlagArray = np.array(values["flags"])
         if not self._estimates:
             return flags
-        steps = np.flatnonzero(open_steps(joint, values))
+        steps = np.flatnonzero(open_steps(joint, values) & asked)
         if steps.size:
             rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
             uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
@@ -327,11 +336,11 @@ class RecordedLimits:
         index = robot.joint_names.index(joint.name)
         joints = (*robot.joints[:index], joint, *robot.joints[index + 1 :])
         change = self._change(index, joint, stiffness, instants)
-        parts = [
-            self._probe(replace(robot, joints=joints), index, time, instants.factor, change)
-            for time in (first, last)
-        ]
-        return {name: (1 - share) * parts[0][name] + share * parts[1][name] for name in parts[0]}
+        # both ends in one call, which costs more than many times
+        both = (np.concatenate(pair) for pair in ((first, last), (instants.factor,) * 2, (change,) * 2))
+        probed = self._probe(replace(robot, joints=joints), index, *both)
+        ends = {name: np.split(array, 2, axis=-1) for name, array in probed.items()}
+        return {name: (1 - share) * begin + share * end for name, (begin, end) in ends.items()}
 
     def _change(
         self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants

@@ -8,7 +8,7 @@ joints are fixed one by one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from vsacli.studies.search.task import Combination, Form, Task, branch_path, con
 
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Pairs of a factor and the relative stride of the scan up to it: fine strides for small slow-downs."""
+
+BOUNDING_STEPS = 40
+"""Samples from which the lower bounds of costs follow."""
 
 MOST_ROUNDS = 20
 """Limit on rounds that add samples refusing a change that watched ones accept; two or three are usual."""
@@ -56,6 +59,7 @@ class CombinedSearch:
         self._factors = Factors.of(task.trajectory)
         self._watch(watched)
         self._impossible = task.impossible.setdefault((form, branches), set())
+        self._impossible_paths = task.impossible.setdefault(None, set())
 
     @property
     def exchangeable(self) -> bool:
@@ -69,6 +73,10 @@ class CombinedSearch:
     def fastest(self) -> Combination | None:
         """Return the combination with the least slow-down, confirmed in the same way."""
         return self._confirmed(self._fastest)
+
+    def possible(self) -> bool:
+        """Return whether there is any combination, confirmed in the same way."""
+        return self._confirmed(self._first) is not None
 
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
         # limits allow for the noise of a recording, which the quick test in `_ruled_out` does not know
@@ -98,6 +106,12 @@ class CombinedSearch:
                 return part.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
         return None
 
+    def _first(self) -> Combination | None:
+        """Return the first combination that is found, in the order of `_smallest`."""
+        bounds = self._lower_bounds()
+        numbers = sorted(bounds, key=lambda each: (bounds[each], each))
+        return next((found for number in numbers if (found := self._at(number)) is not None), None)
+
     def _fastest(self) -> Combination | None:
         """Return the combination with the smallest factor found by scan and bisection."""
         refused = self._factors.first - 1
@@ -113,13 +127,17 @@ class CombinedSearch:
         return self._at(number)
 
     def _smallest(self) -> Combination | None:
-        """Return the combination of least cost, by a scan and then ever shorter steps to either side."""
+        """Return the combination of least cost, by a scan and then ever shorter steps to either side.
+
+        The scan takes factors in the order of a lower bound of their cost, until that exceeds the best cost.
+        """
         best, at, cost = None, 0, self.task.cost
-        for number in self._scanned():
-            if best is not None and cost.of_factor(self._factors.factor(number)) >= best.size:
+        bounds = self._lower_bounds()
+        for number in sorted(bounds, key=lambda each: (bounds[each], each)):
+            if best is not None and bounds[number] >= best.size:
                 break
-            found = self._at(number)
-            if found is not None and (best is None or found.size < best.size):
+            found = self._at(number, math.inf if best is None else best.size)
+            if found is not None and (best is None or (found.size, number) < (best.size, at)):
                 best, at = found, number
         if best is None:
             return None
@@ -127,7 +145,7 @@ class CombinedSearch:
         within = range(self._factors.first, self._factors.last + 1)
         while step:
             sides = {
-                side: self._at(side)
+                side: self._at(side, best.size)
                 for side in (at - step, at + step)
                 if side in within and cost.of_factor(self._factors.factor(side)) < best.size
             }
@@ -142,17 +160,56 @@ class CombinedSearch:
                 step //= 2
         return best
 
-    def _at(self, number: int) -> Combination | None:
-        """Return the combination that fixes every joint at the factor of a number, or None."""
-        if number in self._impossible:
+    def _at(self, number: int, below: float = math.inf) -> Combination | None:
+        """Return the combination that fixes every joint at the factor of a number; None if there is none.
+
+        None may also mean that its cost is not below a limit.
+        """
+        if number in self._impossible or number in self._impossible_paths:
             return None
         if number not in self._found:
             try:
-                self._found[number] = self._fixed(self._factors.factor(number))
+                found = self._fixed(self._factors.factor(number), below)
             except ImpossibleError:
                 self._impossible.add(number)
                 return None
+            if found is None:
+                return None
+            self._found[number] = found
         return self._found[number]
+
+    def _lower_bounds(self) -> dict[int, float]:
+        """Return a lower bound of the cost at each scanned factor that is not known to be impossible.
+
+        The bound of the constants is that of a few samples at all factors at once.
+        """
+        self._rule_out_paths()
+        ruled_out = self._impossible | self._impossible_paths
+        numbers = [number for number in self._scanned() if number not in ruled_out]
+        least = [self.task.cost.of_factor(self._factors.factor(number)) for number in numbers]
+        # limits allow for the noise of a recording, which the admissible range does not know
+        if self.form is constant_change and not self.task.trajectory.estimates and numbers:
+            few = self._watched.select(evenly(len(self._watched.factor), BOUNDING_STEPS))
+            part = joined(few.slowed(self._factors.factor(each)) for each in numbers)
+            of_joints = self._least_of_joints(part.loads(self.task.acceptance.robot), len(numbers))
+            least = [math.hypot(own, *of_joint) for own, of_joint in zip(least, of_joints.T, strict=True)]
+        return {number: bound for number, bound in zip(numbers, least, strict=True) if bound < math.inf}
+
+    def _least_of_joints(self, loads: Sequence[Load], factors: int) -> FloatArray:
+        """Return a lower bound of the cost of the constant of each joint, (joints, factors); 0 if unknown."""
+        acceptance, least = self.task.acceptance, np.zeros((len(loads), factors))
+        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
+            joint = choices[""]
+            if index in acceptance.ignored or len(choices) > 1 or STIFFNESS.key not in joint.commanded:
+                continue
+            asked = self._watched.motion.commanded[STIFFNESS.key][:, index]
+            for place, offset in enumerate(_least_offsets(joint, load, acceptance.min_margin, factors)):
+                if offset:
+                    size = math.inf
+                    if offset < math.inf:
+                        size = self.task.cost.of_stiffness(asked, np.full(len(asked), offset))
+                    least[index, place] = (1 - SAME_CORRIDOR) * size
+        return least
 
     def _ruled_out(self) -> set[int]:
         """Return numbers of scanned factors at which a few samples already exclude every stiffness.
@@ -188,27 +245,53 @@ class CombinedSearch:
                 impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
         return impossible
 
-    def _fixed(self, factor: float) -> Combination:
-        """Return the changes of all joints at a factor.
+    def _loads(self, factor: float) -> list[Load]:
+        """Return the load of each joint at the watched samples, slowed down by a factor.
+
+        Raises:
+            ImpossibleError: a joint exceeds a limit of position or velocity.
+        """
+        watched, acceptance = self._watched, self.task.acceptance
+        instants = Instants(watched.motion.time, watched.factor * factor)
+        commands = self._path.at(Speeds.even(factor, len(instants.time)))
+        loads = [Load(instants.time, command, instants) for command in commands]
+        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
+            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
+                raise ImpossibleError(reason)
+        return loads
+
+    def _rule_out_paths(self) -> None:
+        """Note the scanned factors at which the path is too fast; faster ones than such a factor are, too."""
+        numbers = [number for number in self._scanned() if number not in self._impossible_paths]
+        refused, accepted = -1, len(numbers)
+        middle = 0  # mostly, no factor is refused
+        while accepted - refused > 1:
+            try:
+                self._loads(self._factors.factor(numbers[middle]))
+                accepted = middle
+            except ImpossibleError:
+                refused = middle
+            middle = (accepted + refused) // 2
+        self._impossible_paths |= set(numbers[: refused + 1])
+
+    def _fixed(self, factor: float, below: float) -> Combination | None:
+        """Return the changes of all joints at a factor, or None if their cost is not below a limit.
 
         Raises:
             ImpossibleError: some joint is refused at any stiffness.
         """
-        acceptance = self.task.acceptance
-        watched = self._watched
-        instants = Instants(watched.motion.time, watched.factor * factor)
-        commands = self._path.at(Speeds.even(factor, len(instants.time)))
-        loads = [Load(instants.time, command, instants) for command in commands]
-        joints = list(enumerate(zip(self._choices, loads, strict=True)))
+        joints = list(enumerate(zip(self._choices, self._loads(factor), strict=True)))
+        sizes, found = [self.task.cost.of_factor(factor)], []
         for index, (choices, load) in joints:
-            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
-                raise ImpossibleError(reason)
-        found = [self._of_joint(index, choices, load) for index, (choices, load) in joints]
+            found.append(self._of_joint(index, choices, load))
+            sizes.append(found[-1][0])
+            if math.hypot(*sizes) > below:
+                return None
         return Combination(
             factor,
             changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
             branches={index: branch for index, (_, branch, _) in enumerate(found) if branch},
-            size=math.hypot(self.task.cost.of_factor(factor), *(size for size, _, _ in found)),
+            size=math.hypot(*sizes),
         )
 
     def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
@@ -249,6 +332,19 @@ class CombinedSearch:
         factor = self._factors.factor(number)
         share = next(share for limit, share in STRIDES if factor <= limit)
         return math.ceil(number * share)
+
+
+def _least_offsets(joint: Joint, load: Load, min_margin: float, parts: int) -> FloatArray:
+    """Return the size of the least constant that every sample of a part of a load requires, (parts,).
+
+    Margin, stiffness limits and deflection limits count; infinite if no stiffness keeps them.
+    """
+    low, high = admissible_stiffness(joint, load.command, min_margin)
+    asked = load.command.commanded[STIFFNESS.key]
+    rise = np.max((low - asked).reshape(parts, -1), axis=1)
+    fall = np.min((high - asked).reshape(parts, -1), axis=1)
+    impossible = np.isnan(rise) | np.isnan(fall) | (rise > fall + SAME_CORRIDOR * np.abs(asked).max())
+    return np.where(impossible, np.inf, np.maximum(np.maximum(rise, -fall), 0.0))
 
 
 def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:

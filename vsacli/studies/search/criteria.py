@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
-from vsacli.analysis.run import inverse_dynamics
+from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, TORQUE, Quantity
@@ -23,13 +23,20 @@ from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import apart
-from vsacli.studies.search.interior_point import LAST_GAP, WARM_GAP, Minimum, Problem, minimize
+from vsacli.studies.search.interior_point import (
+    FIRST_GAP,
+    WARM_GAP,
+    Minimum,
+    Problem,
+    minimize,
+    minimize_all,
+)
 from vsacli.studies.search.loads import Load
 from vsacli.studies.sensitivities.joint_derivatives import ImplicitSolution
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from vsacli.analysis.result import Result
+    from vsacli.dynamics.energy import JointEnergy
 
 
 Values = Dual | FloatArray
@@ -49,6 +56,37 @@ class Scale(NamedTuple):
 
 
 UNSCALED = Scale()
+
+
+class MotorsOfRun(NamedTuple):
+    """The variables of a run on which costs depend; there is no self-check, which would take longer.
+
+    Attributes:
+        robot: robot.
+        time: times of the samples, (samples,) in s.
+        tau_motor: motor torques, (samples, joints, 2), N m (N).
+        elastic_energy: energy in the springs, (samples, joints), J.
+        energies: energy of each joint over the run.
+    """
+
+    robot: Robot
+    time: FloatArray
+    tau_motor: FloatArray
+    elastic_energy: FloatArray
+    energies: Sequence[JointEnergy]
+
+    @classmethod
+    def of(cls, robot: Robot, trajectory: Trajectory) -> MotorsOfRun:
+        """Return the variables of a run along a trajectory."""
+        run = Run(robot, trajectory)
+        rows = [(block.time, block.tau_motor, block.elastic_energy) for block in run]
+        time, tau_motor, elastic_energy = map(np.concatenate, zip(*rows, strict=True))
+        return cls(robot, time, tau_motor, elastic_energy, run.energies())
+
+    def torques(self, index: int) -> FloatArray:
+        """Return the torques of the motors that a joint has, (motors, samples)."""
+        torques: FloatArray = self.tau_motor[:, index].T[: self.robot.joints[index].actuator.motor_count]
+        return torques
 
 
 @dataclass(frozen=True)
@@ -114,7 +152,7 @@ class Criterion:
         """Return a scale for the cost from its value for some motion."""
         return self.of(joint, driven, time)
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the cost of a joint, by index, over a run; NaN if any sample is infeasible."""
         raise NotImplementedError
 
@@ -165,10 +203,10 @@ class Torque(Criterion):
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the rms torque, N m (N), by the trapezoidal rule."""
-        square = np.mean(_torques_of(result, index) ** 2, axis=0)
-        return math.sqrt(float(self.weights(result.time)[0] @ square))
+        square = np.mean(run.torques(index) ** 2, axis=0)
+        return math.sqrt(float(self.weights(run.time)[0] @ square))
 
     def together(self, costs: Sequence[float]) -> float:
         """Return the root mean square of the costs."""
@@ -198,9 +236,9 @@ class CopperLoss(Criterion):
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the heat in the report of the run, J."""
-        heat = result.report.joints[index].energy.copper_loss
+        heat = run.energies[index].copper_loss
         return math.nan if heat is None else heat
 
 
@@ -233,10 +271,10 @@ class Energy(Criterion):
         spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven["motor_power"]))
         return float(np.sum(self.weights(time) * np.stack([spent, driven["elastic_energy"]])))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the positive work in the report of the run and the initial spring energy, J."""
-        spent = result.report.joints[index].energy.spent
-        return spent if self.repeating else spent + float(result.elastic_energy[0, index])
+        spent = run.energies[index].spent
+        return spent if self.repeating else spent + float(run.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
@@ -277,9 +315,9 @@ class Peak(Criterion):
         """Return the peak torque, N m (N)."""
         return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven["tau_motor"])))
 
-    def of_run(self, result: Result, index: int) -> float:
+    def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the peak torque, N m (N)."""
-        return float(np.abs(_torques_of(result, index)).max())
+        return float(np.abs(run.torques(index)).max())
 
     def together(self, costs: Sequence[float]) -> float:
         """Return the largest cost."""
@@ -340,16 +378,10 @@ def _of_motors(joint: Joint, variable: Any) -> list[Any]:
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
 
 
-def _torques_of(result: Result, index: int) -> FloatArray:
-    """Return the motor torques of a joint over a run, (motors, samples)."""
-    torques: FloatArray = result.tau_motor[:, index].T[: result.robot.joints[index].actuator.motor_count]
-    return torques
-
-
 def run_costs(robot: Robot, trajectory: Trajectory, criteria: Mapping[int, Criterion]) -> dict[int, float]:
     """Return the costs of a run, by joint index; NaN for a joint with an infeasible sample."""
-    result = inverse_dynamics(robot, trajectory)
-    return {index: criterion.of_run(result, index) for index, criterion in criteria.items()}
+    run = MotorsOfRun.of(robot, trajectory)
+    return {index: criterion.of_run(run, index) for index, criterion in criteria.items()}
 
 
 def asked_size(joint: Joint, load: Load, criterion: Criterion) -> float:
@@ -364,10 +396,12 @@ difference within which two starts count as equal."""
 
 
 class Costed(Protocol):
-    """A part of a problem with a cost that can be smoothed."""
+    """A part of a problem with a cost that can be smoothed, in successive searches by `smoothings`."""
 
-    criterion: Criterion
     scale: Scale
+
+    @property
+    def smoothings(self) -> Sequence[float]: ...  # noqa: D102
 
 
 def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Sequence[Costed]) -> Minimum:
@@ -381,14 +415,32 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
         gap: increase of the cost by the bounds at the first barrier; above `WARM_GAP` the search is cold.
         costed: parts of the problem with these costs, all with the same criterion.
     """
-    smoothings = costed[0].criterion.smoothings
-    cold = gap > WARM_GAP
-    for smoothing in smoothings if cold else smoothings[-1:]:
-        for each in costed:
-            each.scale = each.scale._replace(smoothing=smoothing)
-        last = WARM_GAP if smoothing != smoothings[-1] else ROUGH_GAP if cold else LAST_GAP
-        found = minimize(problem, start, gap, last)
-        start, gap = found.unknowns, WARM_GAP
-    if not cold and not found.found:  # steps became short; with new multipliers they are long again
-        found = minimize(problem, start, gap, last)
+    if gap > WARM_GAP:
+        return rough_minima(problem, [start], costed, gap)[0]
+    _smooth(costed, costed[0].smoothings[-1])
+    found = minimize(problem, start, gap)
+    if not found.found:  # steps became short; with new multipliers they are long again
+        found = minimize(problem, found.unknowns, WARM_GAP)
     return found
+
+
+def rough_minima(
+    problem: Problem, starts: Sequence[FloatArray], costed: Sequence[Costed], gap: float = FIRST_GAP
+) -> list[Minimum]:
+    """Return a minimum near each of several starts, as accurate as their comparison requires.
+
+    See `smoothed_minimum`; only a cold search smooths the cost more than in the end.
+    """
+    smoothings = costed[0].smoothings
+    found: list[Minimum] = []
+    for smoothing in smoothings if gap > WARM_GAP else smoothings[-1:]:
+        _smooth(costed, smoothing)
+        last = ROUGH_GAP if smoothing == smoothings[-1] else WARM_GAP
+        found = minimize_all(problem, starts, gap, last)
+        starts, gap = [each.unknowns for each in found], WARM_GAP
+    return found
+
+
+def _smooth(costed: Sequence[Costed], smoothing: float) -> None:
+    for each in costed:
+        each.scale = each.scale._replace(smoothing=smoothing)

@@ -29,12 +29,12 @@ from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible, rou
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
-    has_transitions,
     lowest_offset,
     smallest_offset,
     smallest_slow_down,
 )
 from vsacli.studies.search.task import AS_IT_IS, Combination, Task, least_change
+from vsacli.studies.search.transitions import has_transitions
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -270,7 +270,7 @@ def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
-    if CombinedSearch(alone, branches=True).smallest() is not None:
+    if CombinedSearch(alone, branches=True).possible():
         return True
     with suppress(ImpossibleError):
         alone.with_profiles(AS_IT_IS)

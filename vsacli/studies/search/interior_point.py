@@ -8,9 +8,9 @@ problem is solved well enough (Waechter & Biegler, Mathematical Programming 106,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -74,13 +74,13 @@ class Point(Protocol):
 
 
 class Problem(Protocol):
-    """A cost, and bounds that must not be positive."""
+    """A cost, and bounds that must not be positive, at several places at once."""
 
-    def values(self, unknowns: FloatArray) -> tuple[float, FloatArray]:
-        """Return cost and bounds; they are not finite where they are undefined."""
+    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+        """Return cost and bounds for each array of unknowns; they are not finite where they are undefined."""
 
-    def at(self, unknowns: FloatArray) -> Point:
-        """Return cost and bounds with derivatives."""
+    def at(self, places: Sequence[FloatArray]) -> Sequence[Point]:
+        """Return cost and bounds with derivatives for each array of unknowns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,64 @@ def minimize(
         stalled: relative change of the cost within `PATIENCE` steps below which the search ends.
         enough: test of unknowns that ends the search early.
     """
-    point, unknowns = problem.at(start), start
+    return _together(problem, [_search(start, gap, last, stalled, enough)])[0]
+
+
+def minimize_all(
+    problem: Problem,
+    starts: Sequence[FloatArray],
+    gap: float = FIRST_GAP,
+    last: float = LAST_GAP,
+    stalled: float = STALLED,
+) -> list[Minimum]:
+    """Search for a minimum from each of several starts; see `minimize`.
+
+    The searches take their steps together: evaluating a problem at several places costs little more than at
+    one. No search depends on the others.
+    """
+    return _together(problem, [_search(start, gap, last, stalled) for start in starts])
+
+
+class _Wanted(NamedTuple):
+    """Unknowns at which a search needs the problem, and whether with derivatives."""
+
+    unknowns: FloatArray
+    derivatives: bool
+
+
+_Search = Generator[_Wanted, Any, Minimum]
+"""A search, which receives a `Point`, or cost and bounds, for each `_Wanted`."""
+
+
+def _together(problem: Problem, searches: Sequence[_Search]) -> list[Minimum]:
+    """Run searches, each round of which needs one evaluation of the problem."""
+    found: dict[int, Minimum] = {}
+    wanted = {number: next(search) for number, search in enumerate(searches)}
+    while wanted:
+        # derivatives last, so that as many searches as possible need them at the same time
+        derivatives = all(each.derivatives for each in wanted.values())
+        asked = [number for number, each in wanted.items() if each.derivatives == derivatives]
+        places = [wanted[number].unknowns for number in asked]
+        answers: Sequence[Any] = problem.at(places) if derivatives else problem.values(places)
+        for number, answer in zip(asked, answers, strict=True):
+            try:
+                wanted[number] = searches[number].send(answer)
+            except StopIteration as end:
+                found[number] = end.value
+                del wanted[number]
+    return [found[number] for number in range(len(searches))]
+
+
+def _search(
+    start: FloatArray,
+    gap: float,
+    last: float,
+    stalled: float,
+    enough: Callable[[FloatArray], bool] = lambda _: False,
+) -> _Search:
+    """Search from one start; see `minimize`."""
+    unknowns, direct = start, True
+    point = yield _Wanted(unknowns, derivatives=True)
     count = max(len(point.bounds), 1)
     multipliers = gap / count / -point.bounds
     costs = [point.cost]
@@ -131,11 +188,10 @@ def minimize(
         solved = gap <= last and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / count)
         if solved or enough(unknowns) or _stalled(costs, stalled):
             break
-        share = _line_search(problem, point, unknowns, step, gap / count)
-        if share is None:
+        moved = yield from _line_search(point, unknowns, step, gap / count, direct=direct)
+        if moved is None:
             break
-        unknowns = unknowns + share * step.unknowns
-        point = problem.at(unknowns)
+        unknowns, point, direct = moved
         multipliers = _moved(multipliers, step.multipliers, gap / count / -point.bounds)
         costs.append(point.cost)
     return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
@@ -200,19 +256,43 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 
 
 def _line_search(
-    problem: Problem, point: Point, unknowns: FloatArray, step: _Step, barrier: float
-) -> float | None:
-    """Return a share of the step that lowers the barrier function inside the bounds, or None."""
+    point: Point, unknowns: FloatArray, step: _Step, barrier: float, *, direct: bool
+) -> Generator[_Wanted, Any, tuple[FloatArray, Point, bool] | None]:
+    """Return the unknowns after a share of the step that lowers the barrier function inside the bounds.
+
+    Args:
+        point: cost and bounds before the step.
+        unknowns: unknowns before the step.
+        step: Newton step.
+        barrier: barrier parameter.
+        direct: whether the first trial is expected to succeed, so that its derivatives are evaluated at once.
+
+    Returns:
+        The unknowns, cost and bounds there, and whether the first trial succeeded; None if no share did.
+    """
     merit = point.cost - barrier * float(np.log(-point.bounds).sum())
-    share = _share_to_boundary(-point.bounds, -point.changes(step.unknowns))
     rounding = 1e-14 * max(1.0, abs(merit))
+
+    def lower(cost: float, bounds: FloatArray, share: float) -> bool:
+        if not (np.isfinite(cost) and np.all(bounds < 0)):
+            return False
+        there = cost - barrier * float(np.log(-bounds).sum())
+        return there <= merit - ARMIJO * share * step.gain + rounding
+
+    share, halvings = _share_to_boundary(-point.bounds, -point.changes(step.unknowns)), 0
     while share > SHORTEST_STEP:
-        cost, bounds = problem.values(unknowns + share * step.unknowns)
-        if np.isfinite(cost) and np.all(bounds < 0):
-            there = cost - barrier * float(np.log(-bounds).sum())
-            if there <= merit - ARMIJO * share * step.gain + rounding:
-                return share
-        share /= 2
+        tried = unknowns + share * step.unknowns
+        if direct and not halvings:
+            there = yield _Wanted(tried, derivatives=True)
+            if lower(there.cost, there.bounds, share):
+                return tried, there, True
+        else:
+            values = yield _Wanted(tried, derivatives=False)
+            cost, bounds = values
+            if lower(cost, bounds, share):
+                there = yield _Wanted(tried, derivatives=True)
+                return tried, there, not halvings
+        share, halvings = share / 2, halvings + 1
     return None
 
 

@@ -191,13 +191,18 @@ class PacedJoint:
         self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
         self._carrying = (
-            made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders, moving_corridor=True)
+            made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
             if self._joint.actuator.sprung
             else apart(self._joint)
         )
         fixed = NOT_OF_THE_PACE if varied else (*NOT_OF_THE_PACE, STIFFNESS.key)
         self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed]
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
+
+    @property
+    def smoothings(self) -> Sequence[float]:
+        """Smoothings of the cost in successive searches."""
+        return self.criterion.smoothings
 
     @property
     def name(self) -> str:

@@ -1,37 +1,30 @@
 """Search over the pace along a path, and the stiffness if it varies, for the least time or cost.
 
-`PacedSearch` tries several starts and refines the best; `TimingSearch` minimizes the time,
-`CheapestPaceSearch` a cost at the commanded duration.
+`PacedSearch` tries several starts and refines the best; `timing_search` minimizes the time, `cheapest_pace` a
+cost at the commanded duration.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.search.criteria import smoothed_minimum, trapezoidal
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
-from vsacli.studies.search.loads import Ends
+from vsacli.studies.search.acceptance import ImpossibleError
+from vsacli.studies.search.criteria import trapezoidal
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,
-    FASTEST,
     PACE_ORDERS,
     Pace,
     PacedJoint,
     PacedMotion,
-    instants_of,
-    least_pace,
 )
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import PacedSpaces, Pacing, of_rows
-from vsacli.trajectory.trajectory import Trajectory
 
 INSTANTS_PER_PIECE = 12
 """Smallest number of instants per piece at which bounds are kept."""
@@ -40,11 +33,11 @@ MOST_ROUNDS = 12
 """Limit on rounds that add instants of violated bounds: a motion with two dwells, bounded only by the ends of
 its attainable ranges, required seven."""
 
+WORTH_COMPLETING = 1e-4
+"""Share of the best cost by which a start must be lower while bounds are kept at some instants only."""
+
 ACTIVE = 1e-2
 """Relative distance from a bound below which it is active; barriers keep a motion a thousandth away."""
-
-STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
-"""Multiples of the commanded stiffness for the starts, if it may vary."""
 
 DRAWN, LEVELS = 2, 6
 """Number of random paces among the starts, and of the random levels that each of them interpolates."""
@@ -107,8 +100,10 @@ class PacedSearch:
         """Return a start among finer splines, near the pace (key None) and the stiffness of joints."""
         raise NotImplementedError
 
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        """Return a minimum of the cost; the first barrier raises it by `gap`."""
+    def _minima(
+        self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
+    ) -> Sequence[Minimum]:
+        """Return a minimum of the cost near each start; the first barrier raises it by `gap`."""
         raise NotImplementedError
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
@@ -124,16 +119,15 @@ class PacedSearch:
         pieces, *further = self.pieces
         spaces = self._spaces(pieces)
         starts = self._starts(spaces)
-        attempts = [self._attempt(spaces, pieces, *start) for start in starts]
-        kept = [attempt for attempt in attempts if attempt is not None]
-        if not kept:
-            raise ImpossibleError(self.nothing_kept)
-        best = min(kept, key=lambda minimum: minimum.cost)
-        agreeing = sum(minimum.cost <= best.cost + self.same_cost * abs(best.cost) for minimum in kept)
+        best, agreeing = self._best_of(spaces, self._instants(pieces), starts)
         for pieces in further:
             finer = self._spaces(pieces)
-            refined = self._attempt(finer, pieces, *self._refined_start(finer, self._rows(spaces, best)))
-            if refined is None or refined.cost > best.cost:
+            start = self._refined_start(finer, self._rows(spaces, best))
+            try:
+                refined, _ = self._best_of(finer, self._instants(pieces), [start])
+            except ImpossibleError:
+                break
+            if refined.cost > best.cost:
                 break
             gained, spaces, best = best.cost - refined.cost, finer, refined
             if gained <= self.worth * abs(best.cost):
@@ -153,24 +147,55 @@ class PacedSearch:
         places = np.linspace(*self._span, LEVELS)
         return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
 
-    def _attempt(
-        self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
+    def _instants(self, pieces: int) -> IndexArray:
+        """Return the instants at which bounds of splines with this many pieces are kept at first."""
+        return evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
+
+    def _best_of(
+        self, spaces: PacedSpaces, instants: IndexArray, starts: Sequence[Start]
+    ) -> tuple[Minimum, int]:
+        """Return the best minimum that keeps all bounds, and the number of starts that reached it.
+
+        Bounds at further instants only raise a cost: starts whose minimum without them is no better than the
+        best result are discarded.
+
+        Raises:
+            ImpossibleError: no start led to any.
+        """
+        problem, best = SeparableProblem(self._groups(spaces, instants)), None
+        begun = [(interior(problem, wanted, inside), inside) for wanted, inside in starts]
+        inner = [(unknowns, inside) for unknowns, inside in begun if unknowns is not None]
+        roughly = self._minima(problem, [unknowns for unknowns, _ in inner], FIRST_GAP) if inner else []
+        self._progress()
+        pairs = zip(roughly, (inside for _, inside in inner), strict=True)
+        for rough, inside in sorted(pairs, key=lambda pair: pair[0].cost):
+            if best is not None and rough.cost > best[0].cost - WORTH_COMPLETING * abs(best[0].cost):
+                break
+            kept = self._completed(spaces, instants, rough, inside)
+            if kept is not None and (best is None or kept.cost < best[0].cost):
+                best = kept, rough.cost
+        if best is None:
+            raise ImpossibleError(self.nothing_kept)
+        found, least = best
+        return found, sum(each.cost <= least + self.same_cost * abs(least) for each in roughly)
+
+    def _completed(
+        self, spaces: PacedSpaces, instants: IndexArray, found: Minimum, inside: FloatArray | None
     ) -> Minimum | None:
-        """Search from a start, adding instants until all bounds are kept; return None if that fails."""
-        instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
-        every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
+        """Return a minimum after adding the instants at which it violates bounds, or None."""
+        every = self._groups(spaces, np.arange(len(self._s)))
         for _ in range(MOST_ROUNDS):
-            problem = SeparableProblem(self._groups(spaces, instants))
-            begun = interior(problem, wanted, inside)
-            if begun is None:
-                return None
-            found, gap = self._minimum(problem, begun, gap), WARM_GAP
-            self._progress()
             kept = self._accepted(spaces, every, found)
             if kept is not None:
                 return kept
             bounds = np.concatenate([group.bounds(group.rows(found.unknowns)) for group in every])
-            instants, wanted = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2)), found.unknowns
+            instants = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2))
+            problem = SeparableProblem(self._groups(spaces, instants))
+            begun = interior(problem, found.unknowns, inside)
+            if begun is None:
+                return None
+            (found,) = self._minima(problem, [begun], WARM_GAP)
+            self._progress()
         return None
 
     def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
@@ -213,261 +238,3 @@ class PacedSearch:
             if shares:
                 found[joint.name] = shares
         return found
-
-
-FEW = 100
-"""Number of instants at which bounds are checked first."""
-
-SLOWEST, STRIDE = 1000.0, 1.1
-"""Largest factor of a uniform slow-down that is tried, and the ratio of successive factors."""
-
-HALVINGS = 16
-"""Bisections of the last stride, to 1e-6 of the factor."""
-
-UNBOUNDED = 1.1
-"""Multiple of the duration at the smallest pace below which no other bound limits the motion."""
-
-SLACK = 1.02
-"""Ratio of a start's duration to that of the fastest uniform timing."""
-
-SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
-"""Relative slow-downs to try so that a motion keeps all bounds between instants as well."""
-
-LAST_TIMING_GAP = 1e-4
-"""Increase of the time by bounds at the last barrier, relative to a uniform timing: close to bounds, Newton
-steps are short."""
-
-STALLED_TIMING = 3e-4
-"""Relative change of the time within `PATIENCE` Newton steps below which the search ends."""
-
-
-class NoStartError(ImpossibleError):
-    """Error: no stiffness that was tried makes any slow-down feasible."""
-
-
-class TimingSearch(PacedSearch):
-    """A search for the fastest timing along the path of a trajectory, over one period if it is periodic.
-
-    Args:
-        acceptance: acceptance rule; its `between` are values of s on the path.
-        trajectory: trajectory that defines the path.
-        ends: ends of the motion.
-        varied: indices of the joints whose stiffness varies as well.
-        seed: seed of the random starts.
-        progress: function to call after each search.
-
-    Attributes:
-        uniform: duration of the fastest motion that is uniformly slowed down or sped up, s; NaN if there is
-            none, or if the pace at an end is prescribed.
-    """
-
-    pieces = (12, 24)
-    same_cost = 1e-2
-    timed = True
-    nothing_kept = "no faster pace that was tried keeps every limit at all instants"
-
-    def __init__(
-        self,
-        acceptance: Acceptance,
-        trajectory: Trajectory,
-        ends: Ends,
-        varied: Sequence[int],
-        seed: int,
-        progress: Callable[[], None],
-    ) -> None:
-        robot, count = acceptance.robot, max(ends.periods, 1)
-        instants = instants_of(trajectory, trajectory.duration / count, acceptance.between)
-        motion = PacedMotion(robot, trajectory, instants)
-        joints = [
-            PacedJoint(
-                motion,
-                index,
-                acceptance.min_margin,
-                reserve=acceptance.reserve,
-                varied=index in varied,
-            )
-            for index in range(len(robot.joints))
-        ]
-        super().__init__(motion, joints, varied, seed, progress)
-        self._ends, self._count = ends, count
-        self.uniform = math.nan
-
-    def best(self) -> Pacing:
-        """Return the fastest timing found.
-
-        Raises:
-            ImpossibleError: none was found, or no limit bounds the speed.
-        """
-        found = super().best()
-        shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
-        held = any(self._ends.moving)
-        if not found.bounding if held else found.pace().integrate(*self._span) < UNBOUNDED * shortest:
-            raise ImpossibleError(
-                f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
-                "max_torque of the motors, or begin with a shorter duration"
-            )
-        return found
-
-    def _spaces(self, pieces: int) -> PacedSpaces:
-        return PacedSpaces.of(self._span, pieces, self._varied, self._ends)
-
-    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
-        begun: list[Start] = []
-        for multiple in STIFFER_STARTS if self._varied else STIFFER_STARTS[:1]:
-            stiffness = {joint: multiple * row for joint, row in asked.items()}
-            factor = self._uniform(spaces, stiffness)
-            if factor is None:
-                continue
-            inside = spaces.even(self._s, SLACK * factor, stiffness)
-            begun.append((inside, inside))
-            if multiple == 1:
-                self._scale = factor * self._span[1]
-                self.uniform = math.nan if any(self._ends.moving) else self._count * self._scale
-                begun += [
-                    (spaces.fitted(self._s, factor * drawn, stiffness), inside)
-                    for drawn in self._drawn(SLACK, 2.0)
-                ]
-        if not begun:
-            raise NoStartError("no slow-down or speed-up of the whole motion keeps every limit")
-        return begun
-
-    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        # a little slower, since the way out of a corner is long
-        stiffness = {key: row for key, row in rows.items() if key is not None}
-        slower = spaces.fitted(self._s, SLACK * rows[None], stiffness)
-        return slower, slower
-
-    def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
-        """Return the smallest constant pace that keeps all bounds, or None."""
-        few = self._groups(spaces, evenly(len(self._s), FEW))
-        every = self._groups(spaces, np.arange(len(self._s)))
-
-        def kept(groups: Sequence[Group], factor: float) -> bool:
-            unknowns = spaces.even(self._s, factor, stiffness)
-            _, bounds = SeparableProblem(groups).values(unknowns)
-            return bool(np.all(bounds < 0))
-
-        factor = FASTEST
-        while not (kept(few, SLACK * factor) and kept(every, factor) and kept(every, SLACK * factor)):
-            factor *= STRIDE
-            if factor > SLOWEST:
-                return None
-        refused = factor / STRIDE
-        for _ in range(HALVINGS):
-            middle = math.sqrt(refused * factor)
-            refused, factor = (refused, middle) if kept(every, middle) else (middle, factor)
-        return factor
-
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        return minimize(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
-
-    def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""
-        for share in SLOWER:
-            unknowns = spaces.slowed(found.unknowns, share)
-            cost, bounds = SeparableProblem(every).values(unknowns)
-            if np.all(bounds <= CLEARANCE / 2):
-                return replace(found, unknowns=unknowns, cost=cost)
-        return None
-
-
-STIFFER = 1.0, 1.5, 2.0
-"""Multiples of the first stiffness for further starts."""
-
-DRAWN_PACES = 0.6, 1.6
-"""Range of the random paces before they are scaled to the duration."""
-
-LIFTED = 1.1
-"""Factor on a stiffness from which a search starts: from an end of the attainable range, where the optimum
-often is, a pendulum required more than 200 Newton steps, and from here 50."""
-
-FIRST_LEVEL = 1.05
-"""Initial level, as a multiple of the largest value that it bounds."""
-
-
-class CheapestPaceSearch(PacedSearch):
-    """A search for the timing of least cost at the commanded duration.
-
-    Args:
-        motion: motion along the path.
-        joints: cost and bounds of each joint.
-        varied: indices of the joints whose stiffness varies as well.
-        ends: ends of the motion.
-        seed: seed of the random starts.
-        progress: function to call after each search.
-        near: pace and stiffness near which to start, scaled to the duration, if the path is infeasible as
-            commanded.
-    """
-
-    pieces = (12, 24, 48)
-    same_cost = 1e-3
-    worth = 1e-3
-    timed = False
-    nothing_kept = "no pace that was tried keeps every limit at all instants within the duration"
-
-    def __init__(
-        self,
-        motion: PacedMotion,
-        joints: Sequence[PacedJoint],
-        varied: Sequence[int],
-        ends: Ends,
-        seed: int,
-        progress: Callable[[], None],
-        near: Pacing | None = None,
-    ) -> None:
-        super().__init__(motion, joints, varied, seed, progress)
-        self._ends, self._near = ends, near
-
-    def _spaces(self, pieces: int) -> PacedSpaces:
-        return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
-
-    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        """Return the commanded pace with several stiffnesses, and random paces with the first of these."""
-        asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
-        even = np.ones_like(self._s)
-        if self._near is not None:
-            even, asked = self._lasting(self._near.pace()(self._s)), self._near.stiffness_at(self._s)
-        first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
-        inside = first if self._kept(spaces, first) else None
-        stiffer = [
-            {joint: multiple * row for joint, row in asked.items()}
-            for multiple in (STIFFER if self._varied else (1.0,))
-        ]
-        wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
-        wanted += [
-            spaces.fitted(self._s, self._lasting(even * drawn), asked) for drawn in self._drawn(*DRAWN_PACES)
-        ]
-        return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
-
-    def _lasting(self, pace: FloatArray) -> FloatArray:
-        """Return a pace scaled to the commanded duration, (instants,)."""
-        scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
-        return scaled
-
-    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}
-        return self._levelled(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
-
-    def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
-        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
-        return bool(np.all(every.values(unknowns)[1] < 0))
-
-    def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
-        """Return unknowns with a level appended that bounds its values, if the cost is a level."""
-        if not self._joints[0].criterion.levels:
-            return unknowns
-        without = np.append(unknowns, 0.0)
-        _, *groups = self._groups(spaces, np.arange(len(self._s)))
-        over = [
-            group.bounds(group.rows(without))[len(joint.bound_names) :]
-            for joint, group in zip(self._joints, groups, strict=True)
-        ]
-        return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(over)).max()))
-
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        return smoothed_minimum(problem, start, gap, self._joints)
-
-    def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        _, bounds = SeparableProblem(every).values(found.unknowns)
-        return found if np.all(bounds <= CLEARANCE / 2) else None

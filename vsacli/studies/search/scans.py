@@ -1,4 +1,4 @@
-"""The smallest accepted slow-down, stiffness offset or transition, by scan and bisection.
+"""The smallest accepted slow-down or stiffness offset, by scan and bisection.
 
 Each candidate is an integer that stands for a value on a grid, so that the printed value is the confirmed
 one. A scan checks some watched samples; a candidate that they accept is confirmed on all samples, and some of
@@ -13,15 +13,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.signals import STIFFNESS
+from vsacli.base.arrays import IndexArray, evenly
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, stiffness_text
-from vsacli.studies.search.changed_motion import rate_of, with_stiffness
-from vsacli.studies.search.fixed_text import changes_of_steps
+from vsacli.studies.search.changed_motion import rate_of
 from vsacli.studies.search.loads import Load, TaskSamples, joined
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.curves.steps import Chain, stepwise
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -208,6 +204,9 @@ LARGEST_RATIO = 100
 OFFSETS_AT_ONCE = 64
 """Offsets evaluated in one call, which costs hardly more than a single one."""
 
+FEWEST_STEPS = 5
+"""Samples that are checked first at offsets far from the bound of the range."""
+
 OFFSET_DIGITS = 4
 """Decimal places of an offset after the leading digit of the stiffness: the grid of printed values."""
 
@@ -234,7 +233,8 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     """
     low, high = _bounds(acceptance, joint, load)
     raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
-    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, -low)
+    most = -low if raised is None else min(-low, raised)
+    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, most)
     found = [offset for offset in (raised, lowered) if offset is not None]
     if found:
         return min(found, key=abs)
@@ -291,6 +291,10 @@ class OffsetCandidates:
         ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
         start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
         stop = math.floor(min(high, ratio * self._softest) / unit + GRID_ROUNDING)
+        if start > stop:
+            return None
+        if self.confirms(start):  # mostly, since few motions come near the limits of the motors
+            return self.value(start)
         near = self._scan_start(start, stop)
         number = None if near is None else smallest_confirmed(self, near, stop)
         return None if number is None else self.value(number)
@@ -326,15 +330,23 @@ class OffsetCandidates:
 
     def _first_accepted(self, numbers: Sequence[int], first: int, steps: IndexArray) -> int:
         """Return the index, from `first` on, of a number that these samples accept, or len(numbers)."""
-        for begin in range(first, len(numbers), OFFSETS_AT_ONCE):
-            tried = numbers[begin : begin + OFFSETS_AT_ONCE]
-            load = self._load.at(np.tile(steps, len(tried)))
-            values = np.repeat([self.value(number) for number in tried], len(steps))
-            refused = self._acceptance.refused_steps(self._joint, load.changed(values))
-            accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+        near = np.arange(first, min(first + OFFSETS_AT_ONCE, len(numbers)))
+        accepted = self._accepted(numbers, near, steps)
+        far = np.arange(first + OFFSETS_AT_ONCE, len(numbers))
+        if not accepted.size and far.size:  # mostly refused, too: a few samples tell
+            far = self._accepted(numbers, far, steps[evenly(len(steps), FEWEST_STEPS)])
+        for begin in range(0, len(far), OFFSETS_AT_ONCE):
             if accepted.size:
-                return begin + int(accepted[0])
-        return len(numbers)
+                break
+            accepted = self._accepted(numbers, far[begin : begin + OFFSETS_AT_ONCE], steps)
+        return int(accepted[0]) if accepted.size else len(numbers)
+
+    def _accepted(self, numbers: Sequence[int], tried: IndexArray, steps: IndexArray) -> IndexArray:
+        """Return the indices, among those tried, of the numbers that these samples accept."""
+        load = self._load.at(np.tile(steps, len(tried)))
+        values = np.repeat([self.value(numbers[index]) for index in tried], len(steps))
+        refused = self._acceptance.refused_steps(self._joint, load.changed(values))
+        return tried[~refused.reshape(len(tried), -1).any(axis=1)]
 
     def stride(self, number: int) -> int:
         """Return 1 % of the changed stiffness."""
@@ -353,96 +365,3 @@ class OffsetCandidates:
     def _refused(self, load: Load, number: int) -> IndexArray:
         changed = load.changed(self.value(number))
         return np.flatnonzero(self._acceptance.refused_steps(self._joint, changed))
-
-
-DIGITS = 3
-"""Decimal places of a transition after its leading digit: the grid of printed values."""
-
-
-def has_transitions(trajectory: Trajectory) -> bool:
-    """Return whether the stiffness is given as levels with transitions between them."""
-    return bool(_changes(trajectory))
-
-
-def _changes(trajectory: Trajectory) -> list[RestToRest]:
-    """Return the transitions between levels; none if the stiffness is another curve."""
-    stiffness = trajectory.commanded[STIFFNESS.key]
-    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, Chain) else []
-
-
-def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
-    """Return the commanded transition time, the shortest accepted longer one, s, and the trajectory with it.
-
-    Each transition begins as commanded. A scan in strides of 1 % is followed by bisection.
-
-    Args:
-        acceptance: acceptance rule, which includes the robot.
-        trajectory: trajectory that `has_transitions`.
-
-    Raises:
-        ImpossibleError: no transition that ends before the next one begins is accepted.
-    """
-    candidates = _Transitions(acceptance, trajectory)
-    number = smallest_confirmed(candidates, candidates.first, candidates.last)
-    if number is None:
-        raise ImpossibleError(f"none of up to {candidates.longest:.4g} s does; then the next change begins")
-    return candidates.shortest, candidates.length(number), candidates.trajectory(number)
-
-
-class _Transitions:
-    """Transition times on a decimal grid, checked at watched instants; see `Candidates`."""
-
-    def __init__(self, acceptance: Acceptance, trajectory: Trajectory) -> None:
-        self._acceptance, self._trajectory, self._changes = acceptance, trajectory, _changes(trajectory)
-        self._limits = [*(change.span[0] for change in self._changes[1:]), trajectory.duration]
-        self.shortest = min(change.span[1] - change.span[0] for change in self._changes)
-        self.longest = min(
-            limit - change.span[0] for change, limit in zip(self._changes, self._limits, strict=True)
-        )
-        self._exponent = math.floor(math.log10(self.shortest)) - DIGITS
-        self._steps = trajectory.times.block(0, trajectory.samples) - trajectory.start
-        watched = self._steps[evenly(len(self._steps), WATCHED_STEPS)]
-        self._watched = np.union1d(watched, acceptance.between)
-
-    @property
-    def first(self) -> int:
-        """Smallest number that stands for a longer transition."""
-        return math.floor(self.shortest / 10.0**self._exponent * (1 + 1e-9)) + 1
-
-    @property
-    def last(self) -> int:
-        """Number of the longest transition that ends before the next one begins, or the motion ends."""
-        return math.floor(self.longest / 10.0**self._exponent * (1 + 1e-9))
-
-    def length(self, number: int) -> float:
-        """Return the transition time that a number stands for, s."""
-        return min(float(f"{number}e{self._exponent}"), self.longest)
-
-    def trajectory(self, number: int) -> Trajectory:
-        """Return the trajectory with the transition time that a number stands for."""
-        first, length = self._changes[0], self.length(number)
-        levels = [first.start, *(change.end for change in self._changes)]
-        spans = [
-            (change.span[0], min(change.span[0] + length, limit))
-            for change, limit in zip(self._changes, self._limits, strict=True)
-        ]
-        profile = stepwise(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
-        return with_stiffness(self._trajectory, profile)
-
-    def stride(self, number: int) -> int:
-        """Return 1 % of the number."""
-        return math.ceil(number / 100)
-
-    def accepts(self, number: int) -> bool:
-        """See `Candidates.accepts`."""
-        return not self._refused(number, self._watched).size
-
-    def confirms(self, number: int) -> bool:
-        """See `Candidates.confirms`."""
-        refused = self._refused(number, self._steps)
-        self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
-        return not refused.size
-
-    def _refused(self, number: int, elapsed: FloatArray) -> FloatArray:
-        part = TaskSamples.between(self.trajectory(number), elapsed)
-        return elapsed[np.any(self._acceptance.refused(part), axis=1)]

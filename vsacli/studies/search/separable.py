@@ -49,16 +49,19 @@ class Functions(Protocol):
 
 
 class Sampled(NamedTuple):
-    """Functions at instants, (functions, instants), and gradients by rows, (functions, rows, instants)."""
+    """Functions at instants, (functions, ..., instants), and gradients, (functions, rows, ..., instants)."""
 
     values: FloatArray
     gradients: FloatArray
 
-    def split(self, parts: int) -> tuple[Sampled, list[FloatArray]]:
-        """Split the instants into equal parts; return the first, and the gradients of each other part."""
-        instants = self.values.shape[1] // parts
-        first = Sampled(self.values[:, :instants], self.gradients[..., :instants])
-        return first, np.split(self.gradients[..., instants:], parts - 1, axis=-1)
+    def shaped(self, shape: tuple[int, ...]) -> Sampled:
+        """Return the same with the instants divided into several axes."""
+        values, gradients = (each.reshape(*each.shape[:-1], *shape) for each in self)
+        return Sampled(values, gradients)
+
+    def part(self, part: int) -> Sampled:
+        """Return the functions at a part of the instants, an index of the first of their axes."""
+        return Sampled(self.values[:, part], self.gradients[:, :, part])
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +98,15 @@ class Group:
         """Basis with the axes (instants, rows, own unknowns)."""
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
 
-    def values(self, rows: FloatArray) -> tuple[float, FloatArray]:
-        """Return the cost and the existing bounds."""
-        integrands, bounds = self.functions(rows, self.instants)
-        cost = float(np.sum(self.weights * _stacked(integrands, rows)))
-        return cost, _stacked(bounds, rows)[self.there]
+    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+        """Return the cost and the existing bounds at each of several unknowns."""
+        rows = np.concatenate([self.rows(unknowns) for unknowns in places], axis=1)
+        integrands, bounds = self.functions(rows, np.tile(self.instants, len(places)))
+        parts = (np.split(_stacked(each, rows), len(places), axis=1) for each in (integrands, bounds))
+        return [
+            (float(np.sum(self.weights * costs)), limited[self.there])
+            for costs, limited in zip(*parts, strict=True)
+        ]
 
     def bounds(self, rows: FloatArray) -> FloatArray:
         """Return all bounds, (bounds, instants)."""
@@ -124,23 +131,29 @@ def _sampled(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sample
 
 
 class _Expanded:
-    """A group at given unknowns: functions and gradients there, and with each row displaced a little.
+    """A group at given unknowns: functions and gradients there, and with each row displaced a little."""
 
-    One call computes all of them, since a call costs more than many instants.
-    """
-
-    def __init__(self, group: Group, unknowns: FloatArray) -> None:
-        self.group, self.rows = group, group.rows(unknowns)
+    def __init__(self, group: Group, integrands: Sampled, bounds: Sampled, steps: FloatArray) -> None:
+        self.group, self._steps = group, steps
         self._curved: FloatArray | None = None
-        self._steps = DIFFERENCE * group.scales
-        count = len(self.rows)
-        displaced = self.rows[:, None, :] + np.diag(self._steps)[:, :, None]
-        places = np.concatenate([self.rows[:, None, :], displaced], axis=1)
-        at = np.tile(group.instants, count + 1)
-        integrands, bounds = group.sampled(places.reshape(count, -1), at)
-        self.integrands, self._moved_integrands = integrands.split(count + 1)
-        bounds, self._moved_bounds = bounds.split(count + 1)
-        self.bounds = bounds._replace(gradients=np.where(group.there[:, None], bounds.gradients, 0.0))
+        self.integrands, *self._moved_integrands = (integrands.part(each) for each in range(len(steps) + 1))
+        here, *self._moved_bounds = (bounds.part(each) for each in range(len(steps) + 1))
+        self.bounds = here._replace(gradients=np.where(group.there[:, None], here.gradients, 0.0))
+
+    @classmethod
+    def each(cls, group: Group, places: Sequence[FloatArray]) -> list[_Expanded]:
+        """Return the group at each of several unknowns.
+
+        One call computes all of them, and all displacements, since a call costs more than many instants.
+        """
+        steps = DIFFERENCE * group.scales
+        rows = np.stack([group.rows(unknowns) for unknowns in places], axis=1)
+        moved = rows[:, :, None] + np.diag(steps)[:, None, :, None]
+        everywhere = np.concatenate([rows[:, :, None], moved], axis=2)
+        at = np.tile(group.instants, len(places) * (len(steps) + 1))
+        found = group.sampled(everywhere.reshape(len(rows), -1), at)
+        integrands, bounds = (each.shaped(everywhere.shape[1:]) for each in found)
+        return [cls(group, integrands.part(place), bounds.part(place), steps) for place in range(len(places))]
 
     def gradient(self) -> FloatArray:
         """Return the gradient of the cost by the own unknowns."""
@@ -174,7 +187,7 @@ class _Expanded:
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
         """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
         moved = [
-            _weighted(self.group.weights, here) + _weighted(multipliers, of_bounds)
+            _weighted(self.group.weights, here.gradients) + _weighted(multipliers, of_bounds.gradients)
             for here, of_bounds in zip(self._moved_integrands, self._moved_bounds, strict=True)
         ]
         here = _weighted(self.group.weights, self.integrands.gradients)
@@ -204,9 +217,8 @@ def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
 class SeparablePoint:
     """Cost and bounds of a separable problem at unknowns, with their derivatives; a `Point`."""
 
-    def __init__(self, groups: Sequence[Group], unknowns: FloatArray) -> None:
-        self._parts = [_Expanded(group, unknowns) for group in groups]
-        self._size = len(unknowns)
+    def __init__(self, parts: Sequence[_Expanded], size: int) -> None:
+        self._parts, self._size = parts, size
         self.cost = sum(float(np.sum(part.group.weights * part.integrands.values)) for part in self._parts)
         of_parts = [part.bounds.values[part.group.there] for part in self._parts]
         self.bounds = np.concatenate(of_parts)
@@ -245,14 +257,19 @@ class SeparableProblem:
 
     groups: Sequence[Group]
 
-    def values(self, unknowns: FloatArray) -> tuple[float, FloatArray]:
+    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
         """See `Problem.values`."""
-        found = [group.values(group.rows(unknowns)) for group in self.groups]
-        return sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found])
+        by_group = [group.values(places) for group in self.groups]
+        return [
+            (sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found]))
+            for found in zip(*by_group, strict=True)
+        ]
 
-    def at(self, unknowns: FloatArray) -> SeparablePoint:
+    def at(self, places: Sequence[FloatArray]) -> list[SeparablePoint]:
         """See `Problem.at`."""
-        return SeparablePoint(self.groups, unknowns)
+        by_group = [_Expanded.each(group, places) for group in self.groups]
+        pairs = zip(zip(*by_group, strict=True), places, strict=True)
+        return [SeparablePoint(parts, len(unknowns)) for parts, unknowns in pairs]
 
 
 def interior(
@@ -266,7 +283,7 @@ def interior(
     kept = None
     for share in PULLS:
         pulled = wanted if inside is None else wanted + share * (inside - wanted)
-        _, bounds = problem.values(pulled)
+        ((_, bounds),) = problem.values([pulled])
         nearest = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
         kept = pulled if nearest < 0 else kept
         if nearest < -LEAST_CLEARANCE:

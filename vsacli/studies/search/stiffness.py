@@ -1,163 +1,29 @@
 """The stiffness profile of one joint that minimizes a cost along a fixed motion.
 
-Cost and bounds are functions of the stiffness and its derivatives at each instant. An interior-point method
-starts from several smooth profiles inside the attainable range and refines the best with finer splines, as
-long as these lower the cost.
+An interior-point method starts from several smooth profiles inside the attainable range, with bounds at some
+instants. Starts that lead to a higher cost are discarded; the best is refined with finer splines, as long as
+these lower the cost, until it keeps the bounds at all instants.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
-from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import driven_by
-from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range, checked_range
-from vsacli.studies.search.criteria import (
-    ENDS_OF_CORRIDOR,
-    Criterion,
-    Scale,
-    limit_bounds,
-    limit_names,
-    made_to_carry,
-    smoothed_minimum,
-    trapezoidal,
-)
-from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimize
+from vsacli.studies.search.criteria import ROUGH_GAP, Criterion, Scale, rough_minima, smoothed_minimum
+from vsacli.studies.search.fixed_motion import CLEARANCE, FixedMotion, best_of_constants
+from vsacli.studies.search.interior_point import WARM_GAP, Minimum
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
-
-CLEARANCE = 1e-6
-"""Relative distance that a profile keeps from each bound, so that rounding does not cross it."""
-
-OF_MOTORS = ("phi", "dtheta", "tau_motor", "current", "voltage")
-"""Limited variables that depend on the stiffness."""
-
-
-class FixedMotion:
-    """The `Functions` of a stiffness and its first two derivatives, and of a level if the cost is one.
-
-    Args:
-        joint: joint whose stiffness varies.
-        load: load of the joint at all instants.
-        admissible: admissible stiffness at these instants.
-        criterion: objective.
-        scale: scale of the cost.
-        reserve: required clearance to the limits of the motors, as a share of each.
-    """
-
-    def __init__(
-        self,
-        joint: Joint,
-        load: Load,
-        admissible: Range,
-        criterion: Criterion,
-        scale: Scale,
-        reserve: float = 0.0,
-    ) -> None:
-        self.joint, self.load, self.admissible = joint, load, admissible
-        self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
-        self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
-        self._carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
-        self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
-
-    @property
-    def bound_names(self) -> list[str]:
-        """Names of the first bounds; the bounds after these belong to levels."""
-        return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
-
-    @property
-    def further_bounds(self) -> int:
-        """Number of bounds after the two of the stiffness itself."""
-        return len(self.bound_names) - 2 + self.criterion.bound_count(self.joint)
-
-    def __call__(
-        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
-    ) -> tuple[list[Any], list[Any]]:
-        """Return integrands of the cost, and bounds; see `Functions`."""
-        driven = self.driven(rows[: STIFFNESS.orders], instants)
-        level = rows[STIFFNESS.orders] if self.criterion.levels else None
-        asked = (self.joint, driven, level, self.scale)
-        low, high = (row[instants] for row in self.admissible)
-        size = self.stiffness
-        bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
-        bounds += limit_bounds(self._limits, driven, self._clearance)
-        return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
-
-    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
-        """Return the variables of the motors for a stiffness and its derivatives."""
-        load = self.load.at(instants).command
-        commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
-        joint = self._carrying if isinstance(rows[0], Dual) else self.joint
-        with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
-
-
-INSIDE = 1e-3
-"""Relative distance that a start keeps from the ends of the admissible range, if possible."""
-
-DRAWN, LEVELS = 2, 6
-"""Number of random targets, and of the random levels that each of them interpolates."""
-
-
-class _Distance:
-    """The `Functions` of the squared distance from a target stiffness, within bounds."""
-
-    def __init__(self, target: FloatArray, within: Range, size: float) -> None:
-        self._target, self._within, self._size = target, within, size
-
-    def __call__(
-        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
-    ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
-        """Return the square of the distance, and the excess over the bounds."""
-        low, high = (row[instants] for row in self._within)
-        missed = (rows[0] - self._target[instants]) / self._size
-        return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
-
-
-def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
-    """Yield targets for starts: the command, the lower end of the range, constants, random profiles."""
-    highest = float(admissible.low.max())
-    generator = np.random.default_rng(seed)
-    yield asked
-    yield 1.05 * admissible.low
-    yield np.full_like(time, 1.05 * highest)
-    yield np.full_like(time, 2 * highest)
-    places = np.linspace(time[0], time[-1], LEVELS)
-    for _ in range(DRAWN):
-        yield admissible.low * np.interp(time, places, generator.uniform(1.0, 2.0, LEVELS))
-
-
-def nearest_profile(
-    space: SplineSpace, time: FloatArray, target: FloatArray, admissible: Range
-) -> FloatArray | None:
-    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None."""
-    size = float(np.median(admissible.low))
-    clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
-    within = Range(admissible.low + clearance, admissible.high - clearance)
-    group = Group(
-        functions=_Distance(target, within, size),
-        instants=np.arange(len(time)),
-        basis=space.basis(time, 1),
-        unknowns=np.arange(space.size),
-        weights=trapezoidal(time)[None] / (time[-1] - time[0]),
-        there=np.isfinite(np.stack(within)),
-        scales=np.array([size]),
-    )
-    problem = SeparableProblem([group])
-    start = interior(problem, space.fitted(time, np.clip(target, *within)))
-    return None if start is None else minimize(problem, start).unknowns
-
+from vsacli.studies.search.stiffness_starts import nearest_profile, targets
 
 INSTANTS_PER_PIECE = 8
 """Instants per piece of the spline at which the cost is integrated and bounds are kept."""
@@ -174,11 +40,17 @@ WORTH_HALVING = 1e-3
 SAME_COST = 1e-4
 """Relative difference of costs up to which two starts reached the same optimum."""
 
+CLOSE_COST = 1e-2
+"""Relative difference of costs with bounds at some instants up to which all bounds may change the order."""
+
 MOST_ROUNDS = 12
 """Limit on rounds that add instants of violated bounds; one or two are usual, seven were needed once."""
 
 SAME_LEVEL = 1e-5
 """Share of a level by which values may exceed it at some instants: a tenth of `SAME_COST`."""
+
+STIFFEST = 100.0
+"""Largest constant that is tried, as a multiple of the smallest admissible one."""
 
 FIRST_LEVEL = 1.05
 """Initial level, as a multiple of the largest value that it bounds."""
@@ -219,15 +91,16 @@ Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
 
 
 class _Attempt(NamedTuple):
-    """A minimum among the splines of a space, and the instants at which its bounds were kept."""
+    """A minimum among the splines of a space, the instants at which its bounds were kept, and its start."""
 
     space: SplineSpace
     minimum: Minimum
     instants: IndexArray
+    start: FloatArray
 
-    def in_space(self, space: SplineSpace, time: FloatArray) -> FloatArray:
-        """Return the coefficients of the profile in another space, (shapes,)."""
-        return space.fitted(time, self.space.basis(time, 1)[0] @ self.minimum.unknowns[: self.space.size])
+    def reaches(self, other: _Attempt, share: float = SAME_COST) -> bool:
+        """Return whether the cost is that of another attempt but for a share of it, or lower."""
+        return self.minimum.cost <= other.minimum.cost + share * abs(other.minimum.cost)
 
 
 class StiffnessSearch:
@@ -264,6 +137,7 @@ class StiffnessSearch:
         self._spaces, self._seed, self._progress = spaces, seed, progress
         self._span = float(load.time[0]), float(load.time[-1])
         self._steps = load.time[load.steps]
+        self._bases: dict[SplineSpace, FloatArray] = {}
         self._most = min(MOST_PIECES, len(self._steps) - 1)
         self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
@@ -276,30 +150,94 @@ class StiffnessSearch:
         pieces, starts = self._starts()
         space = self._space(pieces)
         self._scale_by(space, starts[0])
-        kept: list[tuple[_Attempt, FloatArray]] = []
-        for start in starts:
-            # most starts reach the same optimum, where the same instants are needed to keep the bounds
-            attempt = self._attempt(space, pieces, start, known=kept[-1][0].instants if kept else None)
-            if attempt is not None:
-                kept.append((attempt, start))
-        if not kept:
-            raise ImpossibleError(
-                f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
-            )
-        best, start = min(kept, key=lambda pair: pair[0].minimum.cost)
-        least = best.minimum.cost
-        agreeing = sum(attempt.minimum.cost <= least + SAME_COST * abs(least) for attempt, _ in kept)
-        return self._profile(self._refined(best, pieces, start), len(starts), agreeing)
+        roughly = self._roughly(space, evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1), starts)
+        for rough in self._in_order(roughly):
+            levels = self._refined(rough, pieces)
+            best = self._completed_one_of(levels)
+            if best is not None:
+                if len(self._whole.smoothings) > 1:  # the smoothed cost of finer splines may mislead
+                    kept = [best, *filter(self._keeps_all, levels[:-1])]
+                    best = min(kept, key=self._unsmoothed_cost)
+                agreeing = sum(each.reaches(rough) and rough.reaches(each) for each in roughly)
+                return self._profile(best, len(starts), agreeing)
+        raise ImpossibleError(
+            f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
+        )
 
     def best_constant(self) -> Profile | None:
         """Return the best constant as a profile; None if no constant keeps all bounds."""
-        space = SplineSpace.constant(self._span)
-        start = nearest_profile(space, self._load.time, self._asked, self._admissible)
-        if start is None:
+        space, stiffness = SplineSpace.constant(self._span), self._whole.stiffness
+        low = float(self._admissible.low.max()) + CLEARANCE * stiffness
+        high = min(float(self._admissible.high.min()) - CLEARANCE * stiffness, STIFFEST * low)
+        if low >= high:
             return None
-        self._scale_by(space, start)
-        found = self._attempt(space, FIRST_PIECES, start)
-        return None if found is None else self._profile(found, 1, 1)
+        self._scale_by(space, np.array([low]))
+        every = self._group(space, np.arange(len(self._load.time)))
+        instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
+        for _ in range(MOST_ROUNDS):
+            found = best_of_constants(self._whole, low, high, instants)
+            self._progress()
+            if found is None:
+                return None
+            constant, cost = found
+            unknowns = np.array([constant, cost / self._whole.scale.cost])[: 1 + self._criterion.levels]
+            missed = np.setdiff1d(self._missed(every, unknowns), instants)
+            if not missed.size:
+                minimum = Minimum(unknowns, cost / self._whole.scale.cost, found=True)
+                return self._profile(_Attempt(space, minimum, instants, unknowns[:1]), 1, 1)
+            instants = np.union1d(instants, missed)
+        return None
+
+    def _roughly(
+        self, space: SplineSpace, instants: IndexArray, starts: Sequence[FloatArray]
+    ) -> list[_Attempt]:
+        """Return the minima that starts lead to if bounds are kept at some instants only, best first."""
+        every = self._group(space, np.arange(len(self._load.time)))
+        problem = SeparableProblem([self._group(space, instants)])
+        begun: list[tuple[FloatArray, FloatArray]] = []
+        for start in starts:
+            inside = self._with_level(every, start)
+            unknowns = interior(problem, inside, inside)
+            if unknowns is not None:
+                begun.append((start, unknowns))
+        found = rough_minima(problem, [unknowns for _, unknowns in begun], [self._whole])
+        self._progress()
+        attempts = [
+            _Attempt(space, minimum, instants, start)
+            for (start, _), minimum in zip(begun, found, strict=True)
+        ]
+        return sorted(attempts, key=lambda each: each.minimum.cost)
+
+    def _keeps_all(self, attempt: _Attempt) -> bool:
+        """Return whether an attempt keeps all bounds at all instants."""
+        every = self._group(attempt.space, np.arange(len(self._load.time)))
+        return not self._missed(every, attempt.minimum.unknowns).size
+
+    def _unsmoothed_cost(self, attempt: _Attempt) -> float:
+        """Return the cost over all instants without smoothing."""
+        rows = self._basis(attempt.space) @ attempt.minimum.unknowns[: attempt.space.size]
+        driven = self._whole.driven(rows, np.arange(len(self._load.time)))
+        return self._criterion.of(self._joint, driven, self._load.time)
+
+    def _in_order(self, roughly: Sequence[_Attempt]) -> Iterator[_Attempt]:
+        """Yield different minima that keep bounds at some instants, the best with all bounds first.
+
+        Bounds at further instants only raise a cost: a start that is worse without them is not completed.
+        """
+        different: list[_Attempt] = []
+        for rough in roughly:
+            if not any(rough.reaches(other) for other in different):
+                different.append(rough)
+        close = [each for each in different if each.reaches(different[0], CLOSE_COST)]
+        if len(close) > 1:
+            costs = [self._cost_with_all_bounds(each) for each in close]
+            close = [close[index] for index in np.argsort(costs, kind="stable")]
+        yield from close
+        yield from different[len(close) :]
+
+    def _cost_with_all_bounds(self, rough: _Attempt) -> float:
+        found = self._completed(rough)
+        return np.inf if found is None else found.minimum.cost
 
     @property
     def _asked(self) -> FloatArray:
@@ -316,12 +254,24 @@ class StiffnessSearch:
         wanted = [target[chosen] for target in targets(self._asked, self._admissible, time, self._seed)]
         for pieces in self._finer_than(coarsest // 2):
             space = self._space(pieces)
-            found = [nearest_profile(space, time[chosen], target, admissible) for target in wanted]
+            basis = self._basis(space)[0, chosen]
+            found = [nearest_profile(basis, time[chosen], target, admissible) for target in wanted]
             if starts := [amounts for amounts in found if amounts is not None]:
                 return pieces, starts
         raise ImpossibleError(
             f"what {self._joint.name} may have is too narrow, or changes too fast, for a smooth profile"
         )
+
+    def _basis(self, space: SplineSpace) -> FloatArray:
+        """Return the shapes with two derivatives at all instants, (3, instants, shapes), computed once."""
+        if space not in self._bases:
+            self._bases[space] = space.basis(self._load.time, STIFFNESS.orders)
+        return self._bases[space]
+
+    def _fitted(self, space: SplineSpace, values: FloatArray) -> FloatArray:
+        """Return the coefficients of the spline nearest to values at all instants, (shapes,)."""
+        fitted: FloatArray = np.linalg.lstsq(self._basis(space)[0], values, rcond=None)[0]
+        return fitted
 
     def _finer_than(self, pieces: int) -> Iterator[int]:
         """Yield numbers of pieces, each twice the previous one, up to the largest allowed."""
@@ -332,54 +282,57 @@ class StiffnessSearch:
     def _scale_by(self, space: SplineSpace, amounts: FloatArray) -> None:
         """Scale the cost by the cost of a profile."""
         every = np.arange(len(self._load.time))
-        driven = self._whole.driven(space.basis(self._load.time, STIFFNESS.orders) @ amounts, every)
+        driven = self._whole.driven(self._basis(space) @ amounts, every)
         size = self._criterion.size(self._joint, driven, self._load.time)
-        self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
+        self._whole.scale = Scale(size, self._span[1] - self._span[0], self._whole.smoothings[0])
 
-    def _attempt(
-        self,
-        space: SplineSpace,
-        pieces: int,
-        start: FloatArray,
-        nearby: _Attempt | None = None,
-        known: IndexArray | None = None,
-    ) -> _Attempt | None:
-        """Search from a start, adding instants until all bounds are kept; return None if that fails.
+    def _completed(self, attempt: _Attempt, *, accurate: bool = False) -> _Attempt | None:
+        """Return an attempt that keeps all bounds at all instants, or None.
 
         Args:
-            space: space of the splines.
-            pieces: number of pieces of a spline.
-            start: coefficients of an admissible spline.
-            nearby: minimum among coarser splines from which to continue.
-            known: instants that another search needed.
+            attempt: minimum with bounds at some instants, to which those where it violates bounds are added.
+            accurate: whether the minimum is searched to the last barrier.
         """
-        instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1)
-        if known is not None:
-            instants = np.union1d(instants, known)
+        space, found, instants, start = attempt
         every = self._group(space, np.arange(len(self._load.time)))
-        inside = unknowns = self._with_level(every, start)
-        if nearby is not None:
-            instants = np.union1d(instants, nearby.instants)
-            unknowns = self._with_level(every, nearby.in_space(space, self._load.time))
-        gap = FIRST_GAP if nearby is None else WARM_GAP
+        inside = self._with_level(every, start)
+        searched = not accurate
         for _ in range(MOST_ROUNDS):
+            missed, unknowns, gap = self._missed(every, found.unknowns), found.unknowns, ROUGH_GAP
+            if searched and not missed.size:
+                return _Attempt(space, found, instants, start)
+            if missed.size:
+                instants, gap = np.union1d(instants, missed), WARM_GAP
+                unknowns = self._with_level(every, unknowns[: space.size])
             problem = SeparableProblem([self._group(space, instants)])
-            begun = interior(problem, unknowns, inside)
+            begun = interior(problem, unknowns, inside) if missed.size else unknowns
             if begun is None:
                 return None
-            found, gap = smoothed_minimum(problem, begun, gap, [self._whole]), WARM_GAP
+            if accurate:
+                found = smoothed_minimum(problem, begun, gap, [self._whole])
+            else:
+                (found,) = rough_minima(problem, [begun], [self._whole], gap)
+            searched = True
             self._progress()
-            missed = self._missed(every, found.unknowns)
-            if not missed.size:
-                return _Attempt(space, found, instants)
-            instants = np.union1d(instants, missed)
-            unknowns = self._with_level(every, found.unknowns[: space.size])
+        return None
+
+    def _completed_one_of(self, attempts: Sequence[_Attempt]) -> _Attempt | None:
+        """Return the last attempt that keeps all bounds once they count, searched to the last barrier."""
+        for attempt in reversed(attempts):
+            rough = self._completed(attempt)
+            if rough is not None:
+                found = self._completed(rough, accurate=True)
+                if found is None or (
+                    rough.minimum.found and not found.minimum.found and rough.reaches(found)
+                ):
+                    return rough
+                return found
         return None
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:
         """Return cost and bounds at some instants as a group of the separable problem."""
         time = self._load.time[instants]
-        basis, levels = space.basis(time, STIFFNESS.orders), self._criterion.levels
+        basis, levels = self._basis(space)[:, instants], self._criterion.levels
         if levels:
             of_levels = np.zeros((levels, *basis.shape[1:]))
             alone = np.zeros((len(basis) + levels, len(time), levels))
@@ -412,23 +365,46 @@ class StiffnessSearch:
         missed[len(self._whole.bound_names) :] -= SAME_LEVEL
         return missed_instants(missed)
 
-    def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
-        """Return the attempt refined with finer pieces, as long as these lower the cost."""
-        coarse = best.space
+    def _refined(self, coarse: _Attempt, pieces: int) -> list[_Attempt]:
+        """Return the attempt, and those with finer pieces as long as these lower the cost.
+
+        Bounds are kept at some instants, among them those at which the coarser splines violate them.
+        """
+        time, found = self._load.time, [coarse]
+        inside = self._basis(coarse.space)[0] @ coarse.start
         for finer_pieces in self._finer_than(pieces):
-            space = self._space(finer_pieces)
-            inside = space.fitted(self._load.time, coarse.basis(self._load.time, 1)[0] @ start)
-            finer = self._attempt(space, finer_pieces, inside, best)
-            if finer is None or finer.minimum.cost > best.minimum.cost:
+            best, space = found[-1], self._space(finer_pieces)
+            every = self._group(best.space, np.arange(len(time)))
+            needed = np.union1d(best.instants, self._missed(every, best.minimum.unknowns))
+            instants = np.union1d(evenly(len(time), INSTANTS_PER_PIECE * finer_pieces + 1), needed)
+            finer = self._near(space, instants, best, self._fitted(space, inside))
+            # of equal costs, that at more instants is the more accurate one
+            if finer is None or not finer.reaches(best, WORTH_HALVING):
                 break
-            gained, best = best.minimum.cost - finer.minimum.cost, finer
-            if gained <= WORTH_HALVING * abs(best.minimum.cost):
+            found.append(finer)
+            gained = best.minimum.cost - finer.minimum.cost
+            if gained + ROUGH_GAP <= WORTH_HALVING * abs(finer.minimum.cost):
                 break
-        return best
+        return found
+
+    def _near(
+        self, space: SplineSpace, instants: IndexArray, coarse: _Attempt, start: FloatArray
+    ) -> _Attempt | None:
+        """Return a minimum among finer splines near one among coarser splines, or None."""
+        every = self._group(space, np.arange(len(self._load.time)))
+        problem = SeparableProblem([self._group(space, instants)])
+        profile = self._basis(coarse.space)[0] @ coarse.minimum.unknowns[: coarse.space.size]
+        near = self._with_level(every, self._fitted(space, profile))
+        begun = interior(problem, near, self._with_level(every, start))
+        if begun is None:
+            return None
+        (found,) = rough_minima(problem, [begun], [self._whole], WARM_GAP)
+        self._progress()
+        return _Attempt(space, found, instants, start)
 
     def _profile(self, attempt: _Attempt, starts: int, agreeing: int) -> Profile:
         amounts = attempt.minimum.unknowns[: attempt.space.size]
-        rows = attempt.space.basis(self._load.time, STIFFNESS.orders) @ amounts
+        rows = self._basis(attempt.space) @ amounts
         return Profile(
             rows=rows,
             steps=self._load.steps,

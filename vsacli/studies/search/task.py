@@ -43,8 +43,8 @@ from vsacli.studies.search.nearest_profile import Change, nearest_change
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
     smallest_offset,
-    smallest_transition,
 )
+from vsacli.studies.search.transitions import smallest_transition
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.times import ResampledTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -156,14 +156,17 @@ class Task:
         keeps_rate: whether a recording that is slowed down is sampled at its original rate; otherwise its own
             samples are kept, further apart.
         impossible: numbers of the factors (see `Factors`) at which no change is accepted, by form and whether
-            branches may change; also valid for the same task under a stricter rule, which shares them.
+            branches may change, with the key None whatever these are; also valid for the same task under a
+            stricter rule, which shares them.
     """
 
     acceptance: Acceptance
     trajectory: Trajectory
     cost: Cost = RELATIVE_CHANGE
     keeps_rate: bool = True
-    impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
+    impossible: dict[tuple[Form, bool] | None, set[int]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def acceptance_with(self, found: Combination) -> Acceptance:
         """Return the acceptance rule for the robot with the branches of a combination."""

@@ -76,7 +76,7 @@ class ImplicitSolution:
         torque = self._all(tau_e, q) - slopes.of_torque
         change = self._all(stiffness, q) - slopes.of_stiffness
         if self._actuator.motor_count == 1:
-            alone: Any = Dual.of(found.phi_1, torque / slopes.torque[0])
+            alone: Any = self._dual(found.phi_1, torque / slopes.torque[0])
             return found._replace(phi_1=alone)
         (torque_1, torque_2), (stiffness_1, stiffness_2) = slopes.torque, slopes.stiffness
         determinant = torque_1 * stiffness_2 - torque_2 * stiffness_1
@@ -84,8 +84,8 @@ class ImplicitSolution:
             dphi_1 = (stiffness_2 * torque - torque_2 * change) / determinant
             dphi_2 = (-stiffness_1 * torque + torque_1 * change) / determinant
         derived: dict[str, Any] = {
-            "phi_1": Dual.of(found.phi_1, dphi_1),
-            "phi_2": Dual.of(found.phi_2, dphi_2),
+            "phi_1": self._dual(found.phi_1, dphi_1),
+            "phi_2": self._dual(found.phi_2, dphi_2),
         }
         return found._replace(**derived)
 
@@ -131,7 +131,11 @@ class ImplicitSolution:
             - multiplier * (np.take_along_axis(slopes.torque, fixed[None], 0)[0])
         )
         tangent = tangent + np.where(critical, 0.0, at_end * by_pinned)
-        return Dual.of(end, np.where(bounded, tangent, 0.0))
+        return self._dual(end, np.where(bounded, tangent, 0.0))
+
+    def _dual(self, value: FloatArray, derivatives: FloatArray) -> Dual:
+        """Return a dual without the directions of phi, in which derivatives are zero, or NaN out of reach."""
+        return Dual.of(value, derivatives[: self._directions - self._actuator.motor_count])
 
     def _pinned(self, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return which phi is at an end of its range, and the derivatives of that end by the directions."""

@@ -1,0 +1,163 @@
+"""Cost and bounds of a joint along a fixed motion, as functions of its stiffness with two derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.motor import SHAFT
+from vsacli.actuators.reach import OfJoint
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.flags import MIN_MARGIN
+from vsacli.base.signals import STIFFNESS
+from vsacli.compute.duals import Dual
+from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.joint import Joint
+from vsacli.studies.search.acceptance import Range
+from vsacli.studies.search.criteria import (
+    ENDS_OF_CORRIDOR,
+    SMOOTHINGS,
+    Criterion,
+    Scale,
+    limit_bounds,
+    limit_names,
+    made_to_carry,
+)
+from vsacli.studies.search.loads import Load
+
+CLEARANCE = 1e-6
+"""Relative distance that a profile keeps from each bound, so that rounding does not cross it."""
+
+OF_MOTORS = ("phi", "dtheta", "tau_motor", "current", "voltage")
+"""Limited variables that depend on the stiffness."""
+
+
+class FixedMotion:
+    """The `Functions` of a stiffness and its first two derivatives, and of a level if the cost is one.
+
+    Args:
+        joint: joint whose stiffness varies.
+        load: load of the joint at all instants.
+        admissible: admissible stiffness at these instants.
+        criterion: objective.
+        scale: scale of the cost.
+        reserve: required clearance to the limits of the motors, as a share of each.
+    """
+
+    def __init__(
+        self,
+        joint: Joint,
+        load: Load,
+        admissible: Range,
+        criterion: Criterion,
+        scale: Scale,
+        reserve: float = 0.0,
+    ) -> None:
+        self.joint, self.load, self.admissible = joint, load, admissible
+        self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
+        self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
+        self.smoothings = SMOOTHINGS if _has_sharp_friction(joint) else criterion.smoothings
+        self._speed = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
+        self._smoothed: dict[float, tuple[Joint, Joint]] = {}
+        self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
+
+    @property
+    def bound_names(self) -> list[str]:
+        """Names of the first bounds; the bounds after these belong to levels."""
+        return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
+
+    @property
+    def further_bounds(self) -> int:
+        """Number of bounds after the two of the stiffness itself."""
+        return len(self.bound_names) - 2 + self.criterion.bound_count(self.joint)
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[list[Any], list[Any]]:
+        """Return integrands of the cost, and bounds; see `Functions`."""
+        driven = self.driven(rows[: STIFFNESS.orders], instants)
+        level = rows[STIFFNESS.orders] if self.criterion.levels else None
+        asked = (self.joint, driven, level, self.scale)
+        low, high = (row[instants] for row in self.admissible)
+        size = self.stiffness
+        bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
+        bounds += limit_bounds(self._limits, driven, self._clearance)
+        return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
+
+    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
+        """Return the variables of the motors for a stiffness and its derivatives."""
+        load = self.load.at(instants).command
+        plain, carrying = self._joints(self.scale.smoothing)
+        commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
+        joint = carrying if isinstance(rows[0], Dual) else plain
+        with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
+            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
+
+    def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
+        """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""
+        asked = np.repeat(constants, len(instants))
+        still = np.zeros_like(asked)
+        driven = self.driven(np.stack([asked, still, still]), np.tile(instants, len(constants)))
+        excess = np.max([still - 1, *limit_bounds(self._limits, driven, self._clearance)], axis=0)
+        kept = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
+        time, costs = self.load.time[instants], np.full(len(constants), np.inf)
+        for number in np.flatnonzero(kept).tolist():
+            part = slice(number * len(instants), (number + 1) * len(instants))
+            own = {name: variable[..., part] for name, variable in driven.items()}
+            costs[number] = self.criterion.of(self.joint, own, time)
+        return np.where(np.isnan(costs), np.inf, costs)
+
+    def _joints(self, smoothing: float) -> tuple[Joint, Joint]:
+        """Return the joint with its sharp friction smoothed, and a copy that carries derivatives."""
+        if smoothing not in self._smoothed:
+            width = smoothing * self._speed
+            joint = _with_friction_of(self.joint, width) if _has_sharp_friction(self.joint) else self.joint
+            carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
+            self._smoothed[smoothing] = joint, carrying
+        return self._smoothed[smoothing]
+
+
+def _has_sharp_friction(joint: Joint) -> bool:
+    return any(motor.friction is not None and motor.friction.sharp for motor in joint.actuator.motors)
+
+
+def _with_friction_of(joint: Joint, width: float) -> Joint:
+    """Return a joint whose motors' friction changes its sign over a width of their velocity at the joint.
+
+    A sharp change would make a sum over instants jump wherever a motor stops at another one.
+    """
+    actuator: Any = joint.actuator
+    motors = []
+    for motor in actuator.motor:
+        ratio = abs(motor.gear_ratio or 1.0) if motor.side == SHAFT else 1.0
+        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, ratio * width))
+        motors.append(replace(motor, friction=friction))
+    return replace(joint, actuator=replace(actuator, motor=tuple(motors)))
+
+
+GRID, SAME_CONSTANT = 33, 1e-6
+"""Constants that are compared at once, and the relative width of their range at which the search ends."""
+
+
+def best_of_constants(
+    motion: FixedMotion, low: float, high: float, instants: IndexArray
+) -> tuple[float, float] | None:
+    """Return the best constant between two and its cost, with limits at some instants; None if there is none.
+
+    Grids become finer and finer around the best of the one before.
+    """
+    best, grid = None, np.geomspace(low, high, GRID)
+    while best is None or grid[-1] - grid[0] > SAME_CONSTANT * best[0]:
+        costs = motion.costs_of_constants(grid, instants)
+        at = int(costs.argmin())
+        if costs[at] == np.inf:
+            return best
+        if best is None or costs[at] <= best[1]:
+            best = float(grid[at]), float(costs[at])
+        grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, GRID - 1)], GRID)
+    return best
