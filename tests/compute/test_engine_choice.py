@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import os
 import re
 import shutil
@@ -16,14 +17,20 @@ import pytest
 from samples.command_line import ROBOT
 from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
+from samples.shipped import shipped_robot
 
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import NUMPY, choice, choose, compiler, libraries
 from vsacli.compute.engine.cache import open_cache
-from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks
-from vsacli.compute.engine.compiled_engine import CompiledEngine
+from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks, settle
+from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
+from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.libraries import Code, _loaded
+from vsacli.compute.tracing import is_of_calls
+from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.energy import IntervalEnergy
+from vsacli.robot.model import Robot
 
 KERNEL = LinkTorques(vsa_3r())
 
@@ -194,6 +201,56 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
     short, arm, long = (Code("", sum(functions), functions) for functions in ((200,), (4_500,), (100_000,)))
     assert [choice._repays(code, 1_000_000) for code in (short, arm, long)] == [False, True, False]
     assert choice._repays(Code("", 100_000, (500,) * 200), 1_000_000)
+
+
+@needs_compiler
+def test_measured_springs_are_left_to_numpy_until_tracing_repays():
+    """48,000 to 96,000 samples take NumPy 0.1 to 0.2 s, and tracing alone 0.2 s, compiled before or not."""
+    kernel = BalancedDynamics(shipped_robot("measured_1r"), None)
+    assert choose("c", kernel, 1).reason.startswith("C code computes, compiled now")
+    for samples in (48_000, 96_000):
+        assert choose("auto", kernel, samples).engine is NUMPY
+    assert choose("auto", kernel, 200_000).reason.startswith("C code computes")
+
+
+def test_what_rarely_runs_counts_little():
+    """Fallbacks of the iterations are five sixths of the operations, and take a tenth of the time."""
+    code = kernel_code(BalancedDynamics(shipped_robot("measured_1r"), None))
+    assert not code.straight
+    assert code.operations < sum(code.functions) / 4
+    # NumPy takes 1.3 us a sample, and the compiler 4 s
+    assert not choice._repays(code, 1_000_000)
+    assert choice._repays(code, 10_000_000)
+
+
+@needs_compiler
+def test_the_choice_is_the_same_again():
+    kernel = BalancedDynamics(shipped_robot("vsa_3r"), None)
+    chosen = [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)]
+    kernel_code.cache_clear()
+    assert [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)] == chosen
+    assert [each.name for each in chosen] == ["numpy", "numpy", "c"]
+
+
+def test_long_chains_of_branches_and_loops_share_functions():
+    """Written out, 100 joints took the compiler 13 s, and seven with measured springs 33 s."""
+    inertia, coupling = ((0.1, 0.1),) * 100, (0.0,) * 100
+    chains = {
+        IntervalEnergy(inertia[:10], coupling[:10], rubbing=False): False,
+        IntervalEnergy(inertia, coupling, rubbing=False): True,
+        BalancedDynamics(shipped_robot("measured_1r"), None): False,
+        BalancedDynamics(_chain(shipped_robot("measured_1r"), 3), None): True,
+    }
+    for kernel, shares in chains.items():
+        code = kernel_code(kernel)
+        assert is_of_calls(kernel_program(kernel)) is shares
+        assert code.compiling_seconds < 4
+
+
+def _chain(robot: Robot, joints: int) -> Robot:
+    (joint,) = robot.joints
+    numbered = (dataclasses.replace(joint, name=f"{joint.name}{number}") for number in range(joints))
+    return dataclasses.replace(robot, joints=tuple(numbered))
 
 
 # Environments in which "auto" computes with NumPy, and "c" says why it cannot

@@ -16,7 +16,7 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
-from vsacli.control.simulation.history import History, continuous, history
+from vsacli.control.simulation.history import History, continuous, histories, joined
 from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.start import InitialError
@@ -94,7 +94,7 @@ def linearized_run(
     equations = RecordedEquations(loop, list(boundaries(loop, start)), budget, Computing("auto"))
     integrator = Integrator(equations, Tolerances(), lambda _: None)
     integrated = continuous(loop, integrator, times, start)
-    past = history(robot, loop, integrated, 0.0)
+    past = joined(list(histories(robot, loop, integrated, 0.0)))
     return past, State(past.q, past.dq, past.theta, past.dtheta)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -35,11 +34,11 @@ if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.base.variables import Variable
     from vsacli.control.gains import Gains
-    from vsacli.control.simulation import InitialError, Sensors, Simulation
+    from vsacli.control.simulation import InitialError, Sensors, SimulationRun
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.results.plots import FigureFiles
+    from vsacli.results.store.derived_files import SimulationWriter
     from vsacli.robot.model import Robot
-    from vsacli.trajectory.trajectory import Trajectory
 
 PROGRESS_STEPS = 1000
 FEEDBACK_LINEARIZATION = "feedback-linearization"
@@ -223,22 +222,20 @@ def simulate(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         drawn = figures and _figures(inputs.robot, figures, path.stem, outputs)
-        found = _run(partial(simulation, engine=engine, tell=talk.note), inputs.trajectory, talk)
-        talk.detail(_computed_by(**found.provenance))
+        run = simulation(engine=engine, tell=talk.note)
         provenance = {
             "command_line": shlex.join(["vsacli", *sys.argv[1:]]),
             "options": json.dumps(choices),
-            **found.provenance,
+            **run.provenance,
         }
         sensed = simulation.keywords["sensors"] is not None
-        with SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance) as writer:
-            writer.write(found.history)
-            writer.finish(found.report.as_json())
+        writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
+        report = _run(run, talk, writer)
         if drawn is not None:
             from vsacli.cli.plot import draw_staged
 
             draw_staged(file, drawn, talk)
-    code = _show(found.report, as_json)
+    code = _show(report, as_json)
     talk.wrote(outputs)
     return code
 
@@ -252,13 +249,13 @@ def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) ->
     return target.files(simulation_drawings(drawn), stem, outputs)
 
 
-def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
+def _prepared(inputs: Inputs, options: Options) -> partial[SimulationRun]:
     from vsacli.control.simulation import (
         GoalTolerance,
+        SimulationRun,
         Tolerances,
         check_feedback,
         perturbed,
-        simulate,
     )
 
     gains = _gains(inputs.robot, options)
@@ -273,7 +270,7 @@ def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
     with naming_option("--atol"):
         tolerances = Tolerances(options.rtol, options.atol)
     return partial(
-        simulate,
+        SimulationRun,
         *inputs,
         gains=gains,
         model=model,
@@ -345,15 +342,22 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
         return gains_from_text(robot, poles or DEFAULT, stiffness_poles, integral=integral)
 
 
-def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk) -> Simulation:
-    """Simulate, with a progress bar over simulated time."""
-    first, last = trajectory.times.span
-    with talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
+def _run(run: SimulationRun, talk: Talk, writer: SimulationWriter) -> SimulationReport:
+    """Simulate and write block by block, with a progress bar over simulated time."""
+    first, last = run.trajectory.times.span
+    with writer, talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
 
         def progress(time: float) -> None:
             bar.update(int(PROGRESS_STEPS * (time - first) / (last - first)) - bar.pos)
 
-        return simulate(progress=progress)
+        run.progress = progress
+        for block in run:
+            writer.write(block)
+            del block  # else it stays in memory while the next one is computed
+        talk.detail(_computed_by(**run.provenance))
+        report = run.report()
+        writer.finish(report.as_json(), run.provenance)
+    return report
 
 
 def _computed_by(engine: str, compiler: str, **_further: str) -> str:

@@ -1,6 +1,6 @@
 """The choice of the backend: `choose` for a run, `settle` for many runs that must agree.
 
-"auto" compares the time of NumPy with that of compiling, by estimates measured on the bundled robots.
+"auto" compares the time that compiled code saves with that of compiling, by the estimates in `costs`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Tell, unheard
+from vsacli.compute.engine.costs import LOOK_FROM, NUMPY_CALL_SAMPLES, TRACE_FROM
 from vsacli.compute.engine.engines import (
     SAMPLES_PER_PASS,
     Engine,
@@ -27,22 +28,6 @@ if TYPE_CHECKING:
 
 NAMES = ("numpy", "c", "auto")
 """Names of engines."""
-
-NUMPY_SECONDS = 0.3e-9
-"""Time of NumPy for one operation on one sample, s: 0.22 to 0.31 ns in traced programs of the bundled robots,
-more for loops, which run until the last sample is done."""
-
-NUMPY_CALL_SAMPLES = 3_000
-"""Overhead of a NumPy call, 0.9 us, as a number of samples; it matters in the short blocks of long chains."""
-
-LOOK_FROM = 50_000
-"""Number of samples, in blocks of the usual size, from which on compiled code is looked for. Tracing and
-calling the compiler for its version take 50 to 110 ms, the time of NumPy for 50,000 to 130,000 samples."""
-
-TRACE_FROM = 100_000
-"""Number of samples from which on a traced program saves NumPy more time than tracing takes: 83,000 to
-158,000 for robots of one to seven joints, 47,000 with 50, and 23,000 with 1000, that is 1,200 in their short
-blocks."""
 
 NUMPY: Engine = NumPyEngine()
 
@@ -189,8 +174,7 @@ def in_usual_blocks(samples: int, inputs: int) -> float:
 
 def _repays(code: Code, samples: float) -> bool:
     """Return whether NumPy would take longer than the compiler, and the compiler not too long."""
-    repays = code.operations * samples * NUMPY_SECONDS > code.compiling_seconds
-    return repays and not code.takes_too_long
+    return samples * code.seconds_saved > code.compiling_seconds and not code.takes_too_long
 
 
 def _numpy(samples: float) -> Engine:

@@ -8,14 +8,12 @@ from functools import lru_cache, partial
 from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Tell
 from vsacli.compute.engine.compiler import Compiler, Library
+from vsacli.compute.engine.costs import BRANCH_SHARE, CONDITIONAL_OPERATIONS, USUAL_ITERATIONS
 from vsacli.compute.engine.engines import Kernel, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.engine.libraries import Code, Loaded, Worthwhile, load
 from vsacli.compute.tracing import Program, Symbol
-from vsacli.compute.tracing.program import NESTED
-
-USUAL_ITERATIONS = 5
-"""Usual number of iterations of a loop, for estimates of time."""
+from vsacli.compute.tracing.program import NESTED, conditional_count, operation_count
 
 
 class CompiledEngine:
@@ -63,18 +61,26 @@ def kernel_code(kernel: Kernel) -> Code:
     program = kernel_program(kernel)
     calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
     functions = {id(call.body): call.body for call in calls} or {id(program): program}
-    carried_out = {identity: operation_count(each, USUAL_ITERATIONS) for identity, each in functions.items()}
+    carried_out = {identity: _carried_out(each) for identity, each in functions.items()}
     operations = sum(carried_out[id(call.body)] for call in calls) if calls else carried_out[id(program)]
-    return Code(batch_source(program), operations, tuple(map(operation_count, functions.values())))
+    straight = not any(map(conditional_count, functions.values()))
+    return Code(
+        batch_source(program), round(operations), tuple(map(compiling_size, functions.values())), straight
+    )
 
 
-def operation_count(program: Program, iterations: int = 1) -> int:
-    """Return the number of operations of a program; those of a loop count once per iteration."""
-    return sum(_weight(symbol, iterations) for symbol in program.operations)
+def compiling_size(program: Program) -> int:
+    """Return the size of a function for the compiler: operations, loops and branches as several."""
+    return operation_count(program) + CONDITIONAL_OPERATIONS * conditional_count(program)
 
 
-def _weight(symbol: Symbol, iterations: int) -> int:
+def _carried_out(program: Program) -> float:
+    """Return the usual number of operations per sample, those of loops and branches as often as they run."""
+    return sum(map(_weight, program.operations))
+
+
+def _weight(symbol: Symbol) -> float:
     if symbol.operation not in NESTED:
         return 1
-    count = operation_count(symbol.operands[0].body, iterations)
-    return iterations * count if symbol.operation == "loop" else count
+    often = {"loop": USUAL_ITERATIONS, "branch": BRANCH_SHARE}
+    return often.get(symbol.operation, 1) * _carried_out(symbol.operands[0].body)

@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.aligned_rows import aligned_rows
+from vsacli.compute.engine.costs import CONDITIONAL_OPERATIONS, MOST_UNROLLED
 from vsacli.compute.subnormals import subnormals_as_zero
 
 if TYPE_CHECKING:
@@ -29,10 +30,6 @@ it does not adjust to blocks from 32 MiB on."""
 
 KEPT_PROGRAMS = 8
 """Number of kernels whose programs are kept for the next call."""
-
-MOST_UNROLLED = 8_000
-"""Largest number of operations of a program without calls, that of ten joints with cubic springs. Longer ones
-consist of calls, which are 6 to 9 % slower in C, but compiled in a fraction of the time."""
 
 
 class Kernel(Hashable, Protocol):
@@ -142,4 +139,5 @@ def kernel_program(kernel: Kernel) -> Program:
     """
     from vsacli.compute.tracing import Kind, trace_by_size
 
-    return trace_by_size(kernel, [Kind.REAL] * kernel.inputs, MOST_UNROLLED)
+    kinds = [Kind.REAL] * kernel.inputs
+    return trace_by_size(kernel, kinds, MOST_UNROLLED, conditional=CONDITIONAL_OPERATIONS)

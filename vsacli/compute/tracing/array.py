@@ -320,6 +320,7 @@ def trace(
     *,
     calling: bool = False,
     short: bool = False,
+    conditional: int | None = None,
 ) -> Program:
     """Return the program of a function of rows of samples, for one sample.
 
@@ -329,11 +330,12 @@ def trace(
         most: Largest number of operations.
         calling: Whether calls are recorded as such, or expanded.
         short: Whether subroutines are separate functions.
+        conditional: See `Tape`.
 
     Raises:
         NotImplementedError: The function cannot be traced; `TooLongError` if it has more operations.
     """
-    tape = Tape(most, calling, short)
+    tape = Tape(most, calling, short, conditional)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
     return tape.program([cells_of(result).item() for result in function(rows)])
 
@@ -345,6 +347,7 @@ def trace_by_size(
     most: int = sys.maxsize,
     *,
     short: bool = False,
+    conditional: int | None = None,
 ) -> Program:
     """Return the program of a function, as `trace` does: without calls if it is short, else of calls.
 
@@ -354,11 +357,12 @@ def trace_by_size(
         written_out: Largest number of operations of a program without calls.
         most: Largest number of operations, including calls, of another program.
         short: See `trace`.
+        conditional: See `Tape`; applies to programs without calls.
 
     Raises:
         NotImplementedError: See `trace`.
     """
     try:
-        return trace(function, kinds, written_out, short=short)
+        return trace(function, kinds, written_out, short=short, conditional=conditional)
     except TooLongError:
         return trace(function, kinds, most, calling=True, short=short)

@@ -123,6 +123,23 @@ def is_of_calls(program: Program) -> bool:
     return any(symbol.operation == "call" for symbol in program.operations)
 
 
+def operation_count(program: Program) -> int:
+    """Return the number of operations of a program, those of programs nested in it in place of these."""
+    return sum(operation_count(body) for body in _nested(program)) + sum(
+        symbol.operation not in NESTED for symbol in program.operations
+    )
+
+
+def conditional_count(program: Program) -> int:
+    """Return the number of loops and branches of a program, at any depth."""
+    conditional = sum(symbol.operation in CONDITIONAL for symbol in program.operations)
+    return conditional + sum(map(conditional_count, _nested(program)))
+
+
+def _nested(program: Program) -> Iterator[Program]:
+    return (symbol.operands[0].body for symbol in program.operations if symbol.operation in NESTED)
+
+
 class Loop(NamedTuple):
     """A program that is repeated.
 
@@ -173,6 +190,9 @@ class Subroutine(NamedTuple):
 
 NESTED = frozenset({"loop", "branch", "call", "subroutine"})
 """Operations that contain a program."""
+
+CONDITIONAL = frozenset({"loop", "branch"})
+"""Nested operations that run more than once, or perhaps not at all."""
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
 LOGICAL = {"logical_and": "and", "logical_or": "or", "logical_not": "not"}

@@ -21,6 +21,7 @@ from vsacli.compute.tracing.program import (
     Symbol,
     Table,
     kind_of,
+    operation_count,
     result_kind,
 )
 from vsacli.compute.tracing.simplification import folded, without_dead_code
@@ -40,13 +41,22 @@ class Tape:
         most: Largest number of operations; beyond it `TooLongError` is raised.
         calling: Whether calls are recorded as such, or expanded.
         short: Whether subroutines are separate functions, or recorded inline.
+        conditional: Number of operations as which a loop or branch counts, in addition to those of its body;
+            None if neither counts.
 
     Attributes:
         calls: Recorded calls, by their keys.
     """
 
-    def __init__(self, most: int = sys.maxsize, calling: bool = False, short: bool = False) -> None:
-        self._most = most
+    def __init__(
+        self,
+        most: int = sys.maxsize,
+        calling: bool = False,
+        short: bool = False,
+        conditional: int | None = None,
+    ) -> None:
+        self._most, self._conditional = most, conditional
+        self._nested = 0
         self.short = short
         self.calling = calling
         self.calls: dict[Hashable, Any] = {}
@@ -80,6 +90,7 @@ class Tape:
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
     ) -> list[Symbol]:
         """Return the state after the repetition of a program that was traced on a separate tape."""
+        self._count(body)
         loop = Loop(body, limit, tuple(range(len(state))))
         return self._emit_nested("loop", body.outputs[:-1], (loop, *state, *constants))
 
@@ -87,6 +98,7 @@ class Tape:
         self, truth: Operand, body: Program, arguments: Sequence[Operand], otherwise: Sequence[Operand]
     ) -> list[Symbol]:
         """Add a program that runs where a Boolean is true, and values elsewhere; return the results."""
+        self._count(body)
         branch = Branch(body, tuple(range(len(otherwise))))
         return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
@@ -98,6 +110,10 @@ class Tape:
     def emit_subroutine(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
         """Add a call of a subroutine, which several places may share; return its results."""
         return self._emit_nested("subroutine", body.outputs, (Subroutine(body), *arguments))
+
+    def _count(self, body: Program) -> None:
+        if self._conditional is not None:
+            self._nested += self._conditional + operation_count(body)
 
     def _emit_nested(
         self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]
@@ -111,7 +127,7 @@ class Tape:
             raise NotImplementedError(message)
         if self._ended:
             raise RuntimeError("nothing can be added to a tape once its program is made")
-        if len(self._symbols) >= self._most:
+        if len(self._symbols) + self._nested >= self._most:
             raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
         fresh = operation in {"input", "item"} or operation in NESTED

@@ -4,7 +4,13 @@ from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.perturbation import perturbed
 from vsacli.control.simulation.sensors import Sensors
-from vsacli.control.simulation.simulate import Feedback, Simulation, check_feedback, simulate
+from vsacli.control.simulation.simulate import (
+    Feedback,
+    Simulation,
+    SimulationRun,
+    check_feedback,
+    simulate,
+)
 from vsacli.control.simulation.start import InitialError
 
 __all__ = [
@@ -13,6 +19,7 @@ __all__ = [
     "InitialError",
     "Sensors",
     "Simulation",
+    "SimulationRun",
     "Tolerances",
     "check_feedback",
     "perturbed",

@@ -21,9 +21,6 @@ controller are unbounded."""
 class Boundary(ABC):
     """A boundary at which a run must end, with the distance of a state to it."""
 
-    terminal = True
-    direction = -1.0
-
     reason: str
     flag: Flag
     joints: IndexArray

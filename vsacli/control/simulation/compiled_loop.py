@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.compute.aligned_rows import address
 from vsacli.compute.engine.compiler import CompilerError
 from vsacli.control.simulation.loop_code import Recording
@@ -133,7 +133,7 @@ def open_loop(path: Path) -> dict[str, Any]:
         raise CompilerError(f"what the C compiler made cannot be loaded: {error}") from None
     for name, function in functions.items():
         function.argtypes = [c_void_p, *_ARGUMENTS[name]]
-        function.restype = None
+        function.restype = c_int64 if name == "stages" else None
     return functions
 
 
@@ -156,6 +156,7 @@ class CompiledLoop:
         self._to_boundaries = partial(functions["to_boundaries"], distances)
         self._motors = len(recording.torques.program.outputs)
         self._distances = np.empty(len(recording.distances.program.outputs))
+        self._addressed: dict[str, tuple[AnyArray, int]] = {}
 
     def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
         """Return the time derivatives of state vectors, (..., entries), at a time."""
@@ -172,14 +173,13 @@ class CompiledLoop:
 
     def distance(self, vector: FloatArray) -> float:
         """Return the distance to the nearest boundary, at most 1."""
-        given = np.ascontiguousarray(vector)
-        self._to_boundaries(address(given), address(self._distances))
-        return float(self._distances.min(initial=1.0))
+        self._to_boundaries(self._address("state", vector), self._address("distances", self._distances))
+        return min(1.0, *self._distances.tolist())
 
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
-    ) -> FloatArray:
-        """Compute stages of an explicit step, and return the state at the last one.
+    ) -> FloatArray | None:
+        """Compute stages of an explicit step; return the state at the last one, None if rates are not finite.
 
         Args:
             time: time at the start of the step, s.
@@ -189,9 +189,22 @@ class CompiledLoop:
             rates: rates at the stages, (stages, entries), contiguous; those of earlier stages are read, the
                 computed ones are written.
         """
-        given, state = np.ascontiguousarray(vector), np.empty_like(vector)
-        self._stages(
-            time, step, address(given), which.first, which.last, len(which.weights), address(which.weights),
-            address(which.times), address(rates), address(state),
+        begin, state = self._address("state", vector), np.empty_like(vector)
+        finite = self._stages(
+            time, step, begin, which.first, which.last, len(which.weights),
+            self._address("weights", which.weights), self._address("times", which.times),
+            self._address("rates", rates), self._address("state", state),
         )  # fmt: skip
-        return state
+        return state if finite else None
+
+    def _address(self, role: str, array: FloatArray) -> int:
+        """Return the address of an array; NumPy takes a microsecond for it, as the code for an evaluation.
+
+        Steps pass the same arrays again and again, so the last one of each role is remembered.
+        """
+        last = self._addressed.get(role)
+        if last is not None and last[0] is array:
+            return last[1]
+        given = np.ascontiguousarray(array)  # kept with its address, since it may be a copy
+        self._addressed[role] = given, address(given)
+        return self._addressed[role][1]

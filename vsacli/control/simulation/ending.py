@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -78,7 +77,7 @@ class Budget:
     Attributes:
         limit: number of evaluations after which a run ends.
         used: evaluations so far, at most `limit`.
-        reserved: evaluations that must be left over; see `stopping`.
+        reserved: evaluations that a step must leave over for its interpolant.
         exhausted: whether an evaluation was refused.
 
     Raises:
@@ -119,31 +118,8 @@ class Budget:
         return self.used > TRIAL * self.limit and projected > share * (time - self._first)
 
 
-def stopping(method: Any, budget: Budget, reserve: int) -> Any:
-    """Return a method of `solve_ivp` that fails, and keeps earlier samples, in a step beyond the budget.
-
-    Args:
-        method: class of the method.
-        budget: budget that `check` guards.
-        reserve: evaluations for dense output, which a step must leave over.
-    """
-
-    class Stopping(method):  # type: ignore[misc]
-        def step(self) -> Any:
-            budget.reserved = reserve
-            try:
-                return super().step()
-            except SpentError:
-                self.status = "failed"
-                return None
-            finally:
-                budget.reserved = 0
-
-    return Stopping
-
-
 class Deadline:
-    """An event of `solve_ivp` at the end of the step in which the budget is used up.
+    """An event at the end of the step in which the budget is used up.
 
     It is called at each step, and reports the progress.
 
@@ -156,9 +132,6 @@ class Deadline:
     Attributes:
         time: time of the event, s; infinite until it occurs.
     """
-
-    terminal = True
-    direction = -1.0
 
     def __init__(
         self, budget: Budget, is_due: Callable[[float], bool], last: float, progress: Progress

@@ -1,8 +1,9 @@
-"""The history of a run: its integration to state vectors, and every variable evaluated from them."""
+"""The history of a run in blocks: integration to state vectors, and every variable evaluated from them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,9 @@ from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import add
 from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
 from vsacli.control.simulation.ending import Ending
-from vsacli.control.simulation.integrator import Effort, Integrator
+from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.sensors import Readings
+from vsacli.control.simulation.stepping import Pieces, Samples
 from vsacli.dynamics.limits import limit_flags
 from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.model import Robot
@@ -46,27 +48,30 @@ class RateFilter:
         self.phase = read._replace(dq=dq, dtheta=dtheta)
 
 
-class StateTrajectory(NamedTuple):
-    """A run: times (samples,), states (samples, entries), commanded torques (samples, motors).
+BLOCK = 2048
+"""Samples whose variables are evaluated at a time: 15 MB of an arm of seven joints, in 30 ms."""
 
-    Torques are constant between samples if `held`.
+
+class StateBlock(NamedTuple):
+    """Consecutive samples of a run: times (samples,), states (samples, entries), commanded torques.
+
+    Torques, (samples, motors), are constant between samples if `held`. The early end of a run, if there is
+    one, is in its last block.
     """
 
     time: FloatArray
     states: FloatArray
     demand: FloatArray
-    ending: Ending | None
-    effort: Effort
+    ending: Ending | None = None
     held: bool = False
 
 
 def continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
-) -> StateTrajectory:
-    """Integrate a run whose controller acts at every instant, on the true state."""
-    time, states, ending = integrator.over(times, start)
-    demand = loop.controller.torque(time, loop.packing.unpack(states))
-    return StateTrajectory(time, states, demand, ending, integrator.effort)
+) -> Iterator[StateBlock]:
+    """Integrate a run whose controller acts at every instant, on the true state; yield its blocks."""
+    for (time, states), ending in _gathered(integrator.over(times, start), loop.controller.ending):
+        yield StateBlock(time, states, loop.controller.torque(time, loop.packing.unpack(states)), ending)
 
 
 def sampled(
@@ -75,33 +80,86 @@ def sampled(
     times: FloatArray,
     start: FloatArray,
     readings: Readings | None = None,
-) -> StateTrajectory:
+) -> Iterator[StateBlock]:
     """Integrate a run whose controller acts on measured positions at the times, and holds torques in between.
 
-    Measured positions are the readings of sensors, or the true ones without `readings`.
+    Measured positions are the readings of sensors, or the true ones without `readings`. Yields the blocks of
+    the run.
     """
+    demands: list[FloatArray] = []
+    pieces = _sampled(loop, integrator, times, start, readings, demands)
+    for (time, states), ending in _gathered(pieces, loop.controller.ending):
+        demand = np.array(demands[: len(time)])
+        del demands[: len(time)]
+        yield StateBlock(time, states, demand, ending, held=True)
+
+
+def _sampled(
+    loop: ClosedLoop,
+    integrator: Integrator,
+    times: FloatArray,
+    start: FloatArray,
+    readings: Readings | None,
+    demands: list[FloatArray],
+) -> Pieces:
+    """Integrate interval by interval; append the torques of each sample to `demands` before it is yielded."""
 
     def read(state: FloatArray, sample: int) -> Phase:
         truth = loop.packing.unpack(state)
         return truth if readings is None else readings.phase(truth, sample)
 
     measurement = RateFilter(read(start, 0))
-    reached, states, ending = [times[:1]], [start[None]], None
-    demands = [loop.controller.torque(float(times[0]), measurement.phase)]
-    loop.hold(demands[0])
+    demands.append(loop.controller.torque(float(times[0]), measurement.phase))
+    loop.hold(demands[-1])
+    yield Samples(times[:1], start[None])
+    state, ending = start, None
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
-        time, after, ending = integrator.over(interval, states[-1][-1])
+        (time, after), ending = _whole(integrator.over(interval, state))
         if time[-1] == time[0]:  # the budget was used up before the first step of the interval
             break
-        reached.append(time[1:])
-        states.append(after[1:])
-        measurement.add(read(after[-1], sample), time[-1] - time[0])
-        demands.append(integrator.equations.torques(float(time[-1]), loop.packing.joined(measurement.phase)))
-        loop.hold(demands[-1])
+        state = after[-1]
+        measurement.add(read(state, sample), time[-1] - time[0])
+        torques = integrator.equations.torques(float(time[-1]), loop.packing.joined(measurement.phase))
+        demands += [torques] * (len(time) - 1)
+        loop.hold(torques)
+        yield Samples(time[1:], after[1:])
         if ending is not None:
             break
-    rows = (np.concatenate(reached), np.concatenate(states), np.array(demands)[: sum(map(len, reached))])
-    return StateTrajectory(*rows, ending, integrator.effort, held=True)
+    return ending
+
+
+def _gathered(pieces: Pieces, last: Ending | None) -> Iterator[tuple[Samples, Ending | None]]:
+    """Yield a run in blocks of at least `BLOCK` samples, but for the last one, which has the early end.
+
+    Without one, it has the end of the controller's torques, `last`.
+    """
+    gathered: list[Samples] = []
+    count = 0
+    while True:
+        try:
+            piece = next(pieces)
+        except StopIteration as finished:
+            yield _joined(gathered), last if finished.value is None else finished.value
+            return
+        if count >= BLOCK:
+            yield _joined(gathered), None
+            gathered, count = [], 0
+        gathered.append(piece)
+        count += len(piece.time)
+
+
+def _whole(pieces: Pieces) -> tuple[Samples, Ending | None]:
+    """Return all samples of a short run, and its early end."""
+    gathered: list[Samples] = []
+    while True:
+        try:
+            gathered.append(next(pieces))
+        except StopIteration as finished:
+            return _joined(gathered), finished.value
+
+
+def _joined(pieces: Sequence[Samples]) -> Samples:
+    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
 class History(Block):
@@ -113,17 +171,37 @@ class History(Block):
     declared = SIMULATION_VARIABLES
 
 
-def history(
+def joined(blocks: Sequence[History]) -> History:
+    """Return the variables of consecutive blocks of a run."""
+    arrays = [block.arrays() for block in blocks]
+    names = list(arrays[0])
+    return History(**{name: np.concatenate([each.pop(name) for each in arrays]) for name in names})
+
+
+def histories(
     robot: Robot,
     loop: ClosedLoop,
-    integrated: StateTrajectory,
+    blocks: Iterable[StateBlock],
     first: float,
     readings: Readings | None = None,
+) -> Iterator[History]:
+    """Evaluate every variable along a run, block by block; `first` is the stamp of its time zero, s."""
+    work = _Work()
+    for integrated in blocks:
+        yield _history(robot, loop, integrated, first, readings, work)
+
+
+def _history(
+    robot: Robot,
+    loop: ClosedLoop,
+    integrated: StateBlock,
+    first: float,
+    readings: Readings | None,
+    work: _Work,
 ) -> History:
-    """Evaluate every variable along a run; `first` is the stamp of its time zero, s."""
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
-    found = _simulated(loop, integrated)
+    found = _simulated(loop, integrated, work)
     if robot.has(VARIABLES["dissipated_power"]):
         of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
@@ -145,7 +223,7 @@ def history(
     )
 
 
-def _simulated(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArray]:
+def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
     phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
     ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
@@ -172,7 +250,7 @@ def _simulated(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, Float
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,
-        "motor_energy": _work(theta, tau_motor, held=integrated.held),
+        "motor_energy": work.until(theta, tau_motor, held=integrated.held),
         "det_A": drivetrain.determinant(phase.q, phase.theta),
         **plant.dampers.variables(loop.reference.damping(integrated.time), phase.dq, phase.dtheta),
     }
@@ -182,10 +260,26 @@ def _simulated(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, Float
     return found
 
 
-def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
-    """Return the work of motors up to each sample, (samples, ...), J; torques held or linear in between."""
-    given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
-    return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
+class _Work:
+    """Work of motors along a run; rounding does not depend on its blocks."""
+
+    def __init__(self) -> None:
+        self._last: tuple[FloatArray, ...] = ()
+
+    def until(self, theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
+        """Return the work up to each sample of the next block, (samples, ...), J.
+
+        Torques are held from sample to sample, or linear in between.
+        """
+        begun = 0 * torque[:1]
+        if self._last:
+            *before, begun = self._last
+            theta, torque = map(np.concatenate, zip(before, (theta, torque), strict=True))
+        given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
+        done = np.cumsum(np.concatenate((begun, given * np.diff(theta, axis=0))), axis=0)
+        found = done[1:] if self._last else done
+        self._last = (theta[-1:].copy(), torque[-1:].copy(), done[-1:].copy())
+        return found
 
 
 def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:

@@ -6,11 +6,9 @@ A run begins with an explicit method, and changes to an implicit one if that nee
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -19,8 +17,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored
 from vsacli.control.simulation.compiled_loop import dop853_with_stages
-from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress, SpentError, stopping
+from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress, SpentError
 from vsacli.control.simulation.loop_equations import Edge, Equations
+from vsacli.control.simulation.stepping import Event, Pieces, Samples, Stop, steps
 from vsacli.control.simulation.stick_slip import StickSlip, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
@@ -79,8 +78,22 @@ class Effort(NamedTuple):
     provenance: Mapping[str, str]
 
 
+class _End(NamedTuple):
+    """The end of an integration with one method.
+
+    Attributes:
+        last: time of the last sample, s.
+        early: early end of the run; None without one.
+        sample: state at an early end, which is not among the samples yet; None without one.
+    """
+
+    last: float
+    early: Ending | None = None
+    sample: Samples | None = None
+
+
 class Integrator:
-    """Integration by `solve_ivp` with boundaries at which a run ends, explicit as long as the budget allows.
+    """Integration by SciPy's methods to a boundary or the end, explicit as long as the budget allows.
 
     Args:
         equations: equations of motion, with their boundaries.
@@ -111,118 +124,111 @@ class Integrator:
         budget, by = self._budget, self.equations.provenance
         return Effort(tuple(self._methods), budget.used, budget.limit, by)
 
-    def over(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
-        """Integrate over times, (samples,); return those reached, the states there, and an early end if any.
+    def over(self, times: FloatArray, start: FloatArray) -> Pieces:
+        """Integrate over times, (samples,); yield those reached with the states there, in pieces.
 
         If the run ends early, the last time and state are those of its end.
         """
         if not self._methods:
             self._methods.append(Method(EXPLICIT, float(times[0])))
-        if self._methods[-1].name == IMPLICIT:
-            return self._implicit(times, start)
-        reached, states, ending = self._explicit(times, start)
-        if ending is None or ending.verdict != INCOMPLETE or self._budget.exhausted:
-            return reached, states, ending
-        change = ending.time
-        rest = np.concatenate((reached[-1:], times[times > change]))
-        later, after, ending = self._implicit(rest, states[-1])
-        if len(later) == 1:  # the budget is too small for the implicit method
-            return reached, states, ending
-        self._methods.append(Method(IMPLICIT, change))
-        return np.append(reached[:-1], later[1:]), np.concatenate((states[:-1], after[1:])), ending
+        explicit = self._methods[-1].name == EXPLICIT
+        end = yield from (self._explicit if explicit else self._implicit)(times, start)
+        early, sample = end.early, end.sample
+        if explicit and sample is not None and early is not None and early.verdict == INCOMPLETE:
+            return (yield from self._changed(times, sample))
+        if sample is not None:
+            yield sample
+        return early
 
-    def _explicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
+    def _changed(self, times: FloatArray, change: Samples) -> Pieces:
+        """Continue with the implicit method at the end of the explicit one, which is not a sample of its own.
+
+        Only if the budget is too small for the implicit method, the run ends there.
+        """
+        at = float(change.time[0])
+        rest = np.concatenate((change.time, times[times > at]))
+        pieces = self._implicit(rest, change.states[0])
+        first = next(pieces)
+        if len(first.time) > 1:
+            yield Samples(first.time[1:], first.states[1:])
+        end = yield from pieces
+        if end.sample is None and end.last == at:
+            yield change
+            return end.early
+        self._methods.append(Method(IMPLICIT, at))
+        if end.sample is not None:
+            yield end.sample
+        return end.early
+
+    def _explicit(self, times: FloatArray, start: FloatArray) -> Generator[Samples, None, _End]:
         method = dop853_with_stages()
-        within = stopping(method, self._budget, reserve=len(method.C_EXTRA))
-        steps: dict[str, Any] = {"method": within, "stages": self.equations.stages}
-        return self._solve(times, start, self._budget.too_slow, atol=self._tolerances.atol, **steps)
+        solver = partial(method, self.equations, stages=self.equations.stages, atol=self._tolerances.atol)
+        return self._solve(times, start, self._budget.too_slow, solver, reserve=len(method.C_EXTRA))
 
-    def _implicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
+    def _implicit(self, times: FloatArray, start: FloatArray) -> Generator[Samples, None, _End]:
         from scipy.integrate import Radau
 
         slope = partial(jacobian, self.equations)
         try:
             floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
         except SpentError:
-            return times[:1], start[None], self._budget.ending(float(times[0]))
+            yield Samples(times[:1], start[None])
+            return _End(float(times[0]), self._budget.ending(float(times[0])))
         atol = np.maximum(self._tolerances.atol, floor)
-        within = stopping(Radau, self._budget, reserve=0)
-        return self._solve(times, start, self._budget.spent, method=within, atol=atol, jac=slope)
+        options: dict[str, Any] = {"jac": slope, "atol": atol}  # SciPy's stubs know only scalar tolerances
+        solver = partial(Radau, self.equations, **options)
+        return (yield from self._solve(times, start, self._budget.spent, solver, reserve=0))
 
     def _solve(
         self,
         times: FloatArray,
         start: FloatArray,
         is_due: Callable[[float], bool],
-        **options: Any,
-    ) -> tuple[FloatArray, FloatArray, Ending | None]:
+        solver: Callable[..., Any],
+        reserve: int,
+    ) -> Generator[Samples, None, _End]:
+        """Integrate with a method of SciPy from switch to switch; yield at least one sample."""
         deadline = Deadline(self._budget, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may have changed since the last call
             self._sliding.settle(float(times[0]), start)
-        first, at, state, parts = times[:1], float(times[0]), start, []
+        first, last, stop = times[0], math.nan, Stop(float(times[0]), start)
         while True:
-            solution = self._until_event((at, times), state, events, options)
-            parts.append(_evaluated(solution, start))
-            event, at, state = _terminal_event(events, solution)
-            if not isinstance(event, Switch):
+            stop = yield from self._until_event(stop, times, events, solver, reserve)
+            if stop.reached:
+                last = float(times[stop.reached - 1])
+            if not isinstance(stop.event, Switch):
                 break
-            state, times = event.passed(at, state), times[times > at]
+            times = times[times.searchsorted(stop.time, "right") :]
+            stop = stop._replace(state=stop.event.passed(stop.time, stop.state), event=None)
             if not times.size:
-                event = None
                 break
-        reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
-        if not len(reached):  # a span of zero length, or a failure of the first step
-            reached, states = first, start[None]
+        if math.isnan(last):  # a span of zero length, or a failure of the first step
+            last = float(first)
+            yield Samples(first[None], start[None])
         if self._budget.exhausted:
-            return reached, states, self._budget.ending(float(reached[-1]))
-        if solution.status < 0:
-            reason = "the motion became too fast to integrate"
-            return reached, states, Ending(float(reached[-1]), reason)
-        if event is None:
-            return reached, states, None
-        return np.append(reached, at), np.concatenate((states, state[None])), event.ending(at, state)
+            return _End(last, self._budget.ending(last))
+        if stop.failed:
+            return _End(last, Ending(last, "the motion became too fast to integrate"))
+        if stop.event is None:
+            return _End(last)
+        sample = Samples(np.array([stop.time]), stop.state[None])
+        return _End(last, stop.event.ending(stop.time, stop.state), sample)
 
     def _until_event(
         self,
-        span: tuple[float, FloatArray],
-        start: FloatArray,
-        events: Sequence[Any],
-        options: Mapping[str, Any],
-    ) -> Any:
-        """Return a solution from a time on, at further times, up to the first event or the last time.
-
-        It is empty if the budget is too small even for a first step.
-        """
-        from scipy.integrate import solve_ivp
-
-        time, times = span
-        none: list[Any] = [()] * len(events)
-        empty = SimpleNamespace(t=(), t_events=none, y_events=none, status=-1)
-        with np.errstate(all="ignore"), suppress(SpentError):  # a trial step may leave the range of a law
-            return solve_ivp(
-                self.equations,
-                (time, float(times[-1])),
-                start,
-                t_eval=times,
-                events=events,
-                rtol=self._tolerances.rtol,
-                max_step=self._sliding.longest_step if self._sliding else math.inf,
-                **options,
-            )
-        return empty
-
-
-def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return times and states, (times, entries), of a solution, which may have none."""
-    if not len(solution.t):
-        return np.empty(0), np.empty((0, len(start)))
-    return solution.t, solution.y.T
-
-
-def _terminal_event(events: Sequence[Any], solution: Any) -> tuple[Any, float, FloatArray]:
-    """Return the event that ended a solution, its time and state; the event is None if there was none."""
-    for event, times, states in zip(events, solution.t_events, solution.y_events, strict=True):
-        if len(times):
-            return event, float(times[-1]), states[-1]
-    return None, math.nan, np.empty(0)
+        begin: Stop,
+        times: FloatArray,
+        events: Sequence[Event],
+        solver: Callable[..., Any],
+        reserve: int,
+    ) -> Generator[Samples, None, Stop]:
+        """Integrate from a time and state on to the first event or the last time."""
+        longest = self._sliding.longest_step if self._sliding else math.inf
+        tolerance = {"rtol": self._tolerances.rtol, "max_step": longest}
+        try:
+            with np.errstate(all="ignore"):
+                begun = solver(t0=begin.time, y0=begin.state, t_bound=float(times[-1]), **tolerance)
+        except SpentError:  # the budget is too small even for a first step
+            return Stop(begin.time, begin.state, failed=True)
+        return (yield from steps(begun, times, events, self._budget, reserve))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,18 +13,11 @@ import numpy as np
 from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report_text import number
 from vsacli.analysis.trouble_text import Problem, excess, limit_problem
-from vsacli.base.arrays import FloatArray, by_joint, of_joint
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, has
 from vsacli.base.json_records import Stored, named
-from vsacli.base.simulation_variables import COMMANDS
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
-from vsacli.control.simulation.history import History
-from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
-from vsacli.dynamics.limits import limit_checks
-from vsacli.dynamics.losses import positive_part, trapezoids
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
+from vsacli.dynamics.energy import JointEnergy
 
 _GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
 
@@ -75,10 +68,6 @@ class GoalTolerance:
         return self.share * commanded_range + self.absolute
 
 
-STIFFNESS_SHARE = 0.01
-"""Error of the stiffness at the end without a warning, as a share of the largest commanded stiffness."""
-
-
 @dataclass(frozen=True)
 class Deviation(Stored):
     """Deviation of a simulated value from its command: largest, its time (s), last; NaN if undefined."""
@@ -94,6 +83,12 @@ class Deviation(Stored):
             return cls(np.nan, np.nan, np.nan)
         worst = int(np.nanargmax(np.abs(error)))
         return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
+
+    def after(self, earlier: Deviation) -> Deviation:
+        """Return the deviation over both this block of a run and the earlier ones."""
+        if self.peak > earlier.peak or math.isnan(earlier.peak):
+            return self
+        return replace(earlier, final=self.final)
 
 
 @dataclass(frozen=True)
@@ -136,73 +131,6 @@ class JointTracking(Stored):
     def off_course(self) -> bool:
         """Whether q at the end is further from the command than the tolerance."""
         return abs(self.q.final) > self.tolerance
-
-
-def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tuple[JointTracking, ...]:
-    """Return the findings of a history at each joint."""
-    energies = enumerate(_energies(robot, history))
-    return tuple(_tracking(robot.joints[index], index, history, energy, goal) for index, energy in energies)
-
-
-def _energies(robot: Robot, history: History) -> list[JointEnergy]:
-    time, work, power, tau_transmission, elastic_energy = (
-        _led(getattr(history, name))
-        for name in ("time", "motor_energy", "motor_power", "tau_transmission", "elastic_energy")
-    )
-    lost = history.dissipated_power, history.copper_loss
-    intervals, done = np.diff(time), np.diff(work)
-    losses = (None if taken is None else trapezoids(intervals, _led(taken)) for taken in lost)
-    torques = np.moveaxis(tau_transmission, 1, 0)
-    exerted = efforts(intervals, torques[..., :-1], torques[..., 1:])
-    meter = EnergyMeter()
-    meter.add_stored(elastic_energy)
-    meter.add(Flow(intervals, done, positive_part(intervals, power, done), *exerted, *losses))
-    return meter.report(robot)
-
-
-def _led(values: FloatArray) -> FloatArray:
-    """Return (..., samples + 1) from (samples, ...), with the first sample twice: it may be the only one."""
-    rows = by_joint(values)
-    return np.concatenate((rows[..., :1], rows), axis=-1)
-
-
-def _tracking(
-    joint: Joint, index: int, history: History, energy: JointEnergy, goal: GoalTolerance
-) -> JointTracking:
-    flags = history.flags[:, index]
-    first, second = np.fmax.reduce(np.abs(history.tau_motor[:, index]), axis=0).tolist()
-    return JointTracking(
-        name=joint.name,
-        type=joint.type,
-        q=Deviation.of(history.time, history.q_error[:, index]),
-        stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
-        peak_tau_motor=(first, second),
-        samples_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
-        worst=_worst(joint, index, history),
-        energy=energy,
-        tolerance=goal.of(float(np.ptp(history.q_ref[:, index]))),
-    )
-
-
-def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
-    """Return the worst excess of each limit of a joint, over both motors."""
-    worst: dict[str, Worst] = {}
-    most: dict[str, float] = {}
-    checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
-    names = {check.variable: _checked(check.variable) for check in checks}
-    values = of_joint({variable: getattr(history, name) for variable, name in names.items()}, index)
-    for check in checks:
-        excess, label = check.worst(values, history.flags[:, index]), check.flag.label
-        if excess is not None and excess.size > most.get(label, 0.0):
-            time, unit = float(history.time[excess.step]), check.unit(joint.type)
-            worst[label] = Worst(label, time, excess.value, excess.bound, unit, check.motor)
-            most[label] = excess.size
-    return worst
-
-
-def _checked(variable: str) -> str:
-    """Return the variable that a limit bounds: the commanded torque, else the simulated value."""
-    return COMMANDS[variable] if variable == "tau_motor" else variable
 
 
 def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
@@ -259,16 +187,3 @@ def _off_target(index: int, joint: JointTracking) -> Problem:
         brief=f"{error} (tolerance {tolerance})",
         unit=unit,
     )
-
-
-def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
-    """Yield a warning for each joint whose stiffness at the end differs from the command."""
-    errors = history.stiffness_error[-1]
-    allowed = STIFFNESS_SHARE * history.stiffness_ref.max(axis=0)
-    for index in np.flatnonzero(np.abs(errors) > allowed):  # False for rigid joints, whose error is NaN
-        joint = robot.joints[index]
-        unit = STIFFNESS.unit(joint.type)
-        yield (
-            f"{joint.name}: final stiffness error {errors[index]:.3g} {unit} "
-            f"(commanded: {history.stiffness_ref[-1, index]:.4g} {unit})"
-        )

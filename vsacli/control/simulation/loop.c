@@ -75,8 +75,9 @@ void to_boundaries(const loop *of, const double *y, double *d)
 }
 
 /* Stages of an explicit Runge-Kutta step from the state y, first to last: k[stage] at time + c[stage] step. A row
-   of a has as many coefficients as the width says. Leaves the state at the last stage in x. */
-void stages(const loop *of, double time, double step, const double *y, int64_t first, int64_t last, int64_t width,
+   of a has as many coefficients as the width says. Leaves the state at the last stage in x, and returns whether its
+   rates are finite. */
+int64_t stages(const loop *of, double time, double step, const double *y, int64_t first, int64_t last, int64_t width,
             const double *a, const double *c, double *k, double *x)
 {
     for (int64_t stage = first; stage <= last; stage++) {
@@ -88,4 +89,8 @@ void stages(const loop *of, double time, double step, const double *y, int64_t f
         }
         derivatives(of, time + c[stage] * step, 1, x, k + stage * ENTRIES);
     }
+    double sum = 0;
+    for (int64_t entry = 0; entry < ENTRIES; entry++)
+        sum += k[last * ENTRIES + entry];
+    return isfinite(sum) != 0;
 }

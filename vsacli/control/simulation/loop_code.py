@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine.compiled_engine import operation_count
+from vsacli.compute.engine.compiled_engine import compiling_size
 from vsacli.compute.engine.libraries import Code
 from vsacli.compute.tracing import MOST_RECORDED, Program, Tape, TracedArray, cells_of
 from vsacli.compute.tracing.c_code import Tables, Writer, digits, table_declarations
@@ -106,7 +106,7 @@ def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
     ]
     for name, each in recording._asdict().items():
         lines += _function(name, each.program, recording.entries, writer)
-    functions = tuple(operation_count(each.program) for each in recording)
+    functions = tuple(compiling_size(each.program) for each in recording)
     return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(constants)
 
 

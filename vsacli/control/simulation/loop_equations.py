@@ -73,14 +73,11 @@ class Equations:
 
 
 class Edge:
-    """The event of `solve_ivp` at the first boundary that is reached.
+    """The event at the first boundary that is reached.
 
     Args:
         equations: equations of motion, with their boundaries.
     """
-
-    terminal = True
-    direction = -1.0
 
     def __init__(self, equations: Equations) -> None:
         self._equations = equations
@@ -208,9 +205,8 @@ class RecordedEquations(Equations):
             return None
         self.budget.check(evaluations := which.last - which.first + 1)
         state = self._compiled.stages(time, step, vector, which, rates)
-        if not math.isfinite(rates[which.last].sum()):
-            return None
-        self.budget.used += evaluations
+        if state is not None:
+            self.budget.used += evaluations
         return state
 
     def distance(self, vector: FloatArray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -15,7 +16,7 @@ from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.base.interrupts import leave_interrupts_to_others
-from vsacli.control.simulation.simulate import simulate
+from vsacli.control.simulation.simulate import SimulationRun
 from vsacli.control.simulation.simulation_report import SimulationReport
 from vsacli.documents.fields import Kind, NamedNumbers, Number, OneOf, Pair, Record, declared
 from vsacli.robot.joint import Inertia, Joint, Link
@@ -170,4 +171,6 @@ def simulate_perturbed(
 def _report(
     robot: Robot, trajectory: Trajectory, relative: float, conditions: dict[str, Any], seed: int
 ) -> SimulationReport:
-    return simulate(robot, trajectory, model=perturbed(robot, relative, seed), **conditions).report
+    run = SimulationRun(robot, trajectory, model=perturbed(robot, relative, seed), **conditions)
+    deque(run, maxlen=0)
+    return run.report()

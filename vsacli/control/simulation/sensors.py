@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,10 +52,47 @@ class Sensors:
             raise InputError.one(f"the seed must be zero or positive, not {self.seed}")
 
 
-class Readings:
-    """The readings of the sensors of a robot at each sample of a run.
+DRAWN = 2048
+"""Samples whose noise is drawn at a time."""
 
-    The noise is drawn once, so that a controller that samples positions knows exactly the recorded values.
+
+class _Noise:
+    """Rows of normally distributed noise, drawn when they are needed, and kept until `dropped`.
+
+    Args:
+        random: generator whose next `samples` * `columns` numbers are the noise; it is advanced beyond them.
+        samples: number of rows.
+        columns: length of a row.
+        deviation: standard deviation.
+    """
+
+    def __init__(self, random: np.random.Generator, samples: int, columns: int, deviation: float) -> None:
+        self._random, self._deviation = deepcopy(random), deviation
+        self._first, self._left, self._kept = 0, samples, np.empty((0, columns))
+        for start in range(0, samples, DRAWN):
+            random.standard_normal((min(DRAWN, samples - start), columns))
+
+    def __getitem__(self, rows: int | slice) -> FloatArray:
+        """Return a row by its index, or rows of a slice with both ends, none of them dropped before."""
+        start, stop = (rows.start, rows.stop) if isinstance(rows, slice) else (rows, rows + 1)
+        while self._left and stop > self._first + len(self._kept):
+            drawn = self._random.standard_normal((min(DRAWN, self._left), self._kept.shape[1]))
+            self._left -= len(drawn)
+            self._kept = np.concatenate((self._kept, self._deviation * drawn))
+        found: FloatArray = self._kept[start - self._first : stop - self._first]
+        return found if isinstance(rows, slice) else found[0]
+
+    def dropped(self, stop: int) -> None:
+        """Forget all rows before one."""
+        self._kept = self._kept[stop - self._first :]
+        self._first = stop
+
+
+class Readings:
+    """The readings of the sensors of a robot at each sample of a run, one block after the other.
+
+    The noise of a sample is drawn once, so that a controller that samples positions knows exactly the
+    recorded values.
 
     Args:
         sensors: accuracy of the sensors.
@@ -70,9 +108,10 @@ class Readings:
         joints, motors = len(robot.joints), len(drivetrain.joint)
         random = np.random.default_rng(sensors.seed)
         self._drivetrain = drivetrain
-        self._q = sensors.position * random.standard_normal((samples, joints))
-        self._theta = sensors.position * random.standard_normal((samples, motors))
-        self._torque = sensors.torque * random.standard_normal((samples, motors))
+        self._q = _Noise(random, samples, joints, sensors.position)
+        self._theta = _Noise(random, samples, motors, sensors.position)
+        self._torque = _Noise(random, samples, motors, sensors.torque)
+        self._recorded = 0
         self._q_step, self._theta_step = np.zeros(joints), np.zeros(motors)
         if sensors.encoder_bits is not None:
             share = 0.5**sensors.encoder_bits
@@ -97,11 +136,14 @@ class Readings:
         return truth._replace(q=q, theta=theta[self._drivetrain.sprung])
 
     def variables(self, truth: Phase, torque: FloatArray) -> dict[str, FloatArray]:
-        """Return the readings along a run by name, from its states and motor torques, (samples, motors)."""
-        rows = slice(len(torque))
+        """Return the readings of the next block by name, from its states and torques, (samples, motors)."""
+        first, self._recorded = self._recorded, self._recorded + len(torque)
+        rows = slice(first, self._recorded)
         q, theta = self.positions(truth, rows)
         of_joints = self._drivetrain.of_joints
         read = {"q": q, "theta": of_joints(theta), "tau_motor": of_joints(torque + self._torque[rows])}
+        for noise in (self._q, self._theta, self._torque):
+            noise.dropped(self._recorded)
         return {measured(name): values for name, values in read.items()}
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -20,16 +20,17 @@ from vsacli.base.progress import Tell, unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
-from vsacli.control.simulation.ending import Budget, Progress
-from vsacli.control.simulation.history import History, StateTrajectory, continuous, history, sampled
+from vsacli.control.simulation.ending import Budget, Ending, Progress
+from vsacli.control.simulation.history import History, StateBlock, continuous, histories, joined, sampled
 from vsacli.control.simulation.integrator import Integrator, Tolerances
-from vsacli.control.simulation.joint_tracking import GoalTolerance, joint_trackings, stiffness_warnings
+from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.control.simulation.start import InitialError, start_state, strange_errors
 from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
+from vsacli.control.simulation.summary import Summary
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block, fitted
@@ -58,6 +59,126 @@ _AMPLIFIED = (
     "model and start are exact, so the run ends off target by errors of the integration, which this motion "
     "amplifies and nothing feeds back: with another --rtol it ends elsewhere"
 )
+
+
+class SimulationRun:
+    """A simulation, block by block: iterate over its blocks once, then `report`.
+
+    Args: as for `simulate`.
+
+    Attributes:
+        robot: true robot.
+        trajectory: commanded motion.
+        progress: function called with the time reached, s.
+
+    Raises:
+        InputError: see `simulate`.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        *,
+        gains: Gains | None = None,
+        model: Robot | None = None,
+        initial_error: InitialError = InitialError(),
+        feedback: Feedback = "state",
+        sensors: Sensors | None = None,
+        goal_tolerance: GoalTolerance = GoalTolerance(),
+        tolerances: Tolerances = Tolerances(),
+        budget: int | None = None,
+        progress: Progress = lambda _: None,
+        engine: str = "auto",
+        runs: int = 1,
+        tell: Tell = unheard,
+    ) -> None:
+        self.robot, self.trajectory = robot, fitted(robot, trajectory)
+        check_feedback(feedback, gains)
+        self._gains, self._initial_error, self._feedback = gains, initial_error, feedback
+        self._exact = gains is None and (model is None or model is robot) and initial_error.is_zero
+        self._compared: Any = {
+            "gains": gains,
+            "model": model,
+            "initial_error": initial_error,
+            "tolerances": tolerances,
+            "budget": budget,
+            "engine": engine,
+            "runs": runs,
+        }
+        first, elapsed = self.trajectory.start, self.trajectory.from_zero()
+        loop = _closed_loop(robot, elapsed, model or robot, gains)
+        start = start_state(robot, elapsed, initial_error)
+        drivetrain = loop.plant.drivetrain
+        readings = None if sensors is None else Readings(sensors, robot, drivetrain, elapsed.samples)
+
+        def passed(time: float) -> None:
+            self.progress(first + time)
+
+        self.progress = progress
+        computing = Computing(engine, tell, runs)
+        self._integrator, blocks = _integration(
+            robot, loop, elapsed, start, feedback, readings, tolerances, budget, passed, computing
+        )
+        self._ending: Ending | None = None
+        self._blocks = histories(robot, loop, self._until_end(blocks), first, readings)
+        self._summary = Summary(robot, goal_tolerance)
+
+    def __iter__(self) -> Iterator[History]:
+        """Integrate, and yield the variables of the run; a block is released before the next one."""
+        for block in self._blocks:
+            self._summary.add(block)
+            yield block
+            del block
+
+    def _until_end(self, blocks: Iterable[StateBlock]) -> Iterator[StateBlock]:
+        for block in blocks:
+            self._ending = block.ending
+            yield block
+
+    @property
+    def provenance(self) -> Mapping[str, str]:
+        """Backend of the computation so far: `engine`, `compiler`, `threads`."""
+        return self._integrator.effort.provenance
+
+    def report(self) -> SimulationReport:
+        """Return the report on the run, after its last block.
+
+        If positions are measured, the same run with the full state is simulated for comparison.
+        """
+        full = self._with_full_state() if self._feedback == "positions" else None
+        joints = self._summary.joints()
+        effort, ending = self._integrator.effort, self._ending
+        verdict = verdict_on(self._summary.flags, joints, ending)
+        robot, trajectory = self.robot, self.trajectory
+        return SimulationReport(
+            robot=robot.name,
+            trajectory=trajectory.name,
+            controller="feedforward" if self._gains is None else "feedback-linearization",
+            samples=self._summary.samples,
+            duration=trajectory.duration,
+            verdict=verdict,
+            ending=None if ending is None else ending.described(robot.joint_names, trajectory.start),
+            evaluations=effort.evaluations,
+            budget=effort.budget,
+            methods=tuple(replace(each, start=trajectory.start + each.start) for each in effort.methods),
+            warnings=(
+                *(*robot.warnings, *trajectory.warnings),
+                *strange_errors(robot, self._initial_error),
+                *_undetermined(robot, trajectory),
+                *([_AMPLIFIED] if self._exact and verdict == "off_target" else []),
+                *(self._summary.stiffness_warnings() if ending is None else []),
+                *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
+            ),
+            notes=trajectory.notes,
+            joints=joints,
+            with_full_state=tuple(joint.q for joint in full.joints) if full else (),
+        )
+
+    def _with_full_state(self) -> SimulationReport:
+        run = SimulationRun(self.robot, self.trajectory, **self._compared)
+        deque(run, maxlen=0)
+        return run.report()
 
 
 def simulate(
@@ -108,81 +229,24 @@ def simulate(
             limits; the engine is unknown, or cannot compute the run.
         TypeError: robot or trajectory is of another type.
     """
-    trajectory = fitted(robot, trajectory)
-    check_feedback(feedback, gains)
-    first, elapsed = trajectory.start, trajectory.from_zero()
-    loop = _closed_loop(robot, elapsed, model or robot, gains)
-    start = start_state(robot, elapsed, initial_error)
-    readings = None if sensors is None else Readings(sensors, robot, loop.plant.drivetrain, elapsed.samples)
-
-    def passed(time: float) -> None:
-        progress(first + time)
-
-    computing = Computing(engine, tell, runs)
-    integrated = _integrate(
-        robot, loop, elapsed, start, feedback, readings, tolerances, budget, passed, computing
+    run = SimulationRun(
+        robot,
+        trajectory,
+        gains=gains,
+        model=model,
+        initial_error=initial_error,
+        feedback=feedback,
+        sensors=sensors,
+        goal_tolerance=goal_tolerance,
+        tolerances=tolerances,
+        budget=budget,
+        progress=progress,
+        engine=engine,
+        runs=runs,
+        tell=tell,
     )
-    past = history(robot, loop, integrated, first, readings)
-    full: SimulationReport | None = None
-    if feedback == "positions":
-        conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
-        integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine, "runs": runs}
-        full = simulate(robot, trajectory, **conditions, **integration).report
-    exact = gains is None and (model is None or model is robot) and initial_error.is_zero
-    report = _report(robot, trajectory, gains, past, integrated, goal_tolerance, initial_error, exact, full)
-    return Simulation(past, report, integrated.effort.provenance)
-
-
-def _report(
-    robot: Robot,
-    trajectory: Trajectory,
-    gains: Gains | None,
-    past: History,
-    integrated: StateTrajectory,
-    goal_tolerance: GoalTolerance,
-    initial_error: InitialError,
-    exact: bool,
-    full: SimulationReport | None,
-) -> SimulationReport:
-    """Return the report on a run.
-
-    Args:
-        robot: see `simulate`.
-        trajectory: see `simulate`.
-        gains: see `simulate`.
-        past: variables of the run.
-        integrated: integrated states, with the effort and end of the integration.
-        goal_tolerance: see `simulate`.
-        initial_error: see `simulate`.
-        exact: whether the controller has the exact model, and the initial state is as commanded.
-        full: report on the same run with the full state measured; None unless positions are measured.
-    """
-    joints = joint_trackings(robot, past, goal_tolerance)
-    effort, ending = integrated.effort, integrated.ending
-    verdict = verdict_on(past, joints, ending)
-    return SimulationReport(
-        robot=robot.name,
-        trajectory=trajectory.name,
-        controller="feedforward" if gains is None else "feedback-linearization",
-        samples=len(past.time),
-        duration=trajectory.duration,
-        verdict=verdict,
-        ending=None if ending is None else ending.described(robot.joint_names, trajectory.start),
-        evaluations=effort.evaluations,
-        budget=effort.budget,
-        methods=tuple(replace(each, start=trajectory.start + each.start) for each in effort.methods),
-        warnings=(
-            *(*robot.warnings, *trajectory.warnings),
-            *strange_errors(robot, initial_error),
-            *_undetermined(robot, trajectory),
-            *([_AMPLIFIED] if exact and verdict == "off_target" else []),
-            *(stiffness_warnings(robot, past) if ending is None else []),
-            *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
-        ),
-        notes=trajectory.notes,
-        joints=joints,
-        with_full_state=tuple(joint.q for joint in full.joints) if full else (),
-    )
+    past = joined(list(run))
+    return Simulation(past, run.report(), run.provenance)
 
 
 def check_feedback(feedback: Feedback, gains: Gains | None) -> None:
@@ -225,7 +289,7 @@ def _peak_torque(robot: Robot, trajectory: Trajectory) -> float:
     return float(np.nanmax(np.abs(compute_block(robot, motion).tau_motor)))
 
 
-def _integrate(
+def _integration(
     robot: Robot,
     loop: ClosedLoop,
     trajectory: Trajectory,
@@ -236,8 +300,8 @@ def _integrate(
     limit: int | None,
     progress: Progress,
     computing: Computing,
-) -> StateTrajectory:
-    """Integrate as far as the controller's torques are defined, and the springs are within their laws."""
+) -> tuple[Integrator, Iterator[StateBlock]]:
+    """Return an integrator, and the blocks of its run, until torques or springs are undefined."""
     last = loop.controller.ending
     times = trajectory.times.block(0, trajectory.samples)
     if last is not None and last.time <= times[0]:
@@ -255,7 +319,5 @@ def _integrate(
     equations = RecordedEquations(loop, ends, budget, computing)
     integrator = Integrator(equations, tolerances, progress, slides)
     if feedback == "state":
-        integrated = continuous(loop, integrator, reached, vector)
-    else:
-        integrated = sampled(loop, integrator, reached, vector, readings)
-    return integrated if integrated.ending is not None else integrated._replace(ending=last)
+        return integrator, continuous(loop, integrator, reached, vector)
+    return integrator, sampled(loop, integrator, reached, vector, readings)

@@ -8,8 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from vsacli.analysis.report_text import energy_lines, warnings_and_notes
 from vsacli.analysis.trouble_text import grouped, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
@@ -18,7 +16,6 @@ from vsacli.base.tables import ReportText, headline
 from vsacli.base.texts import counted
 from vsacli.base.units import POSITION, time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
-from vsacli.control.simulation.history import History
 from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
     Deviation,
@@ -34,13 +31,12 @@ VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLE
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
 
-def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
-    """Return the worst of `VERDICTS` that applies.
+def verdict_on(flags: int, joints: Sequence[JointTracking], ending: Ending | None) -> str:
+    """Return the worst of `VERDICTS` that applies, by the flags of any joint at any sample.
 
     A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An
     early end without a flag has its own verdict.
     """
-    flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
     if ending is None and any(joint.off_course for joint in joints):
         applies.add("off_target")

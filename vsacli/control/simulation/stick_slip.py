@@ -16,10 +16,7 @@ integration chooses its steps by the state, but holding friction changes while n
 
 
 class Switch:
-    """An event of `solve_ivp`: a motor stops, or its friction can no longer hold it."""
-
-    terminal = True
-    direction = -1.0
+    """An event: a motor stops, or its friction can no longer hold it."""
 
     def __init__(self, sliding: StickSlip, motor: int) -> None:
         self._sliding, self._motor = sliding, motor

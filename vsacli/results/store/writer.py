@@ -89,11 +89,12 @@ class ResultWriter(NewFile):
                 except FloatingPointError:
                     raise self._too_large(name, values, block.time) from None
 
-    def finish(self, report: Mapping[str, Any]) -> None:
+    def finish(self, report: Mapping[str, Any], provenance: Mapping[str, str] = MappingProxyType({})) -> None:
         """Store the report; the file contains the samples written so far.
 
         Args:
             report: report as JSON values; `verdict` and `complete` also become root attributes.
+            provenance: attributes on the computation that have changed since the file was created.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -102,6 +103,8 @@ class ResultWriter(NewFile):
             for filler in self._fillers.values():
                 filler.finish()
             self.wait()
+            for name, value in provenance.items():
+                self._file.attrs.modify(name, value)  # keeps its place among the attributes
             self._complete(report)
             self._close()
 

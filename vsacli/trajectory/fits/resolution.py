@@ -14,6 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
+from vsacli.trajectory.fits.noise_floor import enough_spans
 from vsacli.trajectory.fits.penalized import Model, deviances, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
@@ -190,6 +191,10 @@ CLOSE = 3.0
 one may state the smallest deviation of a derivative that it does not resolve: with a factor of 100, steps of
 velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques were off by 17 % with a stated 7 %."""
 
+ASKED_AT = 256
+"""Number of spans at which a search that has accepted nothing asks whether finer ones can show anything. Most
+searches have ended before; the question takes as long as the resolution of 32 spans."""
+
 MISSED = 0.3
 """Largest residual over the recording's standard deviation. A larger one is motion that only the finest
 resolution follows, which no other confirms."""
@@ -256,7 +261,8 @@ def find_resolution(
     """Return the first resolution that the next one confirms, or that of a given bandwidth.
 
     The search goes from coarse to fine, since the color of the noise does not matter above the frequency at
-    which the motion falls below the noise; only a finer resolution would depend on it.
+    which the motion falls below the noise; only a finer resolution would depend on it. It ends early where
+    all that a finer resolution could show is noise.
 
     Args:
         time: times, (samples,), s.
@@ -274,10 +280,15 @@ def find_resolution(
         return _given(time, row, degree, order, known)
     tried = []
     finest: Model | None = None
+    enough = np.inf
     for coarse, finest in pairwise(_models(_moments(time, row, degree, below), known)):
         tried.append(_compared(time, row, coarse, finest, order))
         if tried[-1].accepted:
             return tried[-1]
+        if finest.bins.spans == ASKED_AT:
+            enough = enough_spans(time, row)
+        if finest.bins.spans >= enough:
+            break
     least = min((each.residual for each in tried), default=0.0)
     if finest is not None and least > MISSED:
         return tried[-1]._replace(model=finest, residual=_residual(time, row, finest))

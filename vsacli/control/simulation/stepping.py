@@ -1,0 +1,116 @@
+"""Steps of SciPy's integrators, one at a time: the samples within each, and the event that ends a span.
+
+`solve_ivp` keeps all samples until the end of a run, and its own work in a step exceeds that of compiled
+equations of motion. The loop over the steps is therefore here; steps, errors and interpolants are SciPy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.control.simulation.ending import Budget, Ending, SpentError
+
+_ROOT_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
+"""Tolerance of the time of an event, absolute and relative: that of `solve_ivp`."""
+
+
+class Event(Protocol):
+    """A distance to a state at which a span ends: when the distance falls to zero."""
+
+    def __call__(self, time: float, vector: FloatArray, /) -> float:
+        """Return the distance at a time and state."""
+
+
+class Samples(NamedTuple):
+    """Consecutive samples of a run: times, (samples,), s, and states, (samples, entries)."""
+
+    time: FloatArray
+    states: FloatArray
+
+
+class Stop(NamedTuple):
+    """The end of a span.
+
+    Attributes:
+        time: time reached, s.
+        state: state at this time.
+        reached: number of samples of the span until then.
+        event: event that occurred; None at the last time of the span, or after a failure.
+        failed: whether a step failed, or exceeded the budget.
+    """
+
+    time: float
+    state: FloatArray
+    reached: int = 0
+    event: Any = None
+    failed: bool = False
+
+
+Pieces = Generator[Samples, None, Ending | None]
+"""A run in pieces, each of at least one sample; returns the early end of the run, None without one."""
+
+
+def steps(
+    solver: Any, times: FloatArray, events: Sequence[Event], budget: Budget, reserve: int
+) -> Generator[Samples, None, Stop]:
+    """Integrate to the first event or the end of the span; yield the samples within each step.
+
+    Args:
+        solver: instance of one of SciPy's integrators.
+        times: ascending times of the samples within the span, s.
+        events: events that end the span.
+        budget: budget of evaluations.
+        reserve: evaluations for the interpolant of a step, which the step must leave over.
+    """
+    done, ahead = 0, [event(solver.t, solver.y) for event in events]
+    while solver.status == "running":
+        with np.errstate(all="ignore"):  # a trial step may leave the range of a law
+            if not _stepped(solver, budget, reserve):
+                return Stop(solver.t, solver.y, done, failed=True)
+            before, ahead = ahead, [event(solver.t, solver.y) for event in events]
+            inside, stop = None, Stop(solver.t, solver.y)
+            if any(was >= 0 >= now for was, now in zip(before, ahead, strict=True)):
+                inside = solver.dense_output()
+                crossed = zip(events, before, ahead, strict=True)
+                stop = _first([event for event, was, now in crossed if was >= 0 >= now], inside, solver)
+            first, done = done, int(times.searchsorted(stop.time, "right"))
+            states = None if first == done else (inside or solver.dense_output())(times[first:done]).T
+        if states is not None:  # outside of errstate, which the receiver of the samples must not inherit
+            yield Samples(times[first:done], states)
+        if stop.event is not None:
+            return stop._replace(reached=done)
+    return Stop(solver.t, solver.y, done)
+
+
+def _stepped(solver: Any, budget: Budget, reserve: int) -> bool:
+    """Take a step; return whether it succeeded within the budget."""
+    budget.reserved = reserve
+    try:
+        solver.step()
+    except SpentError:
+        return False
+    finally:
+        budget.reserved = 0
+    return bool(solver.status != "failed")
+
+
+def _first(crossed: Sequence[Event], inside: Any, solver: Any) -> Stop:
+    """Return the stop at the first of the events that occur within the last step of a solver."""
+    from scipy.optimize import brentq
+
+    def time_of(event: Event) -> float:
+        return brentq(
+            lambda time: event(time, inside(time)),
+            solver.t_old,
+            solver.t,
+            xtol=_ROOT_TOLERANCE,
+            rtol=_ROOT_TOLERANCE,
+        )
+
+    times = [time_of(event) for event in crossed]
+    first = times.index(min(times))
+    return Stop(times[first], inside(times[first]), event=crossed[first])

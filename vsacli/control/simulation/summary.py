@@ -1,0 +1,170 @@
+"""The summary of a simulation, accumulated block by block: findings of each joint, flags, final stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vsacli.analysis.joint_report import Worst
+from vsacli.base.arrays import AnyArray, FloatArray, by_joint, of_joint
+from vsacli.base.flags import LIMITS, has
+from vsacli.base.simulation_variables import COMMANDS
+from vsacli.base.units import STIFFNESS
+from vsacli.control.simulation.history import History
+from vsacli.control.simulation.joint_tracking import Deviation, GoalTolerance, JointTracking
+from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
+from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.losses import positive_part, trapezoids
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+
+STIFFNESS_SHARE = 0.01
+"""Error of the stiffness at the end without a warning, as a share of the largest commanded stiffness."""
+
+
+class Summary:
+    """The summary of a run: `add` its blocks in order, then read it. It does not depend on the division.
+
+    Args:
+        robot: robot of the run.
+        goal: largest position error of the joints at the end of the run.
+
+    Attributes:
+        samples: number of samples so far.
+        flags: flags of any joint at any sample.
+    """
+
+    def __init__(self, robot: Robot, goal: GoalTolerance) -> None:
+        self._robot, self._goal = robot, goal
+        self.samples = self.flags = 0
+        self._joints = [_JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
+        self._energy = _Energy()
+        self._stiffest: FloatArray = np.full(len(robot.joints), -np.inf)
+        self._last: tuple[FloatArray, FloatArray] = self._stiffest, self._stiffest
+
+    def add(self, block: History) -> None:
+        """Add the next block."""
+        self.samples += len(block.time)
+        self.flags |= int(np.bitwise_or.reduce(block.flags, axis=None))
+        for joint in self._joints:
+            joint.add(block)
+        self._energy.add(block)
+        self._stiffest = np.maximum(self._stiffest, block.stiffness_ref.max(axis=0))
+        self._last = block.stiffness_error[-1].copy(), block.stiffness_ref[-1].copy()
+
+    def joints(self) -> tuple[JointTracking, ...]:
+        """Return the findings of each joint; at least one block must have been added."""
+        energies = self._energy.report(self._robot)
+        return tuple(map(_JointSummary.report, self._joints, energies, [self._goal] * len(energies)))
+
+    def stiffness_warnings(self) -> Iterator[str]:
+        """Yield a warning for each joint whose stiffness at the end differs from the command."""
+        errors, commanded = self._last
+        off = np.abs(errors) > STIFFNESS_SHARE * self._stiffest  # False for rigid joints, whose error is NaN
+        for index in np.flatnonzero(off):
+            joint = self._robot.joints[index]
+            unit = STIFFNESS.unit(joint.type)
+            yield (
+                f"{joint.name}: final stiffness error {errors[index]:.3g} {unit} "
+                f"(commanded: {commanded[index]:.4g} {unit})"
+            )
+
+
+class _JointSummary:
+    """Findings of one joint, accumulated."""
+
+    def __init__(self, joint: Joint, index: int) -> None:
+        self._joint, self._index = joint, index
+        self._checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
+        self._worst: list[tuple[float, Worst | None]] = [(0.0, None)] * len(self._checks)
+        self._q = self._stiffness = Deviation(math.nan, math.nan, math.nan)
+        self._peaks: FloatArray = np.full(2, np.nan)
+        self._lowest, self._highest = math.inf, -math.inf
+        self._over_limit = 0
+
+    def add(self, block: History) -> None:
+        """Add the next block."""
+        index, time, flags = self._index, block.time, block.flags[:, self._index]
+        self._q = Deviation.of(time, block.q_error[:, index]).after(self._q)
+        self._stiffness = Deviation.of(time, block.stiffness_error[:, index]).after(self._stiffness)
+        self._peaks = np.fmax(self._peaks, np.fmax.reduce(np.abs(block.tau_motor[:, index]), axis=0))
+        self._lowest = min(self._lowest, float(block.q_ref[:, index].min()))
+        self._highest = max(self._highest, float(block.q_ref[:, index].max()))
+        self._over_limit += int(np.count_nonzero(has(flags, LIMITS)))
+        names = {check.variable: _checked(check.variable) for check in self._checks}
+        values = of_joint({variable: getattr(block, name) for variable, name in names.items()}, index)
+        for place, check in enumerate(self._checks):
+            excess, label = check.worst(values, flags), check.flag.label
+            if excess is not None and excess.size > self._worst[place][0]:
+                when, unit = float(time[excess.step]), check.unit(self._joint.type)
+                found = Worst(label, when, excess.value, excess.bound, unit, check.motor)
+                self._worst[place] = excess.size, found
+
+    def report(self, energy: JointEnergy, goal: GoalTolerance) -> JointTracking:
+        """Return the findings, with the energy of the joint."""
+        first, second = self._peaks.tolist()
+        return JointTracking(
+            name=self._joint.name,
+            type=self._joint.type,
+            q=self._q,
+            stiffness=self._stiffness,
+            peak_tau_motor=(first, second),
+            samples_over_limit=self._over_limit,
+            worst=self._worst_of_limits(),
+            energy=energy,
+            tolerance=goal.of(self._highest - self._lowest),
+        )
+
+    def _worst_of_limits(self) -> dict[str, Worst]:
+        """Return the worst excess of each limit, over both motors."""
+        worst: dict[str, Worst] = {}
+        most: dict[str, float] = {}
+        for size, found in self._worst:
+            if found is not None and size > most.get(found.kind, 0.0):
+                worst[found.kind], most[found.kind] = found, size
+        return worst
+
+
+def _checked(variable: str) -> str:
+    """Return the variable that a limit bounds: the commanded torque, else the simulated value."""
+    return COMMANDS[variable] if variable == "tau_motor" else variable
+
+
+class _Energy:
+    """Energy of each joint, accumulated."""
+
+    def __init__(self) -> None:
+        self._meter = EnergyMeter()
+        self._before: dict[str, AnyArray] = {}
+
+    def add(self, block: History) -> None:
+        """Add the next block."""
+        time, work, power, tau_transmission, elastic_energy = (
+            self._led(block, name)
+            for name in ("time", "motor_energy", "motor_power", "tau_transmission", "elastic_energy")
+        )
+        intervals, done = np.diff(time), np.diff(work)
+        losses = [
+            None if getattr(block, name) is None else trapezoids(intervals, self._led(block, name))
+            for name in ("dissipated_power", "copper_loss")
+        ]
+        torques = np.moveaxis(tau_transmission, 1, 0)
+        exerted = efforts(intervals, torques[..., :-1], torques[..., 1:])
+        self._meter.add_stored(elastic_energy)
+        self._meter.add(Flow(intervals, done, positive_part(intervals, power, done), *exerted, *losses))
+
+    def report(self, robot: Robot) -> list[JointEnergy]:
+        """Return the energy of each joint."""
+        return self._meter.report(robot)
+
+    def _led(self, block: History, name: str) -> FloatArray:
+        """Return (..., samples + 1) from (samples, ...), led by the last sample of the block before.
+
+        The first block is led by its own first sample, which may be its only one.
+        """
+        rows = by_joint(getattr(block, name))
+        led = np.concatenate((self._before.get(name, rows[..., :1]), rows), axis=-1)
+        self._before[name] = led[..., -1:].copy()
+        return led
