@@ -82,6 +82,15 @@ def test_rods_lie_between_the_origins():
             np.testing.assert_allclose(pose[:3, :3] @ local + pose[:3, 3], end, atol=1e-14)
 
 
+def test_a_link_without_length_is_a_ball():
+    robot = robot_of_ones("R")
+    row = dataclasses.replace(robot.joints[0].dh, a=0, d=0)
+    robot = dataclasses.replace(robot, joints=(dataclasses.replace(robot.joints[0], dh=row),))
+    (geometry,) = ElementTree.fromstring(urdf_model(robot).text).iter("geometry")
+    assert [each.tag for each in geometry] == ["sphere"]
+    assert float(geometry[0].get("radius")) > 0
+
+
 def rotation_x(angle):
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])

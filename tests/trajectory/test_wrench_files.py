@@ -17,6 +17,8 @@ from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+from vsacli.results.charts.stored import StoredCharts
+from vsacli.results.store.reader import open_stored
 
 MOTION = """format: vsacli-trajectory/1
 name: reach
@@ -189,6 +191,16 @@ def result(vsacli, tmp_path):
     (tmp_path / "push.yaml").write_text(f"{MOTION}wrench: {{frame: base, {course}}}\n")
     assert vsacli("invdyn", ARM_FILE, "push.yaml", "-o", "push.h5").code == 0
     return tmp_path / "push.h5"
+
+
+def test_forces_and_moments_have_charts_of_their_own(result) -> None:
+    with open_stored(result) as stored:
+        forces, moments = StoredCharts([stored]).charts_of("wrench")
+    assert [chart.unit for chart in (forces, moments)] == ["N", "N m"]
+    assert [{line.label for line in chart.lines} for chart in (forces, moments)] == [
+        {"fx", "fy", "fz"},
+        {"mx", "my", "mz"},
+    ]
 
 
 def computed(tmp_path):
