@@ -133,6 +133,11 @@ class JointTracking(Stored):
     }
 
     @property
+    def unit(self) -> str:
+        """Unit of the position and its errors."""
+        return POSITION.unit(self.type)
+
+    @property
     def off_course(self) -> bool:
         """Whether q at the end is further from the command than the tolerance."""
         return abs(self.q.final) > self.tolerance
@@ -205,8 +210,13 @@ def _checked(variable: str) -> str:
     return COMMANDS[variable] if variable == "tau_motor" else variable
 
 
-def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
-    """Return a table of errors and peaks, below its header with units."""
+def rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> list[tuple[str, ...]]:
+    """Return a table of errors and peaks, below its header with units.
+
+    Args:
+        joints: findings of each joint.
+        ideal: deviation of q of each joint in the same run with feedback of the full state; none or all.
+    """
     types = [joint.type for joint in joints]
     position, stiffness, torque = (units_of(quantity, types) for quantity in (POSITION, STIFFNESS, TORQUE))
     header = (
@@ -215,7 +225,10 @@ def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
         f"stiffness error peak / end\n{stiffness}",
         f"peak motor 1 / 2\n{torque}",
     )
-    return [header, *map(_row, joints)]
+    if ideal:
+        header = (*header, f"q error with full state\n{position}")
+    compared = [(_pair(each),) for each in ideal] or [()] * len(joints)
+    return [header, *(_row(joint) + columns for joint, columns in zip(joints, compared, strict=True))]
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
@@ -249,7 +262,7 @@ def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Proble
 
 
 def _off_target(index: int, joint: JointTracking) -> Problem:
-    unit = POSITION.unit(joint.type)
+    unit = joint.unit
     error, tolerance = f"{joint.q.final:.3g}", f"{joint.tolerance:.3g}"
     return Problem(
         kind="off_target",
@@ -259,6 +272,27 @@ def _off_target(index: int, joint: JointTracking) -> Problem:
         brief=f"{error} (tolerance {tolerance})",
         unit=unit,
     )
+
+
+FINAL_SHARE = 0.1
+"""Share of a run at its end in which the position should stay within the goal tolerance."""
+
+SELDOM = 0.1
+"""Share of the samples in this part above which errors beyond the tolerance are a warning: the last error
+of an oscillation may be small by chance."""
+
+
+def unsettled_warnings(history: History, joints: Sequence[JointTracking]) -> Iterator[str]:
+    """Yield a warning for each joint that ends on target but was often off it shortly before."""
+    first, last = history.time[[0, -1]]
+    final = history.time >= last - FINAL_SHARE * (last - first)
+    for index, joint in enumerate(joints):
+        beyond = float(np.mean(np.abs(history.q_error[final, index]) > joint.tolerance))
+        if beyond > SELDOM and not joint.off_course:
+            yield (
+                f"{joint.name}: q error exceeds the goal tolerance of {joint.tolerance:.3g} "
+                f"{joint.unit} in {100 * beyond:.0f} % of the last tenth, though not at the end"
+            )
 
 
 def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +24,12 @@ from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, Linea
 from vsacli.control.simulation.ending import Budget, Progress
 from vsacli.control.simulation.history import History, StateTrajectory, continuous, history, sampled
 from vsacli.control.simulation.integrator import Integrator, Tolerances
-from vsacli.control.simulation.joint_tracking import GoalTolerance, joint_trackings, stiffness_warnings
+from vsacli.control.simulation.joint_tracking import (
+    GoalTolerance,
+    joint_trackings,
+    stiffness_warnings,
+    unsettled_warnings,
+)
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
@@ -176,10 +182,11 @@ def _report(
             *strange_errors(robot, initial_error),
             *_undetermined(robot, trajectory),
             *([_AMPLIFIED] if exact and verdict == "off_target" else []),
+            *(unsettled_warnings(past, joints) if ending is None else []),
             *(stiffness_warnings(robot, past) if ending is None else []),
             *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
         ),
-        notes=trajectory.notes,
+        notes=(*trajectory.notes, *([] if gains is None else _unlimited(robot))),
         joints=joints,
         with_full_state=tuple(joint.q for joint in full.joints) if full else (),
     )
@@ -210,6 +217,13 @@ def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
                 yield from (
                     f"{joint.name}: {undetermined_text(each)}" for each in joint.uncertainty.undetermined
                 )
+
+
+def _unlimited(robot: Robot) -> Iterator[str]:
+    """Yield a note if no motor torque is limited: feedback then requires torques that no motor has."""
+    motors = [motor for joint in robot.joints for motor in joint.actuator.motors]
+    if all(math.isinf(motor.max_torque) for motor in motors):
+        yield "no motor has max_torque, so that its torque is unlimited"
 
 
 def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gains | None) -> ClosedLoop:
