@@ -225,10 +225,10 @@ def rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> li
         f"stiffness error peak / end\n{stiffness}",
         f"peak motor 1 / 2\n{torque}",
     )
-    if ideal:
-        header = (*header, f"q error with full state\n{position}")
-    compared = [(_pair(each),) for each in ideal] or [()] * len(joints)
-    return [header, *(_row(joint) + columns for joint, columns in zip(joints, compared, strict=True))]
+    if not ideal:
+        return [header, *map(_row, joints)]
+    compared = zip(joints, ideal, strict=True)
+    return [(*header, f"q error with full state\n{position}"), *((*_row(a), _pair(b)) for a, b in compared)]
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
