@@ -141,7 +141,16 @@ def test_measured_positions_are_reported(vsacli, quick):
     )
     done = vsacli("simulate", ROBOT, fine, *FEEDBACK, "--feedback", "positions", "--initial-error", "0.01")
     assert done.code == Exit.VERDICT  # at 250 Hz these poles miss the end by 0.1 rad
-    assert "base: with feedback of the full state the q error would be at most 0.01 rad" in done.out
+    header, _, base, *_ = done.out.split("\n\n")[1].splitlines()
+    assert header.endswith("q error with full state")
+    assert base.split("  ")[-1].strip().startswith("0.01 / ")
+
+
+def test_sensors_that_the_controller_does_not_read_are_noted(vsacli, quick):
+    unread = "--sensor-noise and --encoder-bits affect the stored measurements only"
+    bits = ("--encoder-bits", "16", "--overwrite", "-o", "s.h5")
+    assert unread in vsacli("simulate", ROBOT, quick, *bits).err
+    assert unread not in vsacli("simulate", ROBOT, quick, *FEEDBACK, "--feedback", "positions", *bits).err
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -15,6 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import GoalTolerance, InitialError, simulate
 from vsacli.control.simulation.simulation_report import SimulationReport
+from vsacli.control.simulation.summary import Summary
 
 MOTOR_INERTIA = 2.0
 
@@ -53,6 +55,39 @@ def test_the_headline_has_the_largest_error_on_the_way():
     )
     largest = json.loads(json.dumps(report.as_json()))["largest_error"]
     assert largest == {"joint": "axis", "value": pytest.approx(0.05, rel=1e-12), "unit": "rad", "time": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "frequency", "share"),
+    [(0.02, 22.5, 67), (0.009, 22.5, None), (0.02, 0.5, None)],
+    ids=["oscillating", "within", "off target"],
+)
+def test_an_oscillation_that_ends_on_target_by_chance_is_a_warning(amplitude, frequency, share):
+    """A sine of twice the tolerance exceeds it two thirds of the time, and is zero at the end."""
+    past = simulate(rigid_joint(2.0), step_of(1.0)).history
+    error = amplitude * np.sin(2 * np.pi * frequency * (1 - past.time)) + (frequency < 1) * amplitude
+    past = past.replaced(q_error=error[:, None])
+    summary = Summary(rigid_joint(2.0), GoalTolerance(0.0, 0.01), (0.0, 1.0))
+    summary.add(past)
+    found = list(summary.unsettled_warnings(summary.joints()))
+    if share is None:
+        assert found == []
+    else:
+        (warning,) = found
+        assert warning.startswith("axis: q error exceeds the goal tolerance of 0.01 rad in ")
+        stated = int(warning.split(" % of the last tenth")[0].split()[-1])
+        assert stated == pytest.approx(share, abs=5)
+
+
+def test_a_joint_that_is_the_worst_only_by_its_tolerance_is_named_so():
+    error = InitialError([0.01, 0, 0.005])
+    gains = Gains.from_poles([-60] * 4, [-60] * 2)
+    report = simulate(vsa_3r(), short_motion(3), gains=gains, initial_error=error).report
+    pairs = zip(report.joints, (1.0, 1.0, 1e-3), strict=True)
+    joints = tuple(dataclasses.replace(joint, tolerance=tolerance) for joint, tolerance in pairs)
+    again = dataclasses.replace(report, joints=joints)
+    assert "largest q error relative to its tolerance 0.005 rad (elbow" in str(again)
+    assert "note: no motor has max_torque, so that its torque is unlimited" in str(again)
 
 
 def test_a_prismatic_joint_strays_in_meters():

@@ -130,7 +130,11 @@ def test_a_spring_shared_by_an_alias(load):
         ("format: vsacli-robot/1\n", "", "1: missing key 'format'; the file must begin with `format: "),
         ("vsacli-robot/1", "vsacli-robot/2", "1: format: expected 'vsacli-robot/1', found 'vsacli-robot/2'"),
         # keys
-        ("      mass: 2\n", "", "8: link: missing key 'mass' (mass of the augmented link)"),
+        (
+            "      mass: 2\n",
+            "",
+            "8: link: missing key 'mass' (mass of the link with the motors mounted on it)",
+        ),
         ("      mass: 2\n", "      mas: 2\n      mass: 2\n", "9: unknown key 'mas'; did you mean 'mass'?"),
         (
             "      mass: 2\n",

@@ -43,6 +43,11 @@ if TYPE_CHECKING:
 PROGRESS_STEPS = 1000
 FEEDBACK_LINEARIZATION = "feedback-linearization"
 
+_UNREAD = (
+    "--sensor-noise and --encoder-bits affect the stored measurements only; with --feedback positions the "
+    "controller uses them"
+)
+
 
 class Options(NamedTuple):
     """Options of the simulation, as on the command line."""
@@ -125,14 +130,15 @@ class Options(NamedTuple):
     metavar="RAD[,NM]",
     type=SENSOR_NOISE,
     help="Standard deviation of measured positions in rad and of measured motor torques in N m, e.g. "
-    "2e-5,0.5; adds q_measured, theta_measured and tau_motor_measured to the result.",
+    "2e-5,0.5; adds q_measured, theta_measured and tau_motor_measured to the result. The controller uses "
+    "measured positions only with --feedback positions.",
 )
 @click.option(
     "--encoder-bits",
     metavar="N",
     type=Whole("a number of bits, e.g. 16", least=1),
     help="Resolution of the encoders: 2^N steps per turn of the joint or of the motor shaft; adds "
-    "q_measured and theta_measured to the result.",
+    "q_measured and theta_measured to the result. The controller uses them only with --feedback positions.",
 )
 @click.option(
     "--seed",
@@ -219,6 +225,9 @@ def simulate(
     from vsacli.base.outputs import Outputs
     from vsacli.results.store.derived_files import SimulationWriter
 
+    sensed = simulation.keywords["sensors"] is not None
+    if sensed and choices["feedback"] == "state":
+        talk.note(_UNREAD)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         drawn = figures and _figures(inputs.robot, figures, path.stem, outputs)
@@ -228,7 +237,6 @@ def simulate(
             "options": json.dumps(choices),
             **run.provenance,
         }
-        sensed = simulation.keywords["sensors"] is not None
         writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
         report = _run(run, talk, writer)
         if drawn is not None:

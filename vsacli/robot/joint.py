@@ -106,7 +106,7 @@ class Inertia:
 class Link:
     """The augmented link: the body with the motors mounted on it, without the inertia of their rotors."""
 
-    mass: float = number(units.MASS, "mass of the augmented link", check=NON_NEGATIVE)
+    mass: float = number(units.MASS, "mass of the link with the motors mounted on it", check=NON_NEGATIVE)
     com: tuple[float, float, float] = vector(3, units.LENGTH, "center of mass in the link frame (DH frame i)")
     inertia: Inertia = value(Record(Inertia), "inertia tensor about the center of mass, link axes")
 

@@ -128,13 +128,23 @@ class JointTracking(Stored):
     }
 
     @property
+    def unit(self) -> str:
+        """Unit of the position and its errors."""
+        return POSITION.unit(self.type)
+
+    @property
     def off_course(self) -> bool:
         """Whether q at the end is further from the command than the tolerance."""
         return abs(self.q.final) > self.tolerance
 
 
-def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
-    """Return a table of errors and peaks, below its header with units."""
+def rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> list[tuple[str, ...]]:
+    """Return a table of errors and peaks, below its header with units.
+
+    Args:
+        joints: findings of each joint.
+        ideal: deviation of q of each joint in the same run with feedback of the full state; none or all.
+    """
     types = [joint.type for joint in joints]
     position, stiffness, torque = (units_of(quantity, types) for quantity in (POSITION, STIFFNESS, TORQUE))
     header = (
@@ -143,7 +153,10 @@ def rows(joints: Sequence[JointTracking]) -> list[tuple[str, ...]]:
         f"stiffness error peak / end\n{stiffness}",
         f"peak motor 1 / 2\n{torque}",
     )
-    return [header, *map(_row, joints)]
+    if not ideal:
+        return [header, *map(_row, joints)]
+    compared = zip(joints, ideal, strict=True)
+    return [(*header, f"q error with full state\n{position}"), *((*_row(a), _pair(b)) for a, b in compared)]
 
 
 def _row(joint: JointTracking) -> tuple[str, ...]:
@@ -177,7 +190,7 @@ def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Proble
 
 
 def _off_target(index: int, joint: JointTracking) -> Problem:
-    unit = POSITION.unit(joint.type)
+    unit = joint.unit
     error, tolerance = f"{joint.q.final:.3g}", f"{joint.tolerance:.3g}"
     return Problem(
         kind="off_target",

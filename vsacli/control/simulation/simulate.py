@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -122,7 +123,7 @@ class SimulationRun:
         )
         self._ending: Ending | None = None
         self._blocks = histories(robot, loop, self._until_end(blocks), first, readings)
-        self._summary = Summary(robot, goal_tolerance)
+        self._summary = Summary(robot, goal_tolerance, self.trajectory.times.span)
 
     def __iter__(self) -> Iterator[History]:
         """Integrate, and yield the variables of the run; a block is released before the next one."""
@@ -167,10 +168,11 @@ class SimulationRun:
                 *strange_errors(robot, self._initial_error),
                 *_undetermined(robot, trajectory),
                 *([_AMPLIFIED] if self._exact and verdict == "off_target" else []),
+                *(self._summary.unsettled_warnings(joints) if ending is None else []),
                 *(self._summary.stiffness_warnings() if ending is None else []),
                 *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
             ),
-            notes=trajectory.notes,
+            notes=(*trajectory.notes, *([] if self._gains is None else _unlimited(robot))),
             joints=joints,
             with_full_state=tuple(joint.q for joint in full.joints) if full else (),
         )
@@ -274,6 +276,13 @@ def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
                 yield from (
                     f"{joint.name}: {undetermined_text(each)}" for each in joint.uncertainty.undetermined
                 )
+
+
+def _unlimited(robot: Robot) -> Iterator[str]:
+    """Yield a note if no motor torque is limited: feedback then requires torques that no motor has."""
+    motors = [motor for joint in robot.joints for motor in joint.actuator.motors]
+    if all(math.isinf(motor.max_torque) for motor in motors):
+        yield "no motor has max_torque, so that its torque is unlimited"
 
 
 def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gains | None) -> ClosedLoop:

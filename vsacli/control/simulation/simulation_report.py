@@ -14,7 +14,7 @@ from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
 from vsacli.base.texts import counted
-from vsacli.base.units import POSITION, time_text
+from vsacli.base.units import time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
@@ -119,7 +119,7 @@ class SimulationReport(Stored):
         if any(math.isnan(joint.tolerance) for joint in self.joints):
             return None
         worst = max(self.joints, key=lambda joint: joint.q.peak / max(joint.tolerance, sys.float_info.min))
-        return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
+        return LargestError(worst.name, worst.q.peak, worst.unit, worst.q.time)
 
     def as_text(self) -> ReportText:
         """Return the report in its parts, as people read it."""
@@ -130,10 +130,11 @@ class SimulationReport(Stored):
         ]
         lines = [
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
-            *self._loss(),
             *self._effort(),
         ]
-        return ReportText(headline(self.verdict, self._title()), found, [rows(self.joints)], lines)
+        return ReportText(
+            headline(self.verdict, self._title()), found, [rows(self.joints, self.with_full_state)], lines
+        )
 
     def __str__(self) -> str:
         """Return the lines that the command prints, without a final newline."""
@@ -143,22 +144,15 @@ class SimulationReport(Stored):
         """Return names, controller, the largest error, and how many joints fail which requirement."""
         parts = [f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"]
         if self.samples > 1 and (error := self.largest_error) is not None:
+            larger = any(each.q.peak > error.value for each in self.joints if each.unit == error.unit)
+            relative = " relative to its tolerance" if larger else ""
             where = f"{error.joint}, t = {time_text(error.time)}"
-            parts.append(f"largest q error {error_text(error.value)} {error.unit} ({where})")
+            parts.append(f"largest q error{relative} {error_text(error.value)} {error.unit} ({where})")
         failing = {
             "off target": sum(self.complete and joint.off_course for joint in self.joints),
             "over a limit": sum(bool(joint.worst) for joint in self.joints),
         }
         return "; ".join([*parts, *filter(None, [of_all_joints(failing, len(self.joints))])])
-
-    def _loss(self) -> Iterator[str]:
-        """Yield sentences on the errors with the full state, for comparison with measured positions."""
-        for joint, ideal in zip(self.joints, self.with_full_state, strict=False):
-            unit = POSITION.unit(joint.type)
-            yield (
-                f"{joint.name}: with feedback of the full state the q error would be at most "
-                f"{error_text(ideal.peak)} {unit}, {error_text(ideal.final)} {unit} at the end"
-            )
 
     def _effort(self) -> Iterator[str]:
         if self.methods:

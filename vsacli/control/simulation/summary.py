@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,6 +23,13 @@ from vsacli.robot.model import Robot
 STIFFNESS_SHARE = 0.01
 """Error of the stiffness at the end without a warning, as a share of the largest commanded stiffness."""
 
+FINAL_SHARE = 0.1
+"""Share of a run at its end in which the position should stay within the goal tolerance."""
+
+SELDOM = 0.1
+"""Share of the samples in this part above which errors beyond the tolerance are a warning: the last error
+of an oscillation may be small by chance."""
+
 
 class Summary:
     """The summary of a run: `add` its blocks in order, then read it. It does not depend on the division.
@@ -30,14 +37,17 @@ class Summary:
     Args:
         robot: robot of the run.
         goal: largest position error of the joints at the end of the run.
+        span: times of the first and last sample of the trajectory, s.
 
     Attributes:
         samples: number of samples so far.
         flags: flags of any joint at any sample.
     """
 
-    def __init__(self, robot: Robot, goal: GoalTolerance) -> None:
+    def __init__(self, robot: Robot, goal: GoalTolerance, span: tuple[float, float]) -> None:
         self._robot, self._goal = robot, goal
+        self._late = span[1] - FINAL_SHARE * (span[1] - span[0])
+        self._late_errors: list[FloatArray] = []
         self.samples = self.flags = 0
         self._joints = [_JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._energy = _Energy()
@@ -53,11 +63,23 @@ class Summary:
         self._energy.add(block)
         self._stiffest = np.maximum(self._stiffest, block.stiffness_ref.max(axis=0))
         self._last = block.stiffness_error[-1].copy(), block.stiffness_ref[-1].copy()
+        self._late_errors.append(np.abs(block.q_error[block.time >= self._late]))
 
     def joints(self) -> tuple[JointTracking, ...]:
         """Return the findings of each joint; at least one block must have been added."""
         energies = self._energy.report(self._robot)
         return tuple(map(_JointSummary.report, self._joints, energies, [self._goal] * len(energies)))
+
+    def unsettled_warnings(self, joints: Sequence[JointTracking]) -> Iterator[str]:
+        """Yield a warning for each joint that ends on target but was often off it shortly before."""
+        errors = np.concatenate(self._late_errors)
+        for index, joint in enumerate(joints):
+            beyond = float(np.mean(errors[:, index] > joint.tolerance))
+            if beyond > SELDOM and not joint.off_course:
+                yield (
+                    f"{joint.name}: q error exceeds the goal tolerance of {joint.tolerance:.3g} "
+                    f"{joint.unit} in {100 * beyond:.0f} % of the last tenth, though not at the end"
+                )
 
     def stiffness_warnings(self) -> Iterator[str]:
         """Yield a warning for each joint whose stiffness at the end differs from the command."""

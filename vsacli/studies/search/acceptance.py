@@ -203,7 +203,8 @@ class Acceptance:
         low, high = lower[step] / (1 - self.min_margin), upper[step] / (1 + self.min_margin)
         bound = low if math.isnan(low) or asked[step] < low else high
         unit = units.STIFFNESS.unit(joint.type)
-        return Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit, of_load=True)
+        found = Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit)
+        return found._replace(attainable=lower[step] if bound == low else upper[step], margin=self.min_margin)
 
     def _limit_trouble(
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
@@ -229,7 +230,8 @@ class Trouble(NamedTuple):
         value: value of the variable at that time.
         bound: violated bound; NaN if no stiffness carries the elastic torque.
         unit: unit of value and bound.
-        of_load: whether the bound follows from the load; otherwise it is a limit of the robot.
+        attainable: end of the attainable range if the bound follows from it; NaN for a limit of the robot.
+        margin: required margin between `attainable` and the bound.
     """
 
     variable: str
@@ -238,7 +240,8 @@ class Trouble(NamedTuple):
     value: float
     bound: float
     unit: str
-    of_load: bool = False
+    attainable: float = math.nan
+    margin: float = 0.0
 
     def clause(self, joint: Joint) -> str:
         """Return the violation as a clause that names the joint."""

@@ -27,6 +27,12 @@ ROUNDING = 1e-6
 """Share of the last digit that is rounding of a value that has no more digits."""
 
 
+_OTHER_SPRINGS = (
+    "to keep the commanded stiffness, change the springs: vsacli sensitivity ranks their parameters by their "
+    "effect on the margin"
+)
+
+
 @dataclass(frozen=True)
 class NotPossible(Published):
     """Reasons why a kind of change fixes nothing."""
@@ -203,6 +209,13 @@ class Fix(Published):
         return 0.0 if self.slow_down is None else self.slow_down.factor - 1
 
     @property
+    def stiffens(self) -> bool:
+        """Whether the stiffness of a joint increases."""
+        offsets = self.stiffness_offset.offsets if self.stiffness_offset else ()
+        changes = self.stiffness_profile.changes if self.stiffness_profile else ()
+        return any(each.value > 0 for each in offsets) or any(each.largest > 0 for each in changes)
+
+    @property
     def kinds(self) -> frozenset[str]:
         """Kinds of change in the fix; a profile includes a constant, which it generalizes."""
         kinds = {part for part in self.PARTS if getattr(self, part) is not None}
@@ -271,3 +284,5 @@ class Fixes(Published):
         else:
             yield f"no fix that was tried gives every sample {margin} within all limits"
         yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
+        if any(fix.stiffens for fix in self.fixes):
+            yield _OTHER_SPRINGS

@@ -322,8 +322,14 @@ def _what(trouble: Trouble, *, resting: bool = False) -> str:
         return f"its springs cannot carry the elastic torque {when}"
     side = "below" if trouble.value < trouble.bound else "above"
     value, shown = apart(trouble.value, trouble.bound)
-    bound = f"the {shown} its load allows" if trouble.of_load else f"its limit of {shown}"
+    bound = f"its limit of {shown}" if math.isnan(trouble.attainable) else _needed(trouble, shown)
     return f"{trouble.whose} is {value} {trouble.unit} {when}, {side} {bound}"
+
+
+def _needed(trouble: Trouble, shown: str) -> str:
+    """Return the stiffness that the margin requires, and the end of the attainable range, as a clause."""
+    end = "minimum" if trouble.value < trouble.bound else "maximum"
+    return f"the {shown} needed for a margin of {100 * trouble.margin:.4g} % ({end} {trouble.attainable:.4g})"
 
 
 def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
