@@ -12,7 +12,14 @@ from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfChec
 from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import counts, findings, spread_lines, uncertainty_lines
+from vsacli.analysis.trouble_text import (
+    NOT_DETERMINED,
+    counts,
+    findings,
+    little_effect,
+    spread_lines,
+    uncertainty_lines,
+)
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.tables import ReportText, headline
@@ -92,7 +99,9 @@ class Report(Stored):
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *text.warnings_and_notes(others, self.notes),
+            *text.warnings_and_notes(others, ()),
+            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in others) else []),
+            *text.warnings_and_notes((), self.notes),
         ]
         lines = [
             *text.start(self.joints),
@@ -121,7 +130,7 @@ class Report(Stored):
 
     def _recorded_infeasible(self, *, causes: bool) -> Iterator[str]:
         """Yield what infeasible samples mean if the stiffness was recorded, too, without any other cause."""
-        recorded = any(fit["signal"] == STIFFNESS.key for fit in self.fits)
+        recorded = any(fit.get("signal") == STIFFNESS.key for fit in self.fits)
         if recorded and not causes and any(joint.samples["infeasible"] for joint in self.joints):
             yield (
                 "if the arm did move like this, the recorded stiffness or the springs of the robot file are "

@@ -27,6 +27,9 @@ from vsacli.base.units import time_text
 DIFFERENT_PEAK = 1.1
 """Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
 
+NOT_DETERMINED = "is not determined by the record"
+"""Words of warnings of fits and of findings on what a recording leaves undetermined."""
+
 MOST_IN_FULL = 3
 """Joints with a full sentence on a kind of problem, where more than one more have it."""
 
@@ -69,6 +72,17 @@ def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
         )
 
 
+def little_effect(joints: Sequence[JointReport]) -> Iterator[str]:
+    """Yield that motor torques hardly depend on undetermined derivatives, if they are determined."""
+    torques = [joint.uncertainty.variables.get(JUDGED) for joint in joints if joint.uncertainty is not None]
+    if torques and all(each is not None and each.determined for each in torques):
+        largest = max(each.bound for each in torques if each is not None)
+        yield (
+            f"motor torques depend little on it: their error may reach {percent(largest)} of their root mean "
+            f"square; {100 * DETERMINED:.0f} % is allowed"
+        )
+
+
 def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:
     yield from map(undetermined_text, uncertainty.undetermined)
     for kind, samples in uncertainty.samples.items():
@@ -97,7 +111,7 @@ def _spread(name: str, spread: Spread) -> str:
 
 def undetermined_text(spread: Spread) -> str:
     """Return that a recording does not determine a variable, and its possible error."""
-    subject = f"{spread.name} is not determined by the recording"
+    subject = f"{spread.name} {NOT_DETERMINED}ing"
     if math.isnan(spread.bound):
         return f"{subject}, since a signal that it depends on is not"
     error = f"its error may reach {percent(spread.bound)} of its root mean square"

@@ -89,8 +89,8 @@ def column_faults(
     if stuck := frozen(time, values, quantization):
         yield (
             stuck.at,
-            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, {_equal(stuck)}, while the "
-            f"motion goes on: these samples were lost; {_instead(stuck, stamps)}, or record again",
+            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, {_equal(stuck)}, while"
+            f" the motion goes on: these samples were lost; {_instead(stuck, stamps)}, or record again",
         )
     if cut := saturated(time, values, quantization):
         at = f"{values[cut.first[0]]:.4g}{unit}"
