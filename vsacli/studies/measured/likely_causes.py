@@ -135,6 +135,15 @@ def likely_causes(signals: Sequence[Agreement], gear_ratios: Sequence[float]) ->
         verb = "holds" if len(still) == 1 else "hold"
         known = "up to rounding or noise: no gain, offset or lag follows"
         yield f"{', '.join(still)} {verb} still as computed, {known}"
+
+
+def wrong_model(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
+    """Yield a sentence if several torques have a gain that points to the model rather than a sensor.
+
+    Args:
+        signals: agreements of a recording.
+        gear_ratios: gear ratio of the motor of each signal; NaN without a motor, or if unknown.
+    """
     rated = zip(signals, gear_ratios, strict=True)
     torques = [each for each, ratio in rated if each.variable == TORQUES and _gain_is_off(each, ratio)]
     if len(torques) >= FEWEST_OFF:
@@ -211,7 +220,7 @@ def _gain_is_off(agreement: Agreement, gear_ratio: float) -> bool:
     """Return whether a gain surely differs from 1, without a likely mistake as the cause."""
     size = abs(agreement.gain)
     alike = abs(agreement.correlation) >= ALIKE and agreement.follows is None
-    off = abs(size - 1) > max(NOTABLE, SURE * agreement.gain_error)
+    off = abs(size - 1) > NOTABLE and abs(size - 1) > SURE * agreement.gain_error  # not if it is NaN
     return alike and off and _looks(size, gear_ratio) is None
 
 
