@@ -28,7 +28,7 @@ DIFFERENT_PEAK = 1.1
 """Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
 
 NOT_DETERMINED = "is not determined by the record"
-"""Words of warnings of fits and of findings on what a recording leaves undetermined."""
+"""Words of warnings of fits on derivatives that a recording leaves undetermined."""
 
 MOST_IN_FULL = 3
 """Joints with a full sentence on a kind of problem, where more than one more have it."""
@@ -111,7 +111,7 @@ def _spread(name: str, spread: Spread) -> str:
 
 def undetermined_text(spread: Spread) -> str:
     """Return that a recording does not determine a variable, and its possible error."""
-    subject = f"{spread.name} {NOT_DETERMINED}ing"
+    subject = f"{spread.name} is not determined by the recording"
     if math.isnan(spread.bound):
         return f"{subject}, since a signal that it depends on is not"
     error = f"its error may reach {percent(spread.bound)} of its root mean square"
