@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from vsacli.analysis.joint_report import JointUncertainty, Spread
 from vsacli.analysis.report import VERDICTS, Report
 from vsacli.analysis.run import Run
 from vsacli.analysis.run_uncertainty import judged_variables
+from vsacli.analysis.trouble_text import uncertainty_lines
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.variables import deviation
@@ -206,6 +208,23 @@ def test_the_unreliable_ends_of_a_record_do_not_count():
     few = dataclasses.replace(position, unreliable=(1.5, 1.5))
     half = Trajectory(ends.times, few, ends.commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), half).report.verdict == "ok"
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(1.09, False), (1.11, True)])
+def test_a_peak_at_an_end_is_reported_if_it_is_more_than_a_tenth_larger(ratio, said):
+    joint = inverse_dynamics(vsa_3r(), swinging(STEADY)).report.joints[0]
+    peak = ratio * joint.uncertainty.variables["tau_motor"].peak
+    sentences = list(uncertainty_lines([dataclasses.replace(joint, peak_tau_motor=(peak, peak / 2))]))
+    assert any("is at an unreliable end of the recording" in sentence for sentence in sentences) == said
+
+
+def test_undetermined_derivatives_that_hardly_matter_are_put_into_proportion():
+    report = inverse_dynamics(vsa_3r(), swinging(STEADY)).report
+    doubted = dataclasses.replace(report, warnings=("d4q of base is not determined by the record to 10 %",))
+    assert "depend little on it" not in str(report)
+    assert re.search(r"motor torques depend little on it: their error may reach [\d.e-]+ % of", str(doubted))
+    shaky = dataclasses.replace(inverse_dynamics(vsa_3r(), swinging(SHAKY)).report, warnings=doubted.warnings)
+    assert "depend little on it" not in str(shaky)
 
 
 def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible():

@@ -51,6 +51,40 @@ def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded
 
 
 @pytest.mark.slow
+def test_faults_come_before_what_follows_from_them(vsacli, recorded):
+    q = positions()
+    q[700, 1] -= 0.1
+    verdict, fault, *others = vsacli("check-feasibility", ROBOT, recorded(q)).out.splitlines()
+    assert verdict.startswith("UNRELIABLE")
+    assert fault.startswith("warning: motion.csv:702: shoulder.q is off at t = 1.400 s")
+    assert "below the minimum" in others[0]
+    assert not any("if the arm did move like this" in line for line in others)
+
+
+@pytest.mark.slow
+def test_an_infeasible_recording_is_about_its_stiffness_or_the_springs(vsacli, recorded, tmp_path):
+    file = recorded(positions())
+    advice = (
+        "if the arm did move like this, the recorded stiffness or the springs of the robot file are wrong"
+    )
+    softer = (tmp_path / file).read_text().replace(",1000", ",600")
+    (tmp_path / "soft.csv").write_text(softer)
+    (tmp_path / "chosen.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: chosen\n"
+        "position: {type: csv, file: motion.csv, ignore: rest}\n"
+        "stiffness: {type: constant, value: 600}\n"
+    )
+    recorded_soft, chosen = (
+        vsacli("check-feasibility", ROBOT, name).out for name in ("soft.csv", "chosen.yaml")
+    )
+    assert recorded_soft.startswith("INFEASIBLE")
+    assert chosen.startswith("INFEASIBLE")
+    assert f"{advice}: run vsacli identify first" in recorded_soft
+    assert advice not in chosen
+    assert advice not in vsacli("check-feasibility", ROBOT, file).out
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 1.7e9])
 def test_gap_frozen_sensor_and_stamps_since_1970(vsacli, recorded, start):
     q, kept = positions(), (TIME < 1) | (TIME >= 1.2)

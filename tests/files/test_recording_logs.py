@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ from samples.command_line import REPOSITORY, Outcome
 
 from vsacli import load_robot, load_trajectory
 from vsacli.files import templates
+from vsacli.files.info import render
 from vsacli.files.recordings import describe_recording
 from vsacli.files.recordings.names import JointNames, words_of
 
@@ -212,6 +215,74 @@ def test_joints_in_names(joints: list[str], column: str, expected: str | None) -
     assert (match.joint if match else None) == expected
 
 
+ARM = ["base", "shoulder", "elbow"]
+
+
+def columns_of_motors(motion: str, torque: str) -> dict[str, Any]:
+    """Columns of both motors of each joint, by templates with the joint's number or name, and the motor."""
+    kinds = {motion: POSITION, torque: 10 * POSITION}
+    return {
+        template.format(joint=joint, number=number, motor=motor, letter="ab"[motor - 1]): values
+        for number, joint in enumerate(ARM, 1)
+        for motor in (1, 2)
+        for template, values in kinds.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("motion", "torque"),
+    [
+        ("mot{number}{letter}_deg", "trq{number}{letter}"),
+        ("theta_{number}_{motor}", "tau_motor_{number}_{motor}"),
+        ("{joint}__theta_measured_{motor}", "{joint}__tau_motor_{motor}"),
+        ("{joint} motor {letter} position", "{joint}_torque_{letter}"),
+        ("motor_encoder_{number}_{letter}", "effort_{number}_{letter}"),
+    ],
+)
+def test_both_motors_are_proposed_for_compare_and_identify(tmp_path: Path, motion: str, torque: str) -> None:
+    columns = columns_of_motors(motion, torque)
+    positions = {f"enc{number}": POSITION for number in (1, 2, 3)}
+    stiffness = {f"K{number}": POSITION + 2 for number in (1, 2, 3)}
+    found = described(tmp_path, ARM, t=TIME, **columns, **positions, **stiffness)
+    named = {name: re.sub(r"^{column: |, unit: deg}$|\"", "", entry) for name, entry in taken(found).items()}
+    of_motors = {
+        f"{joint}.{variable}_{motor}": column
+        for (joint, motor, variable), column in zip(
+            itertools.product(ARM, (1, 2), ("theta", "tau_motor")), columns, strict=True
+        )
+    }
+    joints = {f"{joint}.q": f"enc{number}" for number, joint in enumerate(ARM, 1)}
+    stiff = {f"{joint}.stiffness": f"K{number}" for number, joint in enumerate(ARM, 1)}
+    expected = {name: column.replace("__", ".") for name, column in of_motors.items()}
+    assert named == {"time": "t", **joints, **stiff, **expected}
+    assert "theta" not in found["trajectory"].replace(motion.split("_")[0], "")
+    assert "motor_1" not in found["trajectory"]
+
+
+def test_numbers_of_joints_are_not_those_of_motors(tmp_path: Path) -> None:
+    """Nor are gains, or counters that fall below zero, stiffnesses."""
+    names = [f"panda_joint{number}" for number in range(1, 3)]
+    torques = {f"{name}_torque": POSITION for name in names}
+    gains = {"Kp1": TIME + 1, "k_d_2": TIME + 1, "K1": POSITION, "K2": POSITION}
+    found = described(tmp_path, names, t=TIME, **torques, **gains)
+    assert taken(found) == {"time": "t"}
+    assert "# panda_joint2.tau_motor_1: panda_joint2_torque" in found["mapping"]
+    assert "tau_motor_2" not in found["mapping"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "heading"),
+    [
+        (["shoulder_pos", "elbow_pos"], "check the columns:"),
+        (["pos1", "pos2"], "check the columns, some of which are guessed:"),
+    ],
+)
+def test_guesses_are_announced_where_there_are_some(tmp_path: Path, columns: list[str], heading: str) -> None:
+    log(tmp_path, t=TIME, **dict.fromkeys(columns, POSITION))
+    text = render(describe_recording(tmp_path / "log.csv", load_robot(ROBOT)))
+    assert f"trajectory file for this recording; {heading}\n" in text
+
+
 def trajectory_of(folder: Path, text: str) -> Any:
     path = folder / "recorded.yaml"
     path.write_text(text)
@@ -305,7 +376,9 @@ def test_foreign_headers_end_in_one_message(vsacli: Command, tmp_path: Path, ext
     done = vsacli("invdyn", ROBOT, "log.csv")
     assert done.code == 2
     assert len(done.err.splitlines()) == 1
-    assert done.err.endswith("expected columns such as time, shoulder.q; see vsacli info log.csv\n")
+    advice = "vsacli info log.csv --robot ROBOT --field trajectory writes a file to use in its place"
+    assert done.err.endswith(f"expected columns such as time, shoulder.q; {advice}\n")
+    assert vsacli("plot", "log.csv", "--robot", ROBOT).err.endswith(f"{advice}\n")
 
 
 def test_columns_without_use_beside_known_ones_are_one_message(vsacli: Command, tmp_path: Path) -> None:

@@ -96,6 +96,8 @@ def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
     assert found.time_offset == pytest.approx(BEGIN - columns["time"][kept][0], abs=2e-4)
 
 
+TORQUES = tuple(f"{joint}.tau_motor_{motor}" for joint in ("base", "shoulder", "elbow") for motor in (1, 2))
+
 SLIPS = {
     "base.q looks as if it is in degrees": lambda c: {"base.q": np.degrees(c["base.q"])},
     "base.q runs the other way": lambda c: {"base.q": -c["base.q"]},
@@ -119,6 +121,15 @@ def test_slips_are_named(computed, tmp_path, sentence):
     columns.update(SLIPS[sentence](columns))
     found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
     assert [note for note in found.notes if sentence in note], found.notes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scaled", "said"), [(("base.tau_motor_1",), False), (TORQUES, True)])
+def test_gains_of_several_torques_point_to_the_model(computed, tmp_path, scaled, said):
+    columns = recorded(computed)
+    columns.update({name: 0.95 * columns[name] for name in scaled})
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    assert any("the model may be wrong; run vsacli identify" in note for note in found.notes) == said
 
 
 WRONG = {

@@ -225,7 +225,7 @@ def test_a_table_without_any_known_column_is_one_problem(tmp_path):
         load_trajectory(tmp_path / "log.csv", ROBOT)
     (problem,) = caught.value.problems
     assert problem.message.startswith(
-        "is not a trajectory: expected columns such as time, shoulder.q; see vsacli info "
+        "is not a trajectory: expected columns such as time, shoulder.q; vsacli info "
     )
 
 

@@ -136,6 +136,26 @@ def test_a_sensor_that_freezes_until_the_end_or_from_the_start():
     assert message.startswith("q[0, 0] is frozen 2 times, first at t = 0.000 s, for up to 300 ms (at t = ")
 
 
+@pytest.mark.parametrize(
+    ("samples", "advice"),
+    [
+        (slice(1500, 1505), "delete all but the first of these rows"),
+        (slice(1500, 1506), "cut the recording in two there"),
+        (slice(4700, None), "delete these rows"),
+    ],
+)
+def test_a_frozen_sensor_is_cut_out_where_deleted_rows_would_be_a_gap(samples: slice, advice: str):
+    q = noisy()
+    q[samples] = q[samples.start]
+    (message,) = messages(TIME, q)
+    count = len(q[samples])
+    assert f"{count} equal samples, while the motion goes on: " in message
+    assert message.endswith(f"these samples were lost; {advice}, or record again")
+    repeated = np.arange(len(q))[samples][1:]
+    left = messages(np.delete(TIME, repeated), np.delete(q, repeated))
+    assert bool(left) == advice.startswith("cut")
+
+
 @pytest.mark.parametrize("rows", [2, 3, 5])
 def test_values_that_stand_in_several_rows_each(rows: int):
     (message,) = messages(TIME, noisy()[np.arange(len(TIME)) // rows * rows])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -10,10 +12,21 @@ from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfChec
 from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import counts, findings, spread_lines, uncertainty_lines
+from vsacli.analysis.trouble_text import (
+    NOT_DETERMINED,
+    counts,
+    findings,
+    little_effect,
+    spread_lines,
+    uncertainty_lines,
+)
 from vsacli.base.json_records import JsonObject, Stored, named
+from vsacli.base.signals import STIFFNESS
 from vsacli.base.tables import ReportText, headline
 from vsacli.base.texts import counted
+
+_AT_A_ROW = re.compile(r":\d+: |^\w+\[\d+")
+"""Regular expression of a warning on a row of a file or a sample of an array."""
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_check_failed")
 """Verdicts from best to worst; the worst that applies wins."""
@@ -76,17 +89,19 @@ class Report(Stored):
         Args:
             hint: a line below the findings, such as the command that lists fixes; none if empty.
         """
-        # A question asks whether an input is meant, as in another unit: the findings may follow from it.
-        asked = [warning for warning in self.warnings if "?" in warning]
-        others = [warning for warning in self.warnings if "?" not in warning]
+        first = [warning for warning in self.warnings if self._is_cause(warning)]
+        others = [warning for warning in self.warnings if not self._is_cause(warning)]
         found = [
             *self._failed_check(),
-            *text.warnings_and_notes(asked, ()),
+            *text.warnings_and_notes(first, ()),
             *findings(self.joints, self.samples),
             *text.stops(self.joints, self.drifts),
+            *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *text.warnings_and_notes(others, self.notes),
+            *text.warnings_and_notes(others, ()),
+            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in others) else []),
+            *text.warnings_and_notes((), self.notes),
         ]
         lines = [
             *text.start(self.joints),
@@ -104,6 +119,23 @@ class Report(Stored):
     def __str__(self) -> str:
         """Return the lines that the commands print, without a final newline."""
         return str(self.as_text())
+
+    def _is_cause(self, warning: str) -> bool:
+        """Return whether the findings may follow from what a warning is about.
+
+        This is so for a question, which asks whether an input is meant, as in another unit, and for faults at
+        a row of a recording.
+        """
+        return "?" in warning or (bool(self.fits) and _AT_A_ROW.search(warning) is not None)
+
+    def _recorded_infeasible(self, *, causes: bool) -> Iterator[str]:
+        """Yield what infeasible samples mean if the stiffness was recorded, too, without any other cause."""
+        recorded = any(fit.get("signal") == STIFFNESS.key for fit in self.fits)
+        if recorded and not causes and any(joint.samples["infeasible"] for joint in self.joints):
+            yield (
+                "if the arm did move like this, the recorded stiffness or the springs of the robot file are "
+                "wrong: run vsacli identify first"
+            )
 
     def _failed_check(self) -> list[str]:
         return [] if self.self_check.passed else [text.self_check_line(self.self_check)]

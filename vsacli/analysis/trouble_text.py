@@ -27,6 +27,9 @@ from vsacli.base.units import time_text
 DIFFERENT_PEAK = 1.1
 """Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
 
+NOT_DETERMINED = "is not determined by the record"
+"""Words of warnings of fits on derivatives that a recording leaves undetermined."""
+
 MOST_IN_FULL = 3
 """Joints with a full sentence on a kind of problem, where more than one more have it."""
 
@@ -66,6 +69,17 @@ def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
         yield by_joint(
             "standard deviation of motor torque, random noise only: ",
             [_spread(name, spread) for name, spread in torques],
+        )
+
+
+def little_effect(joints: Sequence[JointReport]) -> Iterator[str]:
+    """Yield that motor torques hardly depend on undetermined derivatives, if they are determined."""
+    torques = [joint.uncertainty.variables.get(JUDGED) for joint in joints if joint.uncertainty is not None]
+    if torques and all(each is not None and each.determined for each in torques):
+        largest = max(each.bound for each in torques if each is not None)
+        yield (
+            f"motor torques depend little on it: their error may reach {percent(largest)} of their root mean "
+            f"square; {100 * DETERMINED:.0f} % is allowed"
         )
 
 

@@ -12,11 +12,25 @@ from vsacli.documents.column_mapping import MappedColumn
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.files.recordings.first_rows import FirstRows, TimeColumn
-from vsacli.files.recordings.names import AXES, GENERIC, POSES, QUANTITIES, WORDS, JointNames, words_of
+from vsacli.files.recordings.names import (
+    AXES,
+    GENERIC,
+    MOTOR_WORDS,
+    OF_MOTORS,
+    POSES,
+    QUANTITIES,
+    WORDS,
+    JointNames,
+    motor_of,
+    words_of,
+)
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
 TAKEN = ("q", "stiffness")
-"""Quantities that are proposed in a mapping; others become comments there."""
+"""Quantities that are proposed in a trajectory file; others become comments there."""
+
+VARIABLES_OF_MOTORS = ("theta_1", "theta_2", "tau_motor_1", "tau_motor_2")
+"""Quantities that are proposed in a mapping for `compare` and `identify` if the names say of which motor."""
 
 ARRAYS = ("q", "dq", "tau_motor_1")
 """Content of the arrays of `sensor_msgs/JointState`: position, velocity, effort."""
@@ -28,6 +42,9 @@ OTHER_THAN_MEASURED = (
 
 _BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
 """Regular expression of a joint name that is recognized without a robot."""
+
+_STIFFNESS = re.compile(r"k[_ -]?\d+", re.IGNORECASE)
+"""Regular expression of the whole name of a stiffness in short; gains, such as `Kp1`, do not match."""
 
 _INDEX = re.compile(r"[\[_ ]?(\d+)")
 _SEPARATORS = re.compile(r"[./\s]")
@@ -43,6 +60,7 @@ class Guess(NamedTuple):
         source: entry of the column in a mapping.
         reason: reason, a clause.
         sure: whether the names are unambiguous.
+        of_motor: whether the name of the column says of which motor it is.
     """
 
     place: int
@@ -51,6 +69,7 @@ class Guess(NamedTuple):
     source: MappedColumn
     reason: str
     sure: bool
+    of_motor: bool = False
 
     @property
     def name(self) -> str:
@@ -68,6 +87,7 @@ class _Column(NamedTuple):
         words: words of the name, without that for the quantity.
         entry: index in an array.
         bare: whether the name has no word for a quantity.
+        of_motor: whether the name says of which motor it is.
     """
 
     place: int
@@ -76,6 +96,7 @@ class _Column(NamedTuple):
     words: tuple[str, ...] = ()
     entry: int | None = None
     bare: bool = False
+    of_motor: bool = False
 
     @property
     def family(self) -> tuple[str, ...]:
@@ -103,13 +124,17 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     if not rows.header.line:
         columns, labels = _joint_states(rows, time)
     found: dict[str, Guess] = {}
-    for quantity in QUANTITIES:
+    if joint_names:
+        columns = [_of_motor(column, JointNames(joint_names)) for column in columns]
+    for quantity in dict.fromkeys((*QUANTITIES, *VARIABLES_OF_MOTORS)):
+        if quantity == "theta":
+            continue
         of_it = [column for column in columns if column.quantity == quantity]
         joints = _of_robot(of_it, labels, JointNames(joint_names)) if joint_names else _named(of_it, labels)
         for column, joint in joints:
             source, doubt = _source(rows, column)
             reasons = "; ".join(filter(None, (joint.reason, doubt)))
-            guess = Guess(column.place, joint.name, quantity, source, reasons, joint.sure)
+            guess = Guess(column.place, joint.name, quantity, source, reasons, joint.sure, column.of_motor)
             found.setdefault(guess.name, guess)
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
@@ -119,12 +144,16 @@ def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
     columns.sort(key=lambda column: (column.bare, any(word in OTHER_THAN_MEASURED for word in column.words)))
+    columns.sort(key=lambda column: any(word in MOTOR_WORDS for word in column.words))
     return columns
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
     """Yield the meaning of a column by its name; a name without a word for a quantity may mean a position."""
     name = split_heading(rows.columns[place])[0]
+    if _STIFFNESS.fullmatch(name) and min(rows.numbers(place)) > 0:
+        yield _Column(place, "stiffness", words=words_of(name)[1:])
+        return
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
         if quantity is not None:
@@ -137,6 +166,18 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
             return
     if name:
         yield _Column(place, "q", name, words_of(name), bare=True)
+
+
+def _of_motor(column: _Column, joints: JointNames) -> _Column:
+    """Return a column as that of a motor if its name says of which motor it is, otherwise unchanged."""
+    variable = OF_MOTORS.get(column.quantity)
+    if variable is None or (column.quantity == "q" and not any(word in MOTOR_WORDS for word in column.words)):
+        return column
+    found = motor_of(column.words, joints)
+    if found is None:
+        return column
+    motor, words = found
+    return _Column(column.place, f"{variable}_{motor}", column.before, words, of_motor=True)
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:

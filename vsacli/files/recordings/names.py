@@ -9,12 +9,22 @@ from typing import NamedTuple
 WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
 QUANTITIES = {
-    "q": ("position", "positions", "pos", "q", "angle", "angles"),
+    "q": ("position", "positions", "pos", "q", "angle", "angles", "enc", "encoder", "encoders"),
     "dq": ("velocity", "velocities", "vel", "dq", "qd", "speed"),
-    "tau_motor_1": ("effort", "efforts", "torque", "torques", "tau"),
+    "tau_motor_1": ("effort", "efforts", "torque", "torques", "tau", "trq"),
     "stiffness": ("stiffness",),
+    "theta": ("theta", "thetas"),
 }
-"""Words for each quantity of a joint."""
+"""Words for each quantity of a joint; `theta` alone may be of a joint or a motor, and is not used."""
+
+OF_MOTORS = {"q": "theta", "theta": "theta", "tau_motor_1": "tau_motor"}
+"""Variables of motors by the quantity in a name that says which motor it is of."""
+
+MOTOR_WORDS = ("motor", "motors", "mot", "rotor")
+"""Words that make a position that of a motor, if the name also says which."""
+
+MOTORS = {"1": 1, "2": 2, "a": 1, "b": 2}
+"""Last words of names that say which motor of a joint is meant."""
 
 QUANTITY_WORDS = frozenset(word for words in QUANTITIES.values() for word in words)
 
@@ -64,6 +74,22 @@ POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "or
 def words_of(name: str) -> tuple[str, ...]:
     """Return the words and numbers of a name in lower case, equal for `joint_01`, `Joint1` and `joint-1`."""
     return tuple(word.lower().lstrip("0") or "0" for word in WORDS.findall(name))
+
+
+def motor_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, ...]] | None:
+    """Return the number of the motor that a name indicates, and the words for its joint; None for neither.
+
+    Args:
+        words: words of the name without that for the quantity, such as `1 a deg` or `elbow motor 2`.
+        joints: joint names of the robot. A last number is that of a motor only next to a joint.
+    """
+    telling = [at for at, word in enumerate(words) if word not in GENERIC and word not in MOTOR_WORDS]
+    motor = MOTORS.get(words[telling[-1]]) if len(telling) > 1 else None
+    if motor is None:
+        return None
+    rest = tuple(word for at, word in enumerate(words) if at != telling[-1] and word not in MOTOR_WORDS)
+    numbered = all(words[at].isdecimal() for at in telling[:-1])
+    return (motor, rest) if numbered or joints.in_words(rest) is not None else None
 
 
 class Match(NamedTuple):

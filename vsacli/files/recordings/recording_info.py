@@ -29,7 +29,7 @@ from vsacli.files.recordings.first_rows import (
     unread_times,
 )
 from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
-from vsacli.files.recordings.recording_text import mapping_lines
+from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file
@@ -84,8 +84,12 @@ def describe_recording(
     surveyed = _Survey(rows, time, found, progress, rate)
     taken = [guess for guess in found if guess.quantity in TAKEN]
     stamps = {time.place, time.nanoseconds} - {None} if time else set()
-    leaves_out = len(stamps | {guess.place for guess in taken}) < len(rows.columns)
-    lines = list(mapping_lines(time, found, joint_names, leaves_out, rate))
+
+    def lines(proposed: Sequence[Guess]) -> list[str]:
+        used = stamps | {guess.place for guess in proposed if is_proposed(guess)}
+        return list(mapping_lines(time, proposed, joint_names, len(used) < len(rows.columns), rate))
+
+    of_trajectory = lines([guess for guess in found if not guess.of_motor])
     stated = [] if rate is None else [f"rate: {rate:g}"]
     return {
         "kind": "recording",
@@ -94,9 +98,11 @@ def describe_recording(
         "time": surveyed.time,
         "columns": surveyed.columns,
         "warnings": surveyed.warnings,
-        "mapping": "\n".join([f"format: {FORMAT}", *stated, *lines]),
+        "mapping": "\n".join([f"format: {FORMAT}", *stated, *lines(found)]),
         "trajectory": "\n".join(
-            _trajectory(Path(path).name, lines, taken, robot, stated or _proposed_rate(time, surveyed.rate))
+            _trajectory(
+                Path(path).name, of_trajectory, taken, robot, stated or _proposed_rate(time, surveyed.rate)
+            )
         ),
     }
 

@@ -12,7 +12,7 @@ from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.column_mapping import REST, MappedColumn
 from vsacli.documents.number import BOOLEANS
 from vsacli.documents.time_column import TIME
-from vsacli.files.recordings.first_rows import TimeColumn
+from vsacli.files.recordings.first_rows import GUESSED, TimeColumn
 from vsacli.files.recordings.guesses import TAKEN, Guess
 from vsacli.trajectory.recorded.stamps import step_text
 
@@ -34,7 +34,8 @@ def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
     yield from aligned([("column", "number", "holds", "smallest", "largest"), *_columns(recording)])
     yield from (f"warning: {warning}" for warning in recording["warnings"])
     yield ""
-    yield "trajectory file for this recording; check the columns, which are partly guessed:"
+    guessed = ", some of which are guessed" if GUESSED in recording["trajectory"] else ""
+    yield f"trajectory file for this recording; check the columns{guessed}:"
     yield ""
     yield from recording["trajectory"].splitlines()
 
@@ -107,9 +108,14 @@ def _unknown(guesses: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[t
             yield f"# {joint}.q: ...", "the name or the number of its column"
 
 
+def is_proposed(guess: Guess) -> bool:
+    """Return whether a mapping contains a guess; other guesses are comments there."""
+    return guess.quantity in TAKEN or guess.of_motor
+
+
 def _entry(guess: Guess) -> tuple[str, str]:
-    reason = guess.reason if guess.sure else f"guessed: {guess.reason}"
-    if guess.quantity not in TAKEN:
+    reason = guess.reason if guess.sure else f"{GUESSED}: {guess.reason}"
+    if not is_proposed(guess):
         comment = COMMENTED[guess.quantity]
         return f"# {guess.name}: {_written(guess.source)}", comment if guess.sure else f"{comment}; {reason}"
     return f"{guess.name}: {_written(guess.source)}", reason

@@ -76,7 +76,9 @@ OFF = "{name}: a position off by {size}, as by a wrong zero of its encoder, {wou
 BIASED = "{name}: a torque off by {size} {would}"
 GAIN = "{name}: torques that read {size} times the torque that the rest of the equations requires {would}"
 FRICTION = "{name}: what is left depends on its velocity: its friction has another law"
-SPRING = "{name}: what is left depends on its deflection: its spring has another law"
+SPRING = (
+    "{name}: what is left depends on its deflection: its spring has another law, or positions were resampled"
+)
 PLACE = "{name}: what is left depends on its position: a cable, a stop or a weight is not in the file"
 
 

@@ -20,7 +20,7 @@ from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
 from vsacli.studies.measured.comparison_warnings import Overlap, comparison_warnings
-from vsacli.studies.measured.likely_causes import NOTABLE, WILD, exchanged_places, likely_causes
+from vsacli.studies.measured.likely_causes import NOTABLE, WILD, exchanged_places, likely_causes, wrong_model
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
     Measured,
@@ -85,6 +85,7 @@ def compare(
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, ratios),
+        *wrong_model(signals, ratios),
         *_left_out(result, recorded, behind),
     )
     return Comparison(

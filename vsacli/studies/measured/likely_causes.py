@@ -106,6 +106,12 @@ NOTABLE = 0.02
 """Deviation of a gain from 1, or ratio of an offset to the range, from which on it is reported: few models
 are better."""
 
+TORQUES = "tau_motor"
+"""Variable whose gains show a wrong model."""
+
+FEWEST_OFF = 2
+"""Fewest torques with another gain that are evidence of a wrong model rather than a wrong sensor."""
+
 WILD = 20.0
 """Ratio of the largest error to the rms of the others from which on outliers are reported."""
 
@@ -129,6 +135,19 @@ def likely_causes(signals: Sequence[Agreement], gear_ratios: Sequence[float]) ->
         verb = "holds" if len(still) == 1 else "hold"
         known = "up to rounding or noise: no gain, offset or lag follows"
         yield f"{', '.join(still)} {verb} still as computed, {known}"
+
+
+def wrong_model(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
+    """Yield a sentence if several torques have a gain that points to the model rather than a sensor.
+
+    Args:
+        signals: agreements of a recording.
+        gear_ratios: gear ratio of the motor of each signal; NaN without a motor, or if unknown.
+    """
+    rated = zip(signals, gear_ratios, strict=True)
+    torques = [each for each, ratio in rated if each.variable == TORQUES and _gain_is_off(each, ratio)]
+    if len(torques) >= FEWEST_OFF:
+        yield "gains of several torques differ: the model may be wrong; run vsacli identify ROBOT RECORDING"
 
 
 def _gains_of_causes(gear_ratio: float) -> Mapping[str, float]:
@@ -192,9 +211,17 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
         yield f"{agreement.column} runs the other way (its gain is {gain:.4g})"
     if looks is not None:
         yield f"{agreement.column} looks as if it {looks} (its gain is {gain:.4g})"
-    elif abs(size - 1) > NOTABLE and abs(size - 1) > SURE * agreement.gain_error:
+    elif _gain_is_off(agreement, gear_ratio):
         yield f"{agreement.column} is {size:.4g} times as large as computed"
     yield from _offset(agreement)
+
+
+def _gain_is_off(agreement: Agreement, gear_ratio: float) -> bool:
+    """Return whether a gain surely differs from 1, without a likely mistake as the cause."""
+    size = abs(agreement.gain)
+    alike = abs(agreement.correlation) >= ALIKE and agreement.follows is None
+    off = abs(size - 1) > NOTABLE and abs(size - 1) > SURE * agreement.gain_error  # not if it is NaN
+    return alike and off and _looks(size, gear_ratio) is None
 
 
 def _offset(agreement: Agreement) -> Iterator[str]:

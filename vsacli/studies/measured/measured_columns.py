@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -15,7 +15,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.renamed import successor
 from vsacli.base.simulation_variables import COMMANDS, measured
 from vsacli.base.texts import counted
-from vsacli.base.variables import MOTORS, Variable
+from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
@@ -96,7 +96,7 @@ class Recording(NamedTuple):
     Attributes:
         time: times, (samples,) in s since the first sample.
         signals: signals in the order of the variables, then of the joints.
-        others: names of columns that are not among these variables, or are ignored by the mapping.
+        others: names of columns that are not among these variables, and that the mapping does not ignore.
         table: table of the file.
         stranger: sentence on joints that the subject of the recording does not have; otherwise empty.
     """
@@ -129,6 +129,7 @@ def read_recording(
         InputError: no column has a place, a unit does not fit its variable, or the times do not ascend.
     """
     places = known_columns(jointed, wanted)
+    mapping = _of_signals(mapping, places, jointed)
     table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
@@ -155,8 +156,15 @@ def read_recording(
         if name in places
     ]
     signals.sort(key=lambda signal: order[signal.column])
-    others = (*table.others, *table.ignored)
-    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others, table, stranger)
+    times = _elapsed(table, factors[names.index(TIME)])
+    return Recording(times, tuple(signals), table.others, table, stranger)
+
+
+def _of_signals(mapping: ColumnMapping, places: Mapping[str, Place], jointed: Jointed) -> ColumnMapping:
+    """Return a mapping without the other variables of the robot, so that one file serves all commands."""
+    others = known_columns(jointed, stand_ins(VARIABLES)).keys() - places.keys()
+    columns = {name: source for name, source in mapping.columns.items() if name not in others}
+    return replace(mapping, columns=columns)
 
 
 def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:

@@ -106,7 +106,9 @@ def column_layout(
     if _is_foreign(names, known):
         examples = ", ".join(expected[:2])
         advice = (
-            f"for a motor catalog use --catalog {file}" if "inertia" in names else f"see vsacli info {file}"
+            f"for a motor catalog use --catalog {file}"
+            if "inertia" in names
+            else f"vsacli info {file} --robot ROBOT --field trajectory writes a file to use in its place"
         )
         message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)

@@ -17,7 +17,7 @@ from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.quantization import ORDER, Quantization
 from vsacli.trajectory.recorded.samples import Samples
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
-from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
+from vsacli.trajectory.recorded.thresholds import GAP_STEPS, LARGEST_ANGLE, LARGEST_TRAVEL
 
 
 def health(
@@ -89,8 +89,8 @@ def column_faults(
     if stuck := frozen(time, values, quantization):
         yield (
             stuck.at,
-            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, while the motion goes on:"
-            " these samples were lost; delete the rows, or record again",
+            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, {_equal(stuck)}, while"
+            f" the motion goes on: these samples were lost; {_instead(stuck, stamps)}, or record again",
         )
     if cut := saturated(time, values, quantization):
         at = f"{values[cut.first[0]]:.4g}{unit}"
@@ -126,6 +126,22 @@ def _occasions(faults: Faults, stamps: FloatArray) -> str:
 
 def _lasting(faults: Faults, stamps: FloatArray) -> str:
     return _extent(faults, stamps, [step_text(size) for size in faults.sizes.tolist()])
+
+
+def _equal(stuck: Faults) -> str:
+    """Return the number of equal samples of the longest frozen stretch."""
+    return f"{int(stuck.last[stuck.worst] - stuck.first[stuck.worst]) + 1} equal samples"
+
+
+def _instead(stuck: Faults, stamps: FloatArray) -> str:
+    """Return what to do with frozen stretches: within a recording, deleting a long one leaves a gap."""
+    inner = (stuck.first > 0) & (stuck.last + 1 < len(stamps))
+    if not inner.any():
+        return "delete these rows"
+    gaps = stamps[stuck.last[inner] + 1] - stamps[stuck.first[inner]]
+    if gaps.max() > GAP_STEPS * float(np.median(np.diff(stamps))):
+        return "cut the recording in two there"
+    return "delete all but the first of these rows"
 
 
 def _extent(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
