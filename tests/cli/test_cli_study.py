@@ -187,15 +187,15 @@ def test_the_table_from_python_is_that_of_the_command(own_folder: Path, grid_tab
 @pytest.mark.parametrize(
     ("vary", "engine"),
     [
-        ("rate: [1000], duration: {linspace: [3, 4, 300]}", "c"),
+        ("rate: [1000], duration: {linspace: [3, 4, 900]}", "c"),
         ("rate: [1000], duration: {linspace: [3, 4, 30]}", "numpy"),
         ("rate: [5], duration: {linspace: [3, 4, 300]}", "numpy"),
         ("rate: [1000], joints.elbow.link.mass: {linspace: [3, 4, 300]}", "numpy"),
-        ("rate: [1000], joints.elbow.link.mass: [3, 4], duration: {linspace: [3, 4, 300]}", "c"),
+        ("rate: [1000], joints.elbow.link.mass: [3, 4], duration: {linspace: [3, 4, 900]}", "c"),
     ],
 )
 def test_compiled_code_pays_by_the_runs_of_each_robot(own_folder: Path, vary: str, engine: str) -> None:
-    """So that 1.2 million steps of one robot repay compiling, and 120,000 do not."""
+    """Three million samples of one robot repay compiling, and 120,000 do not."""
     chosen = load_study(study(own_folder, f"vary: {{{vary}}}"), "auto")
     assert (chosen.engine, bool(chosen.compiler)) == (engine, engine == "c")
 

@@ -16,7 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import GoalTolerance, InitialError, simulate
 from vsacli.control.simulation.simulation_report import SimulationReport
-from vsacli.control.simulation.summary import Summary
+from vsacli.control.simulation.simulation_summary import Summary
 
 MOTOR_INERTIA = 2.0
 

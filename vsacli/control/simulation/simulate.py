@@ -28,10 +28,10 @@ from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
+from vsacli.control.simulation.simulation_summary import Summary
 from vsacli.control.simulation.start import InitialError, start_state, strange_errors
 from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
-from vsacli.control.simulation.summary import Summary
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block, fitted
