@@ -27,7 +27,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
-from vsacli.dynamics.internal_motion import March, internal_motions
+from vsacli.dynamics.internal_motion import March, _Peaks, _Solution, internal_motions
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -318,3 +318,21 @@ def test_simulation_knows_how_fast_it_settles() -> None:
     peak = np.nanmax(np.abs(expected.tau_motor))
     np.testing.assert_allclose(past.tau_motor_cmd, expected.tau_motor, rtol=0, atol=1e-9 * peak)
     assert np.abs(past.q_error).max() < 1e-8
+
+
+class _Springs:
+    """Springs with a stiffness of 1 that stay together."""
+
+    def slope(self, phi, _q):
+        return np.ones_like(phi)
+
+    def spread(self, phi):
+        return np.zeros(phi.shape[-1])
+
+
+def test_last_coefficients_count_relative_to_the_largest_deflection():
+    demand = Command(*np.ones((6, 1)), commanded={})
+    peaks = _Peaks(_Springs(), demand, np.ones((2, 1)))
+    found = _Solution(np.ones((2, 1)), np.zeros((2, 1)), torque=1.0, damping=0.0, constants=1.0)
+    phi = np.array([[1e-3, 1e-4, 1e-7, 1e-8], [1e-3, 0, 0, 0]])
+    assert peaks.share(phi, np.zeros((2, 2)), found) == pytest.approx(1e-4, rel=1e-15)
