@@ -174,7 +174,7 @@ class CompiledLoop:
     def distance(self, vector: FloatArray) -> float:
         """Return the distance to the nearest boundary, at most 1."""
         self._to_boundaries(self._address("state", vector), self._address("distances", self._distances))
-        return min(1.0, *self._distances.tolist())
+        return float(self._distances.min(initial=1.0))  # there may be none
 
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
