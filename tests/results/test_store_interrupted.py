@@ -51,7 +51,7 @@ except StorageError as error:
 
 def test_killed_in_the_middle_of_writing(tmp_path, old):
     process = python(ENDLESS, folder=tmp_path)
-    assert process.stdout.readline() == "writing\n"
+    assert process.stdout.readline() == "writing\n", process.communicate()[1]
     process.kill()
     process.communicate()
     assert (tmp_path / "r.h5").read_bytes() == old
