@@ -73,10 +73,10 @@ def steps(
                 return Stop(solver.t, solver.y, done, failed=True)
             before, ahead = ahead, [event(solver.t, solver.y) for event in events]
             inside, stop = None, Stop(solver.t, solver.y)
-            if any(was >= 0 >= now for was, now in zip(before, ahead, strict=True)):
+            distances = zip(events, before, ahead, strict=True)
+            if crossed := [event for event, was, now in distances if was >= 0 >= now]:
                 inside = solver.dense_output()
-                crossed = zip(events, before, ahead, strict=True)
-                stop = _first([event for event, was, now in crossed if was >= 0 >= now], inside, solver)
+                stop = _first(crossed, inside, solver)
             first, done = done, int(times.searchsorted(stop.time, "right"))
             states = None if first == done else (inside or solver.dense_output())(times[first:done]).T
         if states is not None:  # outside of errstate, which the receiver of the samples must not inherit

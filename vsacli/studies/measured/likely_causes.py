@@ -219,9 +219,9 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
 def _gain_is_off(agreement: Agreement, gear_ratio: float) -> bool:
     """Return whether a gain surely differs from 1, without a likely mistake as the cause."""
     size = abs(agreement.gain)
-    alike = abs(agreement.correlation) >= ALIKE and agreement.follows is None
+    similar = abs(agreement.correlation) >= ALIKE and agreement.follows is None
     off = abs(size - 1) > NOTABLE and abs(size - 1) > SURE * agreement.gain_error  # not if it is NaN
-    return alike and off and _looks(size, gear_ratio) is None
+    return similar and off and _looks(size, gear_ratio) is None
 
 
 def _offset(agreement: Agreement) -> Iterator[str]:
