@@ -18,7 +18,7 @@ from vsacli.cli.main import run
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow cases of a test beyond those that its mark `cases` asks for as exhaustive."""
+    """Mark slow cases of a test as exhaustive beyond the number in its mark `cases`."""
     cases: defaultdict[object, list[pytest.Item]] = defaultdict(list)
     for item in items:
         if item.get_closest_marker("cases") and item.get_closest_marker("slow"):

@@ -177,7 +177,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block_samples", [1, slow(2), 7, slow(50)])
+@pytest.mark.parametrize("block_samples", [1, 2, 7, 50])
 def test_what_is_found_does_not_depend_on_the_blocks(
     block_samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

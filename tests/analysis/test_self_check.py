@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.drives import motion
-from samples.marks import slow
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
@@ -173,7 +172,7 @@ def test_bound_follows_rounding_where_sampling_is_fast():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
-@pytest.mark.parametrize("defect", [slow(1e-2), 1e-6])
+@pytest.mark.parametrize("defect", [1e-2, 1e-6])
 def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: float, monkeypatch):
     spoil_torque(monkeypatch, order, scaled(1 + defect))
     error, bound = ladder(vsa_3r(), fast_recording())

@@ -75,7 +75,7 @@ def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path:
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize("cache", ["relative", slow("/dev/null/cache")])
+@pytest.mark.parametrize("cache", ["relative", "/dev/null/cache"])
 def test_compiled_code_without_a_cache_folder_of_ones_own(cache: str, tmp_path: Path) -> None:
     home = tmp_path / "home"
     home.mkdir()
@@ -127,9 +127,9 @@ NO_TEMPORARY = "folder for temporary files: cannot be used: No usable temporary 
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        slow(COMMANDS["invdyn"], 4, "r.h5: cannot be written: "),
-        slow(COMMANDS["check-feasibility --plot"], 4, NO_TEMPORARY),
-        slow(("new", "trajectory", "--robot", ROBOT), 4, NO_TEMPORARY),
+        (COMMANDS["invdyn"], 4, "r.h5: cannot be written: "),
+        (COMMANDS["check-feasibility --plot"], 4, NO_TEMPORARY),
+        (("new", "trajectory", "--robot", ROBOT), 4, NO_TEMPORARY),
         (("validate", "-"), 4, NO_TEMPORARY),
         pytest.param(
             (*COMMANDS["check-feasibility"], "--engine", "c"), 2, NO_TEMPORARY, marks=needs_compiler

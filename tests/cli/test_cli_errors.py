@@ -190,18 +190,18 @@ CLOSED = "standard output: cannot be written: it is closed\n"
 @pytest.mark.parametrize(
     "arguments",
     [
-        slow("export result.h5"),
+        "export result.h5",
         "info result.h5",
         "info result.h5 --json",
-        slow("info result.h5 --field verdict"),
-        slow("validate result.h5"),
-        slow(f"check-feasibility {ROBOT} move.yaml"),
-        slow("new robot --joints R"),
-        slow("schema robot"),
-        slow("examples"),
-        slow("--help"),
-        slow("--version"),
-        slow("plot --help"),
+        "info result.h5 --field verdict",
+        "validate result.h5",
+        f"check-feasibility {ROBOT} move.yaml",
+        "new robot --joints R",
+        "schema robot",
+        "examples",
+        "--help",
+        "--version",
+        "plot --help",
     ],
 )
 def test_what_a_closed_standard_output_loses_is_told(printing, arguments):

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.marks import slow
 
 from vsacli import load_robot, load_trajectory
 from vsacli.base.flags import LIMITS
@@ -128,9 +127,9 @@ def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
     ("rate", "start", "derivatives", "asked"),
     [
         (500, 0.0, 0, None),
-        slow(963, 1.7e9, 0, None),
-        slow(500, 0.0, 4, None),
-        slow(1000, 0.0, 0, 500),
+        (963, 1.7e9, 0, None),
+        (500, 0.0, 4, None),
+        (1000, 0.0, 0, 500),
     ],
     ids=["record", "963 Hz since 1970", "all derivatives", "with a rate"],
 )

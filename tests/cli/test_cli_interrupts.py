@@ -67,7 +67,7 @@ def target(request, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "target"),
-    [(signal.SIGINT, OLD), slow(signal.SIGTERM, OLD), slow(signal.SIGHUP, None)],
+    [(signal.SIGINT, OLD), (signal.SIGTERM, OLD), (signal.SIGHUP, None)],
     indirect=["target"],
 )
 def test_ended_run_leaves_the_target_and_nothing_else(tmp_path, target, writing, number):

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from samples.command_line import REPOSITORY
-from samples.marks import slow
 
 fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
 
@@ -49,7 +48,7 @@ def _read(terminal: int) -> bytes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", [40, slow(80), slow(200)])
+@pytest.mark.parametrize("columns", [40, 80, 200])
 def test_a_report_is_as_wide_as_its_terminal(columns: int) -> None:
     wrong = (*CHECK, "--set", "stiffness.end=700")
     shown = on_terminal(columns, *wrong)

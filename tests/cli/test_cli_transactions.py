@@ -21,7 +21,7 @@ from samples.catalogs import GENERIC
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, installed
 from samples.disturbed import PATIENCE, Disturbance, Disturber
 from samples.excited import Excitation, excited
-from samples.marks import needs_compiler, slow_but
+from samples.marks import needs_compiler
 
 from vsacli import load_robot
 from vsacli.base.interrupts import ENDING
@@ -215,15 +215,13 @@ def sample(calls: Sequence[str], most: int, draw: random.Random) -> list[int]:
     return sorted(draw.sample(chosen, min(most, len(chosen))))
 
 
-QUICK = {case for case in CASES if case[0] == "new robot"}
-
 TRIED = 1
 """Calls of each task and start, of some twenty to five hundred; all of them take hours."""
 
 
 @pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("case", slow_but(QUICK, CASES), ids=" - ".join)
+@pytest.mark.parametrize("case", CASES, ids=" - ".join)
 def test_all_is_new_or_nothing(stage: MakeStage, case: tuple[str, str]) -> None:
     there = stage(*case)
     draw = random.Random(f"{case}")

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import pytest
 from samples.command_line import REPOSITORY, ROBOT
-from samples.marks import needs_compiler, slow_but
+from samples.marks import needs_compiler
 from samples.wicked import PRINTABLE, UNPRINTABLE, as_yaml, clean
 
 TRAJECTORY = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
@@ -73,7 +73,7 @@ def test_a_description_may_have_lines_but_no_control_characters(vsacli: Any, tmp
 
 @pytest.mark.slow
 @pytest.mark.cases(2)
-@pytest.mark.parametrize("name", slow_but({"break"}, ["escape", "return", "break", "bidirectional", "c1"]))
+@pytest.mark.parametrize("name", ["escape", "return", "break", "bidirectional", "c1"])
 def test_older_results_with_such_names_are_shown_encoded(vsacli: Any, tmp_path: Path, name: str) -> None:
     assert vsacli("invdyn", ROBOT, TRAJECTORY, "-o", "r.h5", "-q").code == 0
     with h5py.File(tmp_path / "r.h5", "r+") as file:

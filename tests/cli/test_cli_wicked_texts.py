@@ -167,7 +167,7 @@ EVERYWHERE = ("shell", "markup", "letters", "long", "unprintable escape")
 
 @pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("kind", slow_but({"shell"}, EVERYWHERE))
+@pytest.mark.parametrize("kind", EVERYWHERE)
 def test_every_command_with_names_and_files_of_a_text(command: Command, work: Path, kind: str) -> None:
     text, stem = TEXTS[kind], stem_of(TEXTS[kind])
     if stem is None:

@@ -175,7 +175,7 @@ def rows_of(kernel: InverseDynamics, samples: int) -> list[FloatArray]:
         (1, None),
         (2, "base"),
         (5, "end_effector"),
-        pytest.param(30, None, marks=pytest.mark.slow),
+        (30, None),
     ],
 )
 def test_code_of_calls_computes_the_same_bit_for_bit(joints: int, frame: str | None, tmp_path: Path):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
-from samples.marks import needs_compiler, slow
+from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
 from vsacli.base.storage import staging_name
@@ -66,9 +66,7 @@ def test_library_is_kept_and_found(folder: Path):
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize(
-    "damage", ["changed", slow("truncated"), slow("without checksum"), "without library"]
-)
+@pytest.mark.parametrize("damage", ["changed", "truncated", "without checksum", "without library"])
 def test_damaged_library_is_never_loaded(folder: Path, damage: str):
     warnings()
     (library,) = folder.rglob(LIBRARY)

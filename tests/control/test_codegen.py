@@ -96,8 +96,8 @@ def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_p
 @pytest.mark.slow
 @pytest.mark.cases(6)
 @needs_compiler
-@pytest.mark.parametrize("path", slow_but(["sliding_anchor_1r"], BUNDLED))
-@pytest.mark.parametrize("precision", slow_but(["float"], ["double", "float"]))
+@pytest.mark.parametrize("path", BUNDLED)
+@pytest.mark.parametrize("precision", ["double", "float"])
 def test_every_bundled_robot_passes_its_own_test_in_both_precisions(
     path: str, precision: str, tmp_path: Path
 ) -> None:

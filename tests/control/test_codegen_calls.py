@@ -9,7 +9,7 @@ import pytest
 from samples.codegen import commands, with_springs
 from samples.generated_code import compiled_robot
 from samples.long_chains import mixed_chain
-from samples.marks import needs_compiler, slow
+from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
 from vsacli.control.codegen import interface
@@ -29,8 +29,8 @@ ROBOTS = {
 
 @pytest.mark.slow
 @pytest.mark.cases(2)
-@pytest.mark.parametrize("name", ["mixed", "cubic", slow("measured"), slow("chain")])
-@pytest.mark.parametrize("precision", ["double", slow("float")])
+@pytest.mark.parametrize("name", ["mixed", "cubic", "measured", "chain"])
+@pytest.mark.parametrize("precision", ["double", "float"])
 def test_they_compute_the_same_bit_for_bit(
     name: str, precision: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from samples.marks import slow
 from samples.plants import with_actuators
 from samples.robots import vsa_3r
 from samples.simulated import error_course, short_motion
@@ -145,7 +144,7 @@ def with_friction(robot: Robot, friction: Friction) -> Robot:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "friction", [SHARP, slow(Friction(coulomb=(3.0, 2.0), width=0.02))], ids=["sharp", "smooth"]
+    "friction", [SHARP, Friction(coulomb=(3.0, 2.0), width=0.02)], ids=["sharp", "smooth"]
 )
 def test_feedforward_follows(friction):
     robot = with_friction(vsa_3r(), friction)

@@ -142,7 +142,7 @@ DRIVES = {
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "kinds",
-    [("antagonistic", "elastic", "rigid"), slow(("rigid", "antagonistic", "elastic"))],
+    [("antagonistic", "elastic", "rigid"), ("rigid", "antagonistic", "elastic")],
     ids=lambda kinds: kinds[0],
 )
 def test_the_full_model_with_friction_follows(kinds):

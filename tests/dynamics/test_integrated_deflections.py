@@ -19,7 +19,7 @@ from samples.deflections import (
     softening,
 )
 from samples.drives import joint_with, springs, with_joint
-from samples.marks import slow, slow_but
+from samples.marks import slow_but
 from samples.shipped import shipped_run
 
 from vsacli import Trajectory, inverse_dynamics
@@ -137,7 +137,7 @@ def test_long_recording_drifts_a_little(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), slow(800.0 + 1e-4)])
+@pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), 800.0 + 1e-4])
 def test_passing_closely_by_goes_on(floor: float):
     trajectory = dipping(floor)
     result = integrated(ARM, trajectory)

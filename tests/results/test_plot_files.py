@@ -11,7 +11,6 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 from samples.figures import rest_to_rest
-from samples.marks import slow_but
 from samples.results import random_block, write_result
 
 from vsacli.base.errors import StorageError
@@ -24,7 +23,7 @@ def motion() -> dict[str, Figure]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file_format", slow_but({"png"}, FORMATS))
+@pytest.mark.parametrize("file_format", FORMATS)
 def test_equal_results_give_equal_files(file_format: str, tmp_path: Path) -> None:
     first = save_figures(motion(), tmp_path / "first", "run", file_format)
     with matplotlib.rc_context({"svg.hashsalt": "another", "lines.linewidth": 9, "axes.facecolor": "red"}):

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from samples.figures import rest_to_rest, without
-from samples.marks import slow
 
 from vsacli.base.errors import InputError
 from vsacli.results.charts.figures import RESULT_DRAWINGS, omitted_figures
@@ -195,7 +194,7 @@ def test_revolute_and_prismatic_joints_get_axes_of_their_own() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("joints", [1, 7, slow(20)])
+@pytest.mark.parametrize("joints", [1, 7, 20])
 def test_many_joints_stay_apart(joints: int, tmp_path: Path) -> None:
     figures = plot_stored(rest_to_rest(types="R" * joints))
     shown = [curves(axes) for axes in panels(figures["elastic-torque"])]

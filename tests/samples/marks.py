@@ -24,7 +24,7 @@ def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
 
 
 def spread(items: list[Any], count: int) -> list[Any]:
-    """As many items as are asked for, at equal distances."""
+    """Return `count` items at equal distances, or all if there are fewer."""
     return [items[place * len(items) // count] for place in range(min(count, len(items)))]
 
 

@@ -105,7 +105,7 @@ def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("motor", "duration"),
-    [slow({"max_torque": 60.0}, 1.0), slow({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
+    [({"max_torque": 60.0}, 1.0), ({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
 )
 def test_motor_limit_takes_the_way_that_is_shorter(motor, duration):
     robot, trajectory = changed(BASE, motor=motor), rest_to_rest(duration)

@@ -17,7 +17,6 @@ from samples.fixes import (
     pendulum,
     rest_to_rest,
 )
-from samples.marks import slow
 from samples.robots import vsa_3r
 from scipy.integrate import trapezoid
 
@@ -122,9 +121,7 @@ def test_bounds_too_fast_for_any_spline_are_refused():
 
 @pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize(
-    ("duration", "stiffness"), [slow(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), slow(0.3, 850.0)]
-)
+@pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), (0.3, 850.0)])
 def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, stiffness):
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
     alternatives = fixes(robot, trajectory, MARGIN)

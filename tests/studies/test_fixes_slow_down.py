@@ -19,7 +19,6 @@ from samples.fixes import (
     rest_to_rest,
     smallest_margin,
 )
-from samples.marks import slow
 from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
@@ -63,7 +62,7 @@ def test_a_controller_can_run_what_is_slowed_down(rate):
 
 @pytest.mark.cases(1)
 @pytest.mark.slow
-@pytest.mark.parametrize("duration", [0.5, slow(0.4)])
+@pytest.mark.parametrize("duration", [0.5, 0.4])
 def test_slow_down_agrees_with_a_dense_scan(duration):
     robot = vsa_3r()
     factors = np.arange(1.0, 0.6 / duration, 0.002)

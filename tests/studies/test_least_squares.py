@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from samples.marks import slow
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -88,7 +87,7 @@ def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [blue, slow(low_passed)])
+@pytest.mark.parametrize("noise", [blue, low_passed])
 def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(noise: Noise) -> None:
     """They have nothing at frequency zero but what neighboring frequencies let in."""
     found = fits(noise)

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from samples.fixes import pendulum, rest_to_rest
-from samples.marks import slow
 
 from vsacli import inverse_dynamics, load_trajectory, optimize
 from vsacli.studies.search.cheapest_pace import CheapestPaceSearch
@@ -58,7 +57,7 @@ def cost(robot, trajectory, criterion, pace):
 
 @pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("criterion", ["torque", slow("energy"), slow("peak")])
+@pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
 def test_no_pace_of_a_dense_family_is_better(swing, criterion):
     """Slower at the ends than between, or the other way; the grid is refined about its best four times."""
     free, s = SplineSpace.free(SPAN, 2).of_mean(1.0), np.linspace(*SPAN, 100)

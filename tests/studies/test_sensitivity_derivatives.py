@@ -182,7 +182,7 @@ def check_actuator(actuator, demand):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", slow_but(["cubic", "exponential", "table"], SPRINGS))
+@pytest.mark.parametrize("law", SPRINGS)
 def test_pairs_by_every_number(law):
     (first, _), (second, _) = SPRINGS[law]
     pair = Antagonistic(motor=MOTORS, spring=(first, second))
