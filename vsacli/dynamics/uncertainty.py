@@ -8,20 +8,21 @@ standard deviation to both sides, computed as one batch of samples by the kernel
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.reach import margin
-from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, of_joint
 from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
-from vsacli.base.variables import UNCERTAIN, Block
+from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
-from vsacli.dynamics.inverse import COMPUTED, block_of, usual_block
+from vsacli.dynamics.drive import drive
+from vsacli.dynamics.inverse import COMPUTED, block_of, command_of, elastic_torques, usual_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
@@ -36,6 +37,10 @@ MARGIN = "margin"
 PROBES_OF_A_KNOT, FEWEST_PROBES, MOST_PROBES = 4, 2048, 32768
 """Numbers of times at which deviations are computed. Each costs about thirty samples of a run with three
 joints, and seventy with seven. Between knots of the fits, deviations change as slowly as the motion does."""
+
+
+_COMPUTED = [name for name in COMPUTED if name in UNCERTAIN and name not in orders_of_derivation()]
+"""Variables with a deviation that follow from signals."""
 
 
 class Uncertainty:
@@ -60,9 +65,7 @@ class Uncertainty:
         """
         estimates = trajectory.estimates
         self._start, self._elapsed = trajectory.start, probed_times(trajectory)
-        components = sum(estimate.fit.components for estimate in estimates.values())
-        # each component has at most five orders, each shifted to both sides
-        batch = max(1, usual_block(len(robot.joints)) // (10 * components))
+        batch = times_at_once(robot, estimates)
         parts: list[Deviations] = []
         for start in range(0, len(self._elapsed), batch):
             elapsed = self._elapsed[start : start + batch]
@@ -85,6 +88,13 @@ class Uncertainty:
                 row[:] = np.interp(time - self._start, self._elapsed[exists], column[exists])
         found[np.isinf(found)] = np.nan
         return np.moveaxis(found.reshape(*known.shape[1:], len(time)), -1, 0)
+
+
+def times_at_once(robot: Robot, estimates: Mapping[Signal, SampledProfile]) -> int:
+    """Return the number of times whose deviations are computed as one block."""
+    components = sum(estimate.fit.components for estimate in estimates.values())
+    # each component has at most five orders, each shifted to both sides
+    return max(1, usual_block(len(robot.joints)) // (10 * components))
 
 
 def probed_times(trajectory: Trajectory) -> FloatArray:
@@ -139,6 +149,68 @@ def deviations(
         covariances: Their covariances, (components, orders, orders, times), as in `SampledProfile`.
         engine: Backend.
     """
+    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
+    frame = None if motion.wrench is None else motion.wrench.frame
+    kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
+
+    def variables(shifted: Motion) -> dict[str, AnyArray]:
+        block = block_of(kernel, shifted, engine)
+        gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
+        return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
+
+    computed = _propagated(variables, motion, estimates, covariances)
+    given = _given(robot, estimates, covariances)
+    return Deviations(computed.deviations | given.deviations, computed.unstated | given.unstated)
+
+
+def deviations_of_joint(
+    robot: Robot,
+    index: int,
+    motion: Motion,
+    estimates: Mapping[Signal, SampledProfile],
+    covariances: Mapping[Signal, FloatArray],
+) -> Deviations:
+    """Return the deviations of one joint, (times,) or (2, times), which take a fraction of the time of all.
+
+    Args:
+        robot: Robot.
+        index: Index of the joint.
+        motion: Motion at some times.
+        estimates: Signals that were recorded.
+        covariances: Their covariances, as in `deviations`.
+
+    Returns:
+        The values that `deviations` has for the joint, except that of `MARGIN`.
+    """
+    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
+
+    def variables(shifted: Motion) -> dict[str, AnyArray]:
+        command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
+        found = {**command.arrays(), **drive(undamped.joints[index], command)}
+        return {name: found[name].T[:, None] for name in _COMPUTED}
+
+    computed = _propagated(variables, motion, estimates, covariances)
+    given = _given(robot, estimates, covariances)
+    return Deviations(
+        {**of_joint(computed.deviations, 0), **of_joint(given.deviations, index)},
+        {
+            **{name: row[0] for name, row in computed.unstated.items()},
+            **{name: row[index] for name, row in given.unstated.items()},
+        },
+    )
+
+
+_Variables = Callable[[Motion], Mapping[str, AnyArray]]
+"""Function that computes variables along a motion, by name, each (times, joints[, 2])."""
+
+
+def _propagated(
+    variables: _Variables,
+    motion: Motion,
+    estimates: Mapping[Signal, SampledProfile],
+    covariances: Mapping[Signal, FloatArray],
+) -> Deviations:
+    """Return the deviations of variables that are computed from recorded signals."""
     # A gradient has a row for each shift: signals in order, then components, then orders.
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
@@ -147,7 +219,7 @@ def deviations(
         for component, rows in enumerate(spread)
         for name, row in zip(signal.names, rows, strict=True)
     ]
-    values, gradients = _values_and_gradients(robot, motion, shifts, engine)
+    values, gradients = _values_and_gradients(variables, motion, shifts)
     found, unstated = {}, {}
     hidden = np.array([not shift.stated for shift in shifts])
     for name, value in values.items():
@@ -159,8 +231,16 @@ def deviations(
             first += len(gradient)
         spread = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
         found[name] = np.where(np.isnan(value), np.nan, np.nan_to_num(spread, nan=np.inf, posinf=np.inf))
-    for signal, spread in spreads.items():
-        for name, rows in zip(signal.names, np.moveaxis(spread, 1, 0), strict=True):
+    return Deviations(found, unstated)
+
+
+def _given(
+    robot: Robot, estimates: Mapping[Signal, SampledProfile], covariances: Mapping[Signal, FloatArray]
+) -> Deviations:
+    """Return the deviations of the recorded signals themselves, and of their derivatives."""
+    found, unstated = {}, {}
+    for signal, covariance in covariances.items():
+        for name, rows in zip(signal.names, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
             if name in estimates[signal].estimated:
                 rows[_ignored(robot, signal)] = np.nan
                 found[name], unstated[name] = rows.T, ~estimates[signal].stated
@@ -187,15 +267,11 @@ def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
 
 
 def _values_and_gradients(
-    robot: Robot, motion: Motion, shifts: Sequence[_Shift], engine: Engine
+    variables: _Variables, motion: Motion, shifts: Sequence[_Shift]
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
-    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
-    frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
-    shifted = block_of(kernel, _shifted(motion, shifts), engine)
     values, gradients = {}, {}
-    for name, array in _uncertain(shifted).items():
+    for name, array in variables(_shifted(motion, shifts)).items():
         every = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
         values[name], ahead, behind = every[0], every[1::2], every[2::2]
         one_sided = np.where(np.isnan(ahead), every[0] - behind, ahead - every[0])
@@ -225,13 +301,6 @@ def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
     if wrench is not None:
         wrench = Wrench(*(rows[name] for name in WRENCH_NAMES), frame=wrench.frame)
     return Motion.of(np.tile(times, 1 + 2 * len(shifts)), rows, wrench)
-
-
-def _uncertain(block: Block) -> dict[str, AnyArray]:
-    """Return the variables of a block that follow from signals."""
-    given = orders_of_derivation()
-    computed = {name: getattr(block, name) for name in COMPUTED if name in UNCERTAIN and name not in given}
-    return {**computed, MARGIN: margin(block.stiffness, block.stiffness_min, block.stiffness_max)}
 
 
 def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:

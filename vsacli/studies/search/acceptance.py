@@ -1,7 +1,7 @@
 """The constraints of every search: margin and limits at each sample, judged exactly as a run judges them.
 
-`Acceptance` is the rule, `RecordedLimits` its allowance for the noise of recordings. `admissible_stiffness`
-is the range that margin, stiffness limits and deflection limits leave to a joint.
+`Acceptance` is the rule. `admissible_stiffness` is the range that margin, stiffness limits and deflection
+limits leave to a joint.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -18,19 +17,16 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import OfJoint, margin
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
-from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, of_joint
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray
 from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag, has
-from vsacli.base.signals import STIFFNESS, Signal
-from vsacli.base.variables import deviation
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block, usual_block
-from vsacli.dynamics.limits import limit_checks, limit_flags, open_steps
-from vsacli.dynamics.uncertainty import deviations, probed_times
+from vsacli.dynamics.limits import limit_checks, limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.loads import Instants, Load, TaskSamples, evenly_chosen, joined
-from vsacli.trajectory.recorded.samples import SampledProfile
+from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
 
 RESERVED = ("dq", "dtheta", "tau_motor", "current", "voltage")
@@ -270,110 +266,6 @@ def apart(value: float, bound: float) -> tuple[str, str]:
 def stiffness_text(joint: Joint, value: float) -> str:
     """Return a stiffness with its unit, as text."""
     return f"{value:.6g} {units.STIFFNESS.unit(joint.type)}"
-
-
-SAME_STIFFNESS = 1e-9
-"""Relative difference up to which stiffnesses are equal but for rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedLimits:
-    """The allowance for uncertain recorded signals in the check of limits, at any timing and stiffness.
-
-    A run computes standard deviations at probed times and interpolates them linearly. The same times are used
-    here, so that search and run agree on every sample; deviations that cannot change the result are skipped.
-
-    Attributes:
-        trajectory: unchanged motion of the task.
-    """
-
-    trajectory: Trajectory
-
-    def flags(
-        self,
-        robot: Robot,
-        joint: Joint,
-        values: OfJoint,
-        instants: Instants,
-        asked: BoolArray | bool = True,
-    ) -> FlagArray:
-        """Return the flags of one joint, (samples,), with only the limits that are certainly exceeded.
-
-        Args:
-            robot: robot of the task.
-            joint: joint of the robot, perhaps on the other branch.
-            values: variables of the joint, with `flags` that ignore the uncertainty.
-            instants: times of the samples in the task.
-            asked: mask of the samples, (samples,), whose flags allow for the uncertainty.
-        """
-        flags: FlagArray = np.array(values["flags"])
-        if not self._estimates:
-            return flags
-        steps = np.flatnonzero(open_steps(joint, values) & asked)
-        if steps.size:
-            rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
-            uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
-            flags[steps] &= ~FLAG_TYPE(LIMITS)
-            flags[steps] = limit_flags(joint, {**rows, **uncertain}, flags[steps])
-        return flags
-
-    @cached_property
-    def _estimates(self) -> dict[Signal, SampledProfile]:
-        return self.trajectory.estimates
-
-    @cached_property
-    def _probed(self) -> FloatArray:
-        return probed_times(self.trajectory)
-
-    def _deviations(
-        self, robot: Robot, joint: Joint, stiffness: FloatArray | None, instants: Instants
-    ) -> dict[str, AnyArray]:
-        """Return standard deviations of the variables of a joint, (samples,) or (2, samples), by name.
-
-        They are NaN where the uncertainty cannot be stated.
-        """
-        elapsed = instants.time - self.trajectory.start
-        before = np.clip(np.searchsorted(self._probed, elapsed) - 1, 0, len(self._probed) - 2)
-        first, last = self._probed[before], self._probed[before + 1]
-        share = (elapsed - first) / (last - first)
-        index = robot.joint_names.index(joint.name)
-        joints = (*robot.joints[:index], joint, *robot.joints[index + 1 :])
-        change = self._change(index, joint, stiffness, instants)
-        # both ends in one call, which costs more than many times
-        both = (np.concatenate(pair) for pair in ((first, last), (instants.factor,) * 2, (change,) * 2))
-        probed = self._probe(replace(robot, joints=joints), index, *both)
-        ends = {name: np.split(array, 2, axis=-1) for name, array in probed.items()}
-        return {name: (1 - share) * begin + share * end for name, (begin, end) in ends.items()}
-
-    def _change(
-        self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants
-    ) -> FloatArray:
-        """Return the deviation of a joint's stiffness from the command, (samples,), without rounding."""
-        if stiffness is None or STIFFNESS.key not in joint.commanded:
-            return np.zeros(len(instants.time))
-        asked = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]
-        return np.where(np.abs(stiffness - asked) > SAME_STIFFNESS * asked, stiffness - asked, 0.0)
-
-    def _probe(
-        self, robot: Robot, index: int, elapsed: FloatArray, factor: FloatArray, change: FloatArray
-    ) -> dict[str, AnyArray]:
-        """Return standard deviations of one joint at times of the task, slowed down and with a change."""
-        motion = self.trajectory.at(self.trajectory.start + elapsed)
-        motion = motion.mapped(motion.time, lambda array, order: array / factor[:, None] ** order)
-        motion.commanded[STIFFNESS.key][:, index] += change
-        covariances = {}
-        for signal, estimate in self._estimates.items():
-            covariance = estimate.covariance(elapsed)
-            if signal is STIFFNESS:  # with an addition, stiffness is a command and no longer a recording
-                covariance[index][..., change != 0] = 0.0
-            orders = np.arange(signal.orders)
-            covariances[signal] = covariance / factor ** np.add.outer(orders, orders)[..., None]
-        found = deviations(robot, motion, self._estimates, covariances)
-        known = {
-            deviation(name): np.where(found.unstated[name], np.nan, array)
-            for name, array in found.deviations.items()
-        }
-        return of_joint(known, index)
 
 
 BISECTIONS = 50

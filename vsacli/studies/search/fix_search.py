@@ -23,10 +23,11 @@ from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmi
 from vsacli.dynamics.inverse import fitted
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, RecordedLimits, Trouble, apart
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Trouble, apart
 from vsacli.studies.search.combined import CombinedSearch
 from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible, rounded
 from vsacli.studies.search.loads import Load
+from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
     lowest_offset,
