@@ -93,6 +93,22 @@ def test_deviations_are_those_of_drawn_errors(robot, exerted):
             np.testing.assert_allclose(stated, expected, rtol=0.025, atol=0, err_msg=f"{name} at {time}")
 
 
+def test_the_deviations_of_one_joint_are_those_that_all_joints_have():
+    robot = with_actuators(random_robot("RPRRRPR", 3), {1: elastic(), 2: rigid()})
+    trajectory = blurred(len(robot.joints), exerted=True)
+    motion, estimates = trajectory.at(TIMES), trajectory.estimates
+    covariances = {signal: each.covariance(TIMES) for signal, each in estimates.items()}
+    of_all = uncertainty.deviations(robot, motion, estimates, covariances)
+    for index in range(len(robot.joints)):
+        found = uncertainty.deviations_of_joint(robot, index, motion, estimates, covariances)
+        assert set(of_all.deviations) - set(found.deviations) == {MARGIN, *WRENCH_NAMES}
+        for name, array in found.deviations.items():
+            expected = of_all.deviations[name][:, index].T
+            # sums of fewer terms in another order
+            np.testing.assert_allclose(array, expected, rtol=1e-11, err_msg=f"{name} of joint {index}")
+            assert (found.unstated[name] == of_all.unstated[name][index]).all()
+
+
 def test_what_is_given_has_no_deviation_and_counts_as_exact():
     alone = np.zeros((3, 5, 5))
     alone[1, 0, 0] = 1e-8  # of the second joint's position; all else is given

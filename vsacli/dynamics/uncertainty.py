@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, of_joint
-from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
+from vsacli.base.signals import COMMANDED, WRENCH, Signal, orders_of_derivation
 from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
@@ -158,7 +158,8 @@ def deviations(
         gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
         return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
 
-    computed = _propagated(variables, motion, estimates, covariances)
+    components = {signal: range(len(covariance)) for signal, covariance in covariances.items()}
+    computed = _propagated(variables, motion, estimates, covariances, components)
     given = _given(robot, estimates, covariances)
     return Deviations(computed.deviations | given.deviations, computed.unstated | given.unstated)
 
@@ -189,8 +190,13 @@ def deviations_of_joint(
         found = {**command.arrays(), **drive(undamped.joints[index], command)}
         return {name: found[name].T[:, None] for name in _COMPUTED}
 
-    computed = _propagated(variables, motion, estimates, covariances)
-    given = _given(robot, estimates, covariances)
+    components = {  # what other joints are commanded beside their motion has no effect on this one
+        signal: [index] if signal.key in COMMANDED else range(len(covariance))
+        for signal, covariance in covariances.items()
+    }
+    computed = _propagated(variables, motion, estimates, covariances, components)
+    of_joints = {signal: each for signal, each in covariances.items() if signal is not WRENCH}
+    given = _given(robot, estimates, of_joints)
     return Deviations(
         {**of_joint(computed.deviations, 0), **of_joint(given.deviations, index)},
         {
@@ -209,14 +215,16 @@ def _propagated(
     motion: Motion,
     estimates: Mapping[Signal, SampledProfile],
     covariances: Mapping[Signal, FloatArray],
+    components: Mapping[Signal, Sequence[int]],
 ) -> Deviations:
-    """Return the deviations of variables that are computed from recorded signals."""
+    """Return the deviations of variables that are computed from some components of recorded signals."""
     # A gradient has a row for each shift: signals in order, then components, then orders.
+    covariances = {signal: covariances[signal][list(several)] for signal, several in components.items()}
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
         _Shift(name, component, bool(estimates[signal].stated[component]), row)
         for signal, spread in spreads.items()
-        for component, rows in enumerate(spread)
+        for component, rows in zip(components[signal], spread, strict=True)
         for name, row in zip(signal.names, rows, strict=True)
     ]
     values, gradients = _values_and_gradients(variables, motion, shifts)
