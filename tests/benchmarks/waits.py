@@ -18,6 +18,8 @@ from commands import VSACLI, Taken, taken
 from growth import chain_documents
 from subjects import PAPER, ROBOTS, SEVEN_JOINTS, TRAJECTORIES
 
+from vsacli import load_robot, load_trajectory
+
 EXPORTED = 1_200_000
 """Samples of the table that is written as CSV."""
 
@@ -25,6 +27,10 @@ RECORDED = 10.0
 """Duration of the recordings, s."""
 
 ONE_JOINT = ROBOTS / "maccepa_1r.yaml", TRAJECTORIES / "maccepa_1r.yaml"
+
+SEVEN_MIXED = ROBOTS / "panda_7r.yaml", TRAJECTORIES / "panda_7r.yaml"
+HURRIED = 0.45
+"""Share of its duration in which a recorded motion of that arm exceeds the torque limit of one motor."""
 
 LINEARIZED = ("--controller", "feedback-linearization")
 
@@ -74,6 +80,10 @@ def _lines(folder: Path) -> Iterator[tuple[str, Line]]:
     yield "optimize, one joint", _command("optimize", *ONE_JOINT)
     soft = (*PAPER, "--set", "stiffness.end=790")
     yield "fixes, 3R below its minimum stiffness", _command("check-feasibility", *soft, "--fixes")
+    yield (
+        "fixes, recorded 7R beyond a torque limit",
+        _command("check-feasibility", *_hurried(folder), "--fixes"),
+    )
     yield from _chains(folder, run)
     yield from _recordings(folder, run)
     yield from _exports(folder)
@@ -98,6 +108,24 @@ def _recordings(folder: Path, run: Callable[..., Line]) -> Iterator[tuple[str, L
         header = "time [s],elbow.q [rad],elbow.stiffness [N m/rad]"
         np.savetxt(path, table, "%.9g", ",", header=header, comments="")
         yield f"a recording of 10 s, {name}", run("invdyn", ONE_JOINT[0], path)
+
+
+def _hurried(folder: Path) -> tuple[Path, Path]:
+    """Return a robot, and a file of its motion in steps of an encoder, faster than its motors can follow."""
+    robot = load_robot(SEVEN_MIXED[0])
+    trajectory = load_trajectory(SEVEN_MIXED[1], robot)
+    motion = trajectory.block(0, trajectory.samples)
+    signals = {"q": np.round(motion.q / 1e-5) * 1e-5, "stiffness": motion.commanded["stiffness"]}
+    columns = [
+        (f"{joint.name}.{name}", values[:, index])
+        for name, values in signals.items()
+        for index, joint in enumerate(robot.joints)
+        if name == "q" or name in joint.commanded
+    ]
+    names, values = zip(("time", HURRIED * motion.time), *columns, strict=True)
+    path = folder / "hurried.csv"
+    np.savetxt(path, np.column_stack(values), "%.9g", ",", header=",".join(names), comments="")
+    return SEVEN_MIXED[0], path
 
 
 def _exports(folder: Path) -> Iterator[tuple[str, Line]]:
