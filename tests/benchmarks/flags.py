@@ -1,7 +1,8 @@
 """Print whether engines agree on flags: `python tests/benchmarks/flags.py`, on a million random demands.
 
-Of every robot in `robots/`, with steps of all kinds: feasible, at the edge of the corridor, beyond it. Flags
-may differ where a step lies within rounding of a threshold. It compiles each robot, which takes minutes once.
+Of every robot in `robots/`, with samples of all kinds: feasible, at an end of the attainable range, beyond it.
+Flags may differ where a sample lies within rounding of a threshold. It compiles each robot, which takes minutes
+once.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def rows(total: int) -> Iterator[list[str]]:
 
 
 def _is_robot(path: Path) -> bool:
-    """Whether inverse dynamics asks nothing but a motion and a stiffness of it."""
+    """Return whether a file is a robot whose inverse dynamics needs only a motion and a stiffness."""
     if "vsacli-robot/" not in path.read_text(encoding="utf-8"):
         return False
     return not any(joint.damper for joint in load_robot(path).joints)
