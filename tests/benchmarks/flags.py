@@ -1,8 +1,8 @@
 """Print whether engines agree on flags: `python tests/benchmarks/flags.py`, on a million random demands.
 
-Of every robot in `robots/`, with samples of all kinds: feasible, at an end of the attainable range, beyond it.
-Flags may differ where a sample lies within rounding of a threshold. It compiles each robot, which takes minutes
-once.
+Of every robot in `robots/`, with samples of all kinds: feasible, at an end of the attainable range, beyond.
+Flags may differ where a sample lies within rounding of a threshold. It compiles each robot, which takes
+minutes once.
 """
 
 from __future__ import annotations
