@@ -61,9 +61,11 @@ def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
     assert not any(block.flags.any() for block in others)
 
 
-def test_memory_does_not_grow_with_the_duration():
+def test_memory_does_not_grow_with_the_duration(monkeypatch):
+    monkeypatch.setattr(history, "BLOCK", 512)
+
     def peak(duration: float) -> int:
-        motion = short_motion(3, duration=duration, rate=8000)
+        motion = short_motion(3, duration=duration, rate=4000)
         run = SimulationRun(vsa_3r(), motion, engine="numpy")
         tracemalloc.start()
         try:
@@ -72,10 +74,10 @@ def test_memory_does_not_grow_with_the_duration():
         finally:
             tracemalloc.stop()
 
-    peak(0.5)  # what is loaded once
-    short, long = peak(1), peak(3)
+    peak(0.05)  # what is loaded once
+    short, long = peak(0.2), peak(0.6)
     stored = 3.6e3  # bytes of a sample of this robot
-    assert long - short < 0.02 * stored * 2 * 8000
+    assert long - short < 0.02 * stored * 0.4 * 4000
 
 
 def test_a_wrong_condition_is_found_before_the_first_block():

@@ -42,7 +42,7 @@ def test_everything_that_comes_along_is_valid(vsacli: Any) -> None:
     assert (done.code, done.err) == (0, "")
     assert done.out.count(": ok, robot ") == len(ROBOTS)
     assert done.out.count(": ok, trajectory ") == len(TRAJECTORIES)
-    assert vsacli("validate", *ROBOTS, "-q").out == ""
+    assert vsacli("validate", *ROBOTS[:3], "-q").out == ""
 
 
 @pytest.mark.parametrize("path", TRAJECTORIES, ids=lambda path: path.stem)

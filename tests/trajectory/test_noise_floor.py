@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
+from samples.marks import slow_but
 from samples.random_recordings import draw
 
 from vsacli.trajectory.fits import resolution
@@ -59,13 +62,14 @@ def test_noise_alone_needs_no_fine_resolution(noise: np.ndarray, monkeypatch: py
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 
 
-@pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
-@pytest.mark.parametrize("noise", ["white", pytest.param("random walk", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("noise", "name"), slow_but([("white", "vibration")], product(["white", "random walk"], MOTIONS))
+)
 def test_what_is_resolved_is_the_same_without_an_early_end(
-    motion: np.ndarray, noise: str, monkeypatch: pytest.MonkeyPatch
+    noise: str, name: str, monkeypatch: pytest.MonkeyPatch
 ):
     step = 0.05 if noise == "random walk" else 1.0
-    row = normal(10 * motion + step * NOISES[noise])
+    row = normal(10 * MOTIONS[name] + step * NOISES[noise])
     early = find_resolution(TIME, row, 7, 4, KnownNoise())
     monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
     late = find_resolution(TIME, row, 7, 4, KnownNoise())
