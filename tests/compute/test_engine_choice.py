@@ -203,6 +203,7 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
     assert choice._repays(Code("", 100_000, (500,) * 200), 1_000_000)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_measured_springs_are_left_to_numpy_until_tracing_repays():
     """48,000 to 96,000 samples take NumPy 0.1 to 0.2 s, and tracing alone 0.2 s, compiled before or not."""

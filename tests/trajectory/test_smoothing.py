@@ -48,7 +48,13 @@ def alarmed(fit):
     return known is not None and bool(not known.determined or known.lines.others)
 
 
-@pytest.mark.parametrize("color", ["white, 1e-4 rad", "12-bit encoder", *list(COLORS)[5:9:3], "hum of 50 Hz"])
+@pytest.mark.parametrize(
+    "color",
+    slow_but(
+        ["white, 1e-4 rad", "hum of 50 Hz"],
+        ["white, 1e-4 rad", "12-bit encoder", *list(COLORS)[5:9:3], "hum of 50 Hz"],
+    ),
+)
 def test_sines_with_noise_of_any_color(color):
     of = record(sines, color, 0)
     for method in (SMOOTH, None):
