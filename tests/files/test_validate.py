@@ -12,10 +12,10 @@ import h5py
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
+from samples.shipped import EXAMPLES
 
 from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
-from vsacli.files.examples import examples
 from vsacli.files.file_kinds import FileKind, recognize
 from vsacli.files.limits_of_motion import unattainable
 from vsacli.files.placeholder_robot import placeholder_robot
@@ -303,7 +303,7 @@ def test_a_motion_beyond_its_robot_is_noted(vsacli: Any, tmp_path: Path) -> None
     ]
 
 
-@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_nothing_is_noted_of_bundled_motions(example: Any) -> None:
     for each in example.trajectories:
         assert list(unattainable(example.robot, load_trajectory(each.path, example.robot))) == []

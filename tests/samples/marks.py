@@ -20,7 +20,7 @@ def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
     """All cases, of which only some are quick."""
     whole = list(cases)
     assert set(quick) <= set(whole)
-    return [case if case in quick else slow(*case) if type(case) is tuple else slow(case) for case in whole]
+    return [case if case in quick else slow(case) for case in whole]
 
 
 def spread(items: list[Any], count: int) -> list[Any]:

@@ -63,11 +63,12 @@ def test_noise_alone_needs_no_fine_resolution(noise: np.ndarray, monkeypatch: py
 
 
 @pytest.mark.parametrize(
-    ("noise", "name"), slow_but([("white", "vibration")], product(["white", "random walk"], MOTIONS))
+    "case", slow_but([("white", "vibration")], product(["white", "random walk"], MOTIONS)), ids=" - ".join
 )
 def test_what_is_resolved_is_the_same_without_an_early_end(
-    noise: str, name: str, monkeypatch: pytest.MonkeyPatch
+    case: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ):
+    noise, name = case
     step = 0.05 if noise == "random walk" else 1.0
     row = normal(10 * MOTIONS[name] + step * NOISES[noise])
     early = find_resolution(TIME, row, 7, 4, KnownNoise())
