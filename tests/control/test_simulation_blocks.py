@@ -7,6 +7,7 @@ from collections import deque
 
 import numpy as np
 import pytest
+from samples.marks import slow_but
 from samples.robots import vsa_3r
 from samples.simulated import short_motion
 
@@ -37,8 +38,11 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("conditions", CASES.values(), ids=CASES)
-def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, conditions):
+@pytest.mark.parametrize(
+    "case", slow_but({"feedforward", "linearized", "measured", "another method", "budget for nothing"}, CASES)
+)
+def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
+    conditions = CASES[case]
     whole = simulate(vsa_3r(), short_motion(3), engine="numpy", **conditions)
     monkeypatch.setattr(history, "BLOCK", 7)
     monkeypatch.setattr(sensors, "DRAWN", 5)

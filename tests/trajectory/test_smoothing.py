@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from samples.marks import slow_but
+from samples.marks import slow, slow_but
 from samples.noisy_records import (
     COLORS,
     FILTERED,
@@ -65,7 +65,7 @@ def test_sines_with_noise_of_any_color(color):
         assert not alarmed(fit)
 
 
-@pytest.mark.parametrize("rate", [100, 1000])
+@pytest.mark.parametrize("rate", [100, slow(1000)])
 @pytest.mark.parametrize("motion", MOTIONS.values())
 def test_clean_samples_are_interpolated_in_silence(motion, rate):
     time = np.arange(10 * rate + 1) / rate
