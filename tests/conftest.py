@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import signal
 from collections import defaultdict
@@ -28,6 +29,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in found:
             if item not in kept:
                 item.add_marker("exhaustive")
+
+
+def pytest_collection_finish() -> None:
+    """Exclude what has been imported and collected from garbage collections: it stays to the end."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,16 +9,12 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
-
-import vsacli
+from samples.sources import PACKAGE, SOURCES, contents
 
 REPOSITORY = Path(__file__).parents[1]
-PACKAGE = Path(vsacli.__file__).parent
 ROW = re.compile(r"^\| `(?P<entry>\w+(?:\.\w+)?)` \| .+ \|$", re.MULTILINE)
 
 HOMES = {
@@ -61,14 +57,11 @@ HEADLESS = re.compile(
 )
 """Words with which no docstring begins: it names its subject, or says what to do."""
 
-TALK = ("print", "sys.stdout", "sys.stderr", "sys.exit", "logging", "warnings.warn")
-
 PAGE = (REPOSITORY / "docs" / "contributing.md").read_text(encoding="utf-8")
 ENTRIES = ROW.findall(PAGE.partition("\n## Packages\n")[2].partition("\n## ")[0])
 """What lies in the package, from the rooms at the bottom to the entrances."""
 
 ROOMS = [entry for entry in ENTRIES if "." not in entry]
-SOURCES = sorted(PACKAGE.rglob("*.py"))
 TESTS = Path(__file__).parent
 
 
@@ -87,25 +80,9 @@ def dotted(source: Path) -> str:
     return ".".join(source.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
 
 
-@cache
-def parsed(source: Path) -> ast.Module:
-    return ast.parse(source.read_text(encoding="utf-8"))
-
-
-def imports(source: Path) -> Iterator[tuple[str, int]]:
-    """Every import of a source file, wherever it stands: the dotted name, and the line."""
-    for node in ast.walk(parsed(source)):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, node.lineno) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{source}:{node.lineno}: relative import"
-            names = [""] if node.module != "vsacli" else [f".{alias.name}" for alias in node.names]
-            yield from ((f"{node.module}{name}", node.lineno) for name in names)
-
-
 def lines_run_at_import(source: Path) -> set[int]:
     """Lines where the statements begin that run when a module is imported."""
-    waiting: list[ast.AST] = [parsed(source)]
+    waiting: list[ast.AST] = [ast.parse(source.read_text(encoding="utf-8"))]
     lines = set()
     while waiting:
         for child in ast.iter_child_nodes(waiting.pop()):
@@ -132,7 +109,7 @@ def test_a_room_imports_only_from_rows_above_its_own() -> None:
     strays = []
     for source in SOURCES:
         room = part_of(source)
-        for name, line in imports(source) if room in ROOMS else ():
+        for name, line in contents(source).imports if room in ROOMS else ():
             library, _, rest = name.partition(".")
             if library == "vsacli":
                 target = rest.partition(".")[0]
@@ -146,7 +123,9 @@ def test_modules_form_no_circle() -> None:
     modules = {dotted(source): source for source in SOURCES}
     graph: dict[str, set[str]] = {}
     for module, source in modules.items():
-        named = {name.removeprefix("vsacli.") for name, _ in imports(source) if name.startswith("vsacli.")}
+        named = {
+            name.removeprefix("vsacli.") for name, _ in contents(source).imports if name.startswith("vsacli.")
+        }
         graph[module] = {name for name in named if name in modules and not is_folder(modules[name])}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError
 
@@ -158,18 +137,8 @@ def test_the_package_grows_only_on_purpose() -> None:
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
 
 
-def docstrings(source: Path) -> Iterator[str]:
-    """Yield the docstrings of modules, classes and functions, and the texts below constants."""
-    for node in ast.walk(parsed(source)):
-        body = getattr(node, "body", [])
-        for statement in body if isinstance(body, list) else []:
-            match statement:
-                case ast.Expr(value=ast.Constant(value=str(text))):
-                    yield text
-
-
 def test_docstrings_begin_with_their_subject() -> None:
-    headless = [text for source in SOURCES for text in docstrings(source) if HEADLESS.match(text)]
+    headless = [text for source in SOURCES for text in contents(source).docstrings if HEADLESS.match(text)]
     assert len(headless) <= MOST_HEADLESS
 
 
@@ -177,7 +146,7 @@ def test_libraries_stay_at_home() -> None:
     strays = [
         f"{source}:{line}: {name}"
         for source in SOURCES
-        for name, line in imports(source)
+        for name, line in contents(source).imports
         if not dotted(source).startswith(HOMES.get(library := name.partition(".")[0], ""))
         or (library == "scipy" and line in lines_run_at_import(source))
     ]
@@ -186,11 +155,10 @@ def test_libraries_stay_at_home() -> None:
 
 def test_only_the_command_line_prints() -> None:
     strays = [
-        f"{source}:{node.lineno}: {ast.unparse(node)}"
+        f"{source}:{line}: {name}"
         for source in SOURCES
         if part_of(source) != "cli"
-        for node in ast.walk(parsed(source))
-        if isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in TALK
+        for name, line in contents(source).talk
     ]
     assert strays == []
 
@@ -258,7 +226,7 @@ def quick_tests(source: Path) -> list[str]:
     """Tests of a file that run without being asked for, some of their cases at least."""
     return [
         node.name
-        for node in parsed(source).body
+        for node in ast.parse(source.read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef)
         and node.name.startswith("test_")
         and "pytest.mark.slow" not in map(ast.unparse, node.decorator_list)
@@ -278,17 +246,17 @@ def test_oracles_know_nothing_of_what_they_judge() -> None:
     strays = [
         f"{source}:{line}: {name}"
         for source in sorted((TESTS / "oracles").glob("*.py"))
-        for name, line in imports(source)
+        for name, line in contents(source).imports
         if name.startswith("vsacli") and name not in known
     ]
     assert strays == []
 
 
 def test_test_files_share_what_lies_in_samples() -> None:
+    of_tests = re.compile(r"^\s*(?:from|import) (?:\.|test_|conftest).*", re.MULTILINE)
     strays = [
-        f"{source}:{line}: {name}"
+        f"{source}: {line}"
         for source in sorted(TESTS.rglob("*.py"))
-        for name, line in imports(source)
-        if name.startswith(("test_", "conftest"))
+        for line in of_tests.findall(source.read_text(encoding="utf-8"))
     ]
     assert strays == []

@@ -44,7 +44,7 @@ LINES = {
     "info": ["info", "arm.yaml", "--robot", ARM],
     "invdyn": ["invdyn", ARM, "arm.yaml", "-o", "numpy.h5"],
     "compiled": ["invdyn", ARM, "arm.yaml", "-o", "c.h5", "--engine", "c"],
-    "plot": ["plot", "numpy.h5", "-o", "figures"],
+    "plot": ["plot", "numpy.h5", "--joints", "elbow", "-o", "figures"],
     "export": ["export", "numpy.h5", "--variables", ",".join(["q", "stiffness", *NAMES]), "-o", "table.csv"],
     "table": ["invdyn", ARM, "table.csv", "-o", "table.h5"],
     "check": ["check-feasibility", ARM, "soft.yaml", "--write-fix", "1", "-o", "fixed.yaml"],

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
-
-import vsacli
+from samples.sources import SOURCES, contents
 
 PAGE = Path(__file__).parents[1] / "docs" / "troubleshooting.md"
 QUOTED = re.compile(r"^\| `([^`]+)` \|", re.MULTILINE)
@@ -20,17 +17,9 @@ MESSAGES = QUOTED.findall(PAGE.read_text(encoding="utf-8"))
 @cache
 def texts() -> str:
     """Every text of the package; within one that is put together, `{}` stands for what differs."""
-    sources = Path(vsacli.__file__).parent.rglob("*.py")
-    return "\n".join(text for source in sources for text in texts_of(source))
-
-
-def texts_of(source: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-        match node:
-            case ast.JoinedStr(values=parts):
-                yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in parts)
-            case ast.Constant(value=str(text)):
-                yield text
+    found = [contents(source) for source in SOURCES]
+    literals = (text for each in found for text, _ in each.literals)
+    return "\n".join((*literals, *(text for each in found for text in (*each.formatted, *each.docstrings))))
 
 
 def test_the_page_has_messages_of_every_kind() -> None:

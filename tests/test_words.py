@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 import click
 import command_pages
 import pytest
+from samples.sources import PACKAGE, SOURCES, contents
 
 from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
@@ -21,7 +21,6 @@ from vsacli.files.file_kinds import DOCUMENTS
 from vsacli.studies.sweeps.columns import KEPT
 
 REPOSITORY = Path(__file__).parents[1]
-PACKAGE = REPOSITORY / "vsacli"
 
 PHRASES = re.compile(
     r"\b("
@@ -125,23 +124,14 @@ def test_declared_words_are_in_standard_terms() -> None:
     assert [phrase for text in texts for phrase in found(text)] == []
 
 
-def literals(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield line and value of each string with a blank that is no docstring."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        match node:
-            case ast.Constant(value=str(text)) if " " in text and id(node) not in docstrings:
-                yield node.lineno, text
-
-
 def test_messages_are_in_standard_terms() -> None:
     assert all(path.is_file() for path in EXEMPT)
     assert [
         f"{path.relative_to(REPOSITORY)}:{line}: {phrase}"
-        for path in sorted(PACKAGE.rglob("*.py"))
+        for path in SOURCES
         if path not in EXEMPT
-        for line, text in literals(path)
+        for text, line in contents(path).literals
+        if " " in text
         for phrase in found(text)
     ] == []
 

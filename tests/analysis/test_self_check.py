@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.drives import motion
+from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
@@ -33,6 +34,8 @@ EXAMPLES = {
     "R-P": ("rp_2", "rp_2"),
 }
 examples = pytest.mark.parametrize("example", EXAMPLES)
+arms = pytest.mark.parametrize("example", slow_but(["3R", "7R", "R-P"], EXAMPLES))
+"""The same, of which each arm is quick once."""
 
 EPS = np.finfo(float).eps
 
@@ -96,7 +99,7 @@ def test_motion_far_too_fast_is_infeasible_but_sound(duration: float):
     assert report.verdict == ("infeasible" if duration < 0.5 else "ok")
 
 
-@pytest.mark.parametrize("seed", [0, 21, 74, 237, 321])
+@pytest.mark.parametrize("seed", slow_but([0, 74], [0, 21, 74, 237, 321]))
 def test_hardly_feasible_motions_pass(seed: int):
     """Some probes fall next to a fold, which the joint passes in a moment; these seeds were looked for."""
     rng = np.random.default_rng(seed)
@@ -231,9 +234,9 @@ def scaled(factor: float) -> Defect:
     return lambda values: values * factor
 
 
-@examples
+@arms
 @pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
-@pytest.mark.parametrize("defect", [1e-2, 1e-6])
+@pytest.mark.parametrize("defect", [slow(1e-2), 1e-6])
 def test_wrong_derivative_of_the_torque_fails(example: str, order: int, defect: float, monkeypatch):
     spoil_torque(monkeypatch, order, scaled(1 + defect))
     report = inverse_dynamics(*load(example)).report
@@ -259,7 +262,7 @@ def test_torque_wrong_for_a_moment_fails(monkeypatch):
     assert not inverse_dynamics(*load("3R")).report.self_check.passed
 
 
-@examples
+@arms
 @pytest.mark.parametrize("name", ["phi", "dphi", "theta", "dtheta", "ddtheta"])
 def test_wrong_motion_of_the_motors_fails(example: str, name: str, monkeypatch):
     spoil_drive(monkeypatch, name, scaled(1 + 1e-6))

@@ -15,7 +15,7 @@ COMPUTED = ("motion", "motor-torque", "elastic-torque", "energy")
 @pytest.fixture
 def log(own_folder: Path) -> Path:
     """A noisy recording of the 3R arm, `log.csv`."""
-    time = np.arange(1001) / 250
+    time = np.arange(401) / 100
     rng = np.random.default_rng(4)
     columns = {"time [s]": time}
     for number, joint in enumerate(("base", "shoulder", "elbow")):
@@ -28,7 +28,7 @@ def log(own_folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("robot", [(), ("--robot", ROBOT)])
+@pytest.mark.parametrize("robot", [(), pytest.param(("--robot", ROBOT), marks=pytest.mark.slow)])
 def test_a_recording_is_drawn(vsacli, log, robot):
     done = vsacli("plot", log.name, *robot, "-o", "drawn", "--format", "svg")
     assert (done.code, done.out, done.err) == (0, "", "wrote drawn/log-recording.svg\n")

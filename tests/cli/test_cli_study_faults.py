@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from samples.marks import slow
 from samples.studies import GRID, HEAD, column, content, study
 
 from vsacli import StorageError
@@ -54,7 +55,7 @@ def kept(path: Path, study_file: str) -> bytes:
     return path.read_bytes()
 
 
-@pytest.mark.parametrize("where", ["checksum", "row", "break"])
+@pytest.mark.parametrize("where", [slow("checksum"), "row", slow("break")])
 def test_a_damaged_row_costs_no_other_one(vsacli: Any, grid_study: str, grid_table: Path, where: str) -> None:
     """A bit that is wrong in the third row, or in the break behind it."""
     journal = Path("study.h5.journal")

@@ -8,7 +8,7 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from samples.command_line import REST_TO_REST, ROBOT
+from samples.command_line import ROBOT, rest_to_rest
 from samples.marks import slow
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result, simulate
@@ -27,7 +27,7 @@ STORED = {
 def computed(tmp_path_factory):
     """A result, `r.h5`, and a simulation, `s.h5`, of the trajectory `move.yaml`; not to be changed."""
     folder = tmp_path_factory.mktemp("computed")
-    shutil.copy(REST_TO_REST, folder / "move.yaml")
+    rest_to_rest(folder / "move.yaml")
     inputs = (str(ROBOT), str(folder / "move.yaml"))
     assert run(["invdyn", *inputs, "-q", "-o", str(folder / "r.h5")]) == 0
     assert run(["simulate", *inputs, "--sensor-noise", "1e-4,0.5", "-q", "-o", str(folder / "s.h5")]) == 0

@@ -203,6 +203,7 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
     assert choice._repays(Code("", 100_000, (500,) * 200), 1_000_000)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_measured_springs_are_left_to_numpy_until_tracing_repays():
     """48,000 to 96,000 samples take NumPy 0.1 to 0.2 s, and tracing alone 0.2 s, compiled before or not."""
@@ -232,19 +233,21 @@ def test_the_choice_is_the_same_again():
     assert [each.name for each in chosen] == ["numpy", "numpy", "c"]
 
 
-def test_long_chains_of_branches_and_loops_share_functions():
-    """Written out, 100 joints took the compiler 13 s, and seven with measured springs 33 s."""
-    inertia, coupling = ((0.1, 0.1),) * 100, (0.0,) * 100
-    chains = {
-        IntervalEnergy(inertia[:10], coupling[:10], rubbing=False): False,
-        IntervalEnergy(inertia, coupling, rubbing=False): True,
-        BalancedDynamics(shipped_robot("measured_1r"), None): False,
-        BalancedDynamics(_chain(shipped_robot("measured_1r"), 3), None): True,
-    }
-    for kernel, shares in chains.items():
-        code = kernel_code(kernel)
-        assert is_of_calls(kernel_program(kernel)) is shares
-        assert code.compiling_seconds < 4
+@pytest.mark.parametrize(("joints", "shares"), [(10, False), (100, True)])
+def test_long_chains_of_branches_share_functions(joints: int, shares: bool):
+    """Written out, 100 joints took the compiler 13 s."""
+    kernel = IntervalEnergy(((0.1, 0.1),) * joints, (0.0,) * joints, rubbing=False)
+    assert is_of_calls(kernel_program(kernel)) is shares
+    assert kernel_code(kernel).compiling_seconds < 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("joints", "shares"), [(1, False), (3, True)])
+def test_chains_of_loops_share_functions(joints: int, shares: bool):
+    """Written out, seven joints with measured springs took the compiler 33 s."""
+    kernel = BalancedDynamics(_chain(shipped_robot("measured_1r"), joints), None)
+    assert is_of_calls(kernel_program(kernel)) is shares
+    assert kernel_code(kernel).compiling_seconds < 4
 
 
 def _chain(robot: Robot, joints: int) -> Robot:

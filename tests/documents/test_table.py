@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vsacli.base.errors import InputError
@@ -324,6 +324,7 @@ def test_reader_agrees_with_plain_python(tmp_path_factory, content):
         np.testing.assert_array_equal(read_table(path).values, expected)
 
 
+@settings(deadline=None)  # files take long on a busy disk
 @given(content=st.binary(max_size=60) | st.text(max_size=60).map(lambda text: ("a,b\n" + text).encode()))
 def test_only_input_errors_escape(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "any.csv"

@@ -16,6 +16,7 @@ from oracles.jets import Jet, Scalar, circle
 from oracles.lagrange import Chain, Link, State
 from oracles.mutants import Mutant, mutants_of
 from oracles.rational import random_chain, random_contact
+from samples.marks import slow, slow_but
 
 from vsacli.compute.vector import SymmetricTensor, Vector
 from vsacli.dynamics import recursion as recursion_module
@@ -28,7 +29,7 @@ contacts = pytest.mark.parametrize(
     [None, random_contact(1, in_base=False), random_contact(2, in_base=True)],
     ids=["free", "contact in the last frame", "contact in the base frame"],
 )
-seeds = pytest.mark.parametrize("seed", [1, 2])
+seeds = pytest.mark.parametrize("seed", [1, slow(2)])
 
 Recursion = Callable[..., Sequence[tuple[Scalar, Scalar, Scalar]]]
 RICHEST_CHAIN = ("RPR", 1)
@@ -39,6 +40,7 @@ RICH_CONTACTS = (random_contact(3, in_base=False), random_contact(4, in_base=Tru
 NO_RATES = ((0, 0, 0), (0, 0, 0))
 
 MUTANTS = mutants_of(recursion_module, "recursion")
+COEFFICIENTS = [mutant for mutant in MUTANTS if mutant.coefficient]
 
 
 def link_constants(link: Link) -> LinkConstants:
@@ -141,15 +143,13 @@ def test_torques_and_derivatives_satisfy_lagranges_equations(types: str, contact
     assert torques(chain, contact) == lagrange_torques(chain, contact)
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.label)
+@pytest.mark.parametrize("mutant", slow_but(MUTANTS[::4], MUTANTS), ids=lambda mutant: mutant.label)
 def test_every_changed_term_contradicts_lagranges_equations(mutant: Mutant) -> None:
     run = mutant.load().recursion
     assert any(torques(chain, contact, run) != expected for chain, contact, expected in richest_cases())
 
 
-@pytest.mark.parametrize(
-    "mutant", [mutant for mutant in MUTANTS if mutant.coefficient], ids=lambda mutant: mutant.label
-)
+@pytest.mark.parametrize("mutant", slow_but(COEFFICIENTS[::3], COEFFICIENTS), ids=lambda mutant: mutant.label)
 def test_every_changed_coefficient_breaks_the_ladder(mutant: Mutant) -> None:
     run = mutant.load().recursion
     assert any(any(ladder_gaps(chain, contact, run)) for chain, contact, _ in richest_cases())

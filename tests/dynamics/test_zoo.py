@@ -13,13 +13,13 @@ from oracles import pinocchio
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.robots import at_rest, random_motion
-from samples.shipped import shipped_robot
+from samples.shipped import EXAMPLES, shipped_robot
 
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import mass_matrix
-from vsacli.files.examples import Example, examples
+from vsacli.files.examples import Example
 from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12
@@ -52,7 +52,7 @@ def urdf(package: str, name: str) -> Path:
     return Path(str(found.locate()))
 
 
-@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_link_torques_are_those_of_pinocchio(example: Example):
     robot = example.robot
     motion = random_motion(robot, 20, seed=4)

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from samples.command_line import contents
 from samples.marks import slow
+from samples.shipped import EXAMPLES
 
 from vsacli import inverse_dynamics, load_trajectory
 from vsacli.base.errors import InputError
 from vsacli.files import examples as module
 from vsacli.files.examples import Example, ExampleTrajectory, examples, opening_comment
 
-EXAMPLES = examples()
 RUNS = [(example, trajectory) for example in EXAMPLES for trajectory in example.trajectories]
 RUN_NAMES = [f"{example.name} {trajectory.name}" for example, trajectory in RUNS]
 QUICK = ("mixed_3r", "tendon_1r")

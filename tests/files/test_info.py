@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest, without_hint
-from samples.marks import slow
+from samples.marks import slow, slow_but
 
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.info.describe import describe_trajectory
@@ -25,6 +25,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
 
 ARM = load_robot(ROBOT)
+NAMES = sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml"))
 SLIDE = load_robot(REPOSITORY / "robots" / "rp_2.yaml")
 G = 9.81
 
@@ -270,7 +271,7 @@ def test_other_kinds_are_refused(vsacli: Any) -> None:
     assert "desk_arm.urdf: is a URDF; make a robot file of it: vsacli import-urdf " in done.err
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml")))
+@pytest.mark.parametrize("name", slow_but(NAMES[::3], NAMES))
 def test_every_robot_that_comes_along_is_described(vsacli: Any, name: str) -> None:
     done = vsacli("info", REPOSITORY / "robots" / f"{name}.yaml")
     assert done.code == 0

@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from oracles import kinematics as oracle
 from samples.command_line import REPOSITORY
 from samples.figures import smallest_stiffness
+from samples.marks import slow_but
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot, shipped_run
 from samples.wrenches import held
@@ -83,7 +84,7 @@ def device(name: str) -> Path:
     return REPOSITORY / "robots" / "devices" / f"{name}.yaml"
 
 
-@bundled
+@pytest.mark.parametrize("file", slow_but(FILES[::4], FILES), ids=lambda file: file.stem)
 def test_the_decoupling_matrix_is_singular_at_ends_of_the_attainable_range_alone(file: Path) -> None:
     for each in bundled_charts(file):
         if not each.commanded:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.command_line import REPOSITORY, edited
+from samples.command_line import REPOSITORY, REST_TO_REST, edited
 from samples.robots import random_joint
+from samples.shipped import shipped_robot
 
-from vsacli import DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot, load_robot
+from vsacli import DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot, load_robot, load_trajectory
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws import Cubic, Exponential, Quadratic
@@ -138,3 +139,15 @@ def test_hostile_numbers_are_judged_without_an_error(tmp_path):
     ):
         path.write_text(text.replace(right, wrong))
         assert load_robot(path).warnings, wrong
+
+
+def test_the_attainable_stiffness_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the rules of the robot, and by those of all its trajectories."""
+    solved = []
+    genuine = Antagonistic.solve
+    monkeypatch.setattr(Antagonistic, "solve", lambda *args: solved.append(args) or genuine(*args))
+    robot = shipped_robot("vsa_3r")
+    assert robot.warnings == ()
+    for _ in range(2):
+        assert load_trajectory(REST_TO_REST, robot).warnings == ()
+    assert len(solved) == 3

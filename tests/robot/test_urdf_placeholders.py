@@ -74,7 +74,7 @@ def test_a_prismatic_joint(tmp_path):
 
 
 @pytest.mark.parametrize("actuator", ACTUATORS)
-@pytest.mark.parametrize("size", [1e-3, 1, 1e3])
+@pytest.mark.parametrize("size", [1e-3, slow(1), 1e3])
 def test_the_desk_arm_of_any_weight_can_move(tmp_path, actuator, size):
     text = SIZED.sub(lambda found: f'{found[1]}="{float(found[2]) * size!r}"', DESK_ARM.read_text())
     path = write(tmp_path / "arm.urdf", text)

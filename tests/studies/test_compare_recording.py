@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import hashlib
 import json
 import math
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from samples.pages import Page
 
 from vsacli import compare
 from vsacli.base.errors import InputError
+from vsacli.cli.main import run
 
 BEGIN = 0.5137
 """Of the result in the recording, s; no multiple of the 2 ms between its rows."""
@@ -29,18 +32,28 @@ stiffness: {type: polynomial, degree: 5, start: 900, end: 1200}
 """
 
 
-@pytest.fixture
-def computed(vsacli, tmp_path):
-    """Columns of a result `r.h5` by name; on a grid of 2 ms, shifted by BEGIN, they make a recording."""
-    (tmp_path / "wave.yaml").write_text(MOTION)
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    """A folder with a result `r.h5`, its inputs, and a table of some of its variables."""
+    folder = tmp_path_factory.mktemp("original")
+    (folder / "wave.yaml").write_text(MOTION)
     edited(
         ROBOT,
-        tmp_path / "robot.yaml",
+        folder / "robot.yaml",
         ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, side: shaft, inertia: 1.28e-3"),
     )
-    assert vsacli("invdyn", "robot.yaml", "wave.yaml", "-o", "r.h5").code == 0
-    printed = vsacli("export", "r.h5", "--variables", "q,theta,tau_motor").out
-    header, *rows = csv.reader(printed.splitlines())
+    with contextlib.chdir(folder):
+        assert run(["invdyn", "robot.yaml", "wave.yaml", "-q", "-o", "r.h5"]) == 0
+        assert run(["export", "r.h5", "--variables", "q,theta,tau_motor", "-o", "r.csv"]) == 0
+    return folder
+
+
+@pytest.fixture
+def computed(original, own_folder):
+    """Columns of a result `r.h5` by name; on a grid of 2 ms, shifted by BEGIN, they make a recording."""
+    for name in ("wave.yaml", "robot.yaml", "r.h5"):
+        shutil.copy(original / name, own_folder)
+    header, *rows = csv.reader((original / "r.csv").read_text().splitlines())
     return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
 
 

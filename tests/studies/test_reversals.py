@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
+from samples.marks import slow_but
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import Trajectory, load_trajectory, sensitivity
@@ -29,7 +30,7 @@ def coarse(folder: Path, robot: Robot) -> Trajectory:
     return load_trajectory(folder / "coarse.yaml", robot)
 
 
-@pytest.mark.parametrize("speed", [-2.0, -0.3, 0.0, 0.1, 1.5])
+@pytest.mark.parametrize("speed", slow_but([-0.3, 0.0], [-2.0, -0.3, 0.0, 0.1, 1.5]))
 @pytest.mark.parametrize("correlation", [-0.9, 0.0, 0.6])
 def test_the_variance_is_that_of_drawn_speeds(speed: float, correlation: float) -> None:
     """Of so many draws a variance is known to 1/sqrt(200000), 0.2 %; five times that is allowed."""

@@ -212,7 +212,7 @@ def test_ranges_of_gears_against_a_dense_scan(seed, tmp_path):
 
 
 @pytest.mark.parametrize("criterion", ["copper_loss", "utilization", "mass"])
-@pytest.mark.parametrize("coupling", [0.001, 0.05, 0.3])
+@pytest.mark.parametrize("coupling", [slow(0.001), 0.05, slow(0.3)])
 def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(criterion, coupling, tmp_path):
     """All pairs of the catalog, each tried by building the robot with it."""
     robot, trajectory = shipped("awas_1r")

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from samples.marks import slow, slow_but
 from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, fit_samples
@@ -39,7 +40,7 @@ def relative_error(fit, time, order=4):
     return np.sqrt(np.mean(error**2) / np.mean(motion(inside, order) ** 2))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", slow_but([0], range(5)))
 def test_noisy_record_gives_the_fourth_derivative_within_two_percent(seed):
     time = np.arange(10001) / 1000
     values = motion(time) + noise(len(time), 1e-5, seed)
@@ -53,8 +54,8 @@ def test_noisy_record_gives_the_fourth_derivative_within_two_percent(seed):
     assert 3e-5 < fit.largest[0] < 7e-5  # of 1e4 normal deviates
 
 
-@pytest.mark.parametrize("rate", [100, 1000, 10000])
-@pytest.mark.parametrize("decimals", [3, 4, 6])
+@pytest.mark.parametrize("rate", [100, slow(1000), 10000])
+@pytest.mark.parametrize("decimals", [3, slow(4), 6])
 def test_rounded_records(rate, decimals):
     time = np.arange(4 * rate + 1) / rate
     fit = fitted(time, np.round(motion(time), decimals))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
+from samples.marks import slow_but
 from samples.random_recordings import draw
 
 from vsacli.trajectory.fits import resolution
@@ -46,12 +49,12 @@ MOTIONS = {
 }
 
 
-@pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
-def test_noise_alone_needs_no_fine_resolution(noise: np.ndarray, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("name", slow_but({"white", "flickering encoder"}, NOISES))
+def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.MonkeyPatch):
     tried = []
     original = resolution.most_likely
     monkeypatch.setattr(resolution, "most_likely", lambda *args: tried.append(args) or original(*args))
-    found = find_resolution(TIME, normal(noise), 7, 4, KnownNoise())
+    found = find_resolution(TIME, normal(NOISES[name]), 7, 4, KnownNoise())
     assert found is not None
     assert not found.accepted
     assert found.total > resolution.ACCEPTED
@@ -59,13 +62,15 @@ def test_noise_alone_needs_no_fine_resolution(noise: np.ndarray, monkeypatch: py
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 
 
-@pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
-@pytest.mark.parametrize("noise", ["white", pytest.param("random walk", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "case", slow_but([("white", "vibration")], product(["white", "random walk"], MOTIONS)), ids=" - ".join
+)
 def test_what_is_resolved_is_the_same_without_an_early_end(
-    motion: np.ndarray, noise: str, monkeypatch: pytest.MonkeyPatch
+    case: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ):
+    noise, name = case
     step = 0.05 if noise == "random walk" else 1.0
-    row = normal(10 * motion + step * NOISES[noise])
+    row = normal(10 * MOTIONS[name] + step * NOISES[noise])
     early = find_resolution(TIME, row, 7, 4, KnownNoise())
     monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
     late = find_resolution(TIME, row, 7, 4, KnownNoise())

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
-from samples.shipped import shipped_robot
+from samples.shipped import EXAMPLES, shipped_robot
 from samples.slips import FURTHER, REST, TYPICAL, Slip
 
 from vsacli import Robot, Trajectory, load_robot, load_trajectory
 from vsacli.base.errors import Problem
-from vsacli.files.examples import examples
 from vsacli.robot.plausibility import ROBOT_RULES, strange_of_robot
 from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
@@ -75,7 +74,7 @@ def test_a_rule_is_explained_by_rules_that_come_before():
         assert all(order.index(other) < order.index(name) for other in rule.explained_by), name
 
 
-@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_no_rule_finds_anything_in_what_comes_along(example):
     assert strange_of_robot(example.robot.checked, example.robot.sources) == frozenset()
     for each in example.trajectories:

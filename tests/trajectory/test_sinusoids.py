@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from samples.marks import slow
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
@@ -48,7 +49,7 @@ def derivatives(joint, ramped):
 
 @pytest.mark.parametrize("signal", [POSITION, STIFFNESS], ids=lambda signal: signal.key)
 @pytest.mark.parametrize("ramped", [False, True])
-@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("joint", [0, slow(1)])
 def test_derivatives_are_exact_to_rounding(joint, ramped, signal):
     rows = sinusoids(0.25 if ramped else 0.0, signal=signal).at(np.array(TIMES))
     assert len(rows) == signal.orders
@@ -105,7 +106,7 @@ def test_samples_do_not_depend_on_the_block(ramp):
         np.testing.assert_array_equal(np.concatenate(parts, axis=2), whole)
 
 
-@pytest.mark.parametrize("ramp", [0.0, 0.02, 0.4, 0.5])
+@pytest.mark.parametrize("ramp", [0.0, slow(0.02), 0.4, slow(0.5)])
 @pytest.mark.parametrize("cycles", [0.3, 2, 7.4])
 def test_the_lowest_value_is_that_of_a_dense_scan(cycles, ramp):
     profile = sinusoids(ramp, cycles=cycles)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from samples.marks import slow_but
+from samples.marks import slow, slow_but
 from samples.noisy_records import (
     COLORS,
     FILTERED,
@@ -48,7 +48,13 @@ def alarmed(fit):
     return known is not None and bool(not known.determined or known.lines.others)
 
 
-@pytest.mark.parametrize("color", ["white, 1e-4 rad", "12-bit encoder", *list(COLORS)[5:9:3], "hum of 50 Hz"])
+@pytest.mark.parametrize(
+    "color",
+    slow_but(
+        ["white, 1e-4 rad", "hum of 50 Hz"],
+        ["white, 1e-4 rad", "12-bit encoder", *list(COLORS)[5:9:3], "hum of 50 Hz"],
+    ),
+)
 def test_sines_with_noise_of_any_color(color):
     of = record(sines, color, 0)
     for method in (SMOOTH, None):
@@ -59,7 +65,7 @@ def test_sines_with_noise_of_any_color(color):
         assert not alarmed(fit)
 
 
-@pytest.mark.parametrize("rate", [100, 1000])
+@pytest.mark.parametrize("rate", [100, slow(1000)])
 @pytest.mark.parametrize("motion", MOTIONS.values())
 def test_clean_samples_are_interpolated_in_silence(motion, rate):
     time = np.arange(10 * rate + 1) / rate

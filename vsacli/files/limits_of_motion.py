@@ -12,7 +12,6 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import together
 from vsacli.base.units import time_text
 from vsacli.robot.model import Robot
-from vsacli.robot.plausibility.springs import corridor
 from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 8192
@@ -34,8 +33,7 @@ def unattainable(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
         fault = f"is {value:.4g} {unit} at t = {time_text(time)}, outside {ends}; {ADVICE}"
         groups.setdefault(f"position of {{}} {fault}", []).append(index)
     if not any(warning.message.startswith(STIFFNESS.key) for warning in trajectory.located_warnings):
-        for index, joint in enumerate(robot.joints):
-            found = corridor(joint)
+        for index, (joint, found) in enumerate(zip(robot.joints, robot.checked.corridors, strict=True)):
             if found is not None and low[index] < found.lower:
                 unit = units.STIFFNESS.unit(joint.type)
                 minimum = f"below the minimum of {found.lower:.4g} {unit} without load"

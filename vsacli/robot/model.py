@@ -128,7 +128,7 @@ class Robot:
         sources = (source for joint in self.joints for source in joint.actuator.sources)
         return tuple(dict.fromkeys(sources))
 
-    @property
+    @cached_property
     def checked(self) -> CheckedRobot:
         """The robot's data that plausibility rules need."""
         from vsacli.documents.record_values import numbers

@@ -29,8 +29,8 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.checked_robot import BodySizes, ratio
-from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT, Corridor, corridor
+from vsacli.robot.plausibility.checked_robot import BodySizes, Corridor, ratio
+from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
 
@@ -87,20 +87,20 @@ class CheckedTrajectory:
     times: Times
     motion: Profile | None
 
-    @cached_property
+    @property
     def sizes(self) -> BodySizes:
         """Body sizes of the robot."""
-        return BodySizes(self.robot.joints)
+        return self.robot.checked.sizes
 
     @cached_property
     def moved(self) -> FloatArray | None:
         """Position and its derivatives, (orders, joints, instants); None if they are recorded."""
         return None if self.motion is None else self.motion.at(np.linspace(*self.times.span, INSTANTS))
 
-    @cached_property
-    def corridors(self) -> list[Corridor | None]:
+    @property
+    def corridors(self) -> tuple[Corridor | None, ...]:
         """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return [corridor(joint) for joint in self.robot.joints]
+        return self.robot.checked.corridors
 
     @property
     def revolute(self) -> BoolArray:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,21 @@ WEIGHT_PER_MASS = 9.81
 
 SPHERE = 0.4
 """Moment of inertia of a solid sphere, over mass times radius squared."""
+
+
+class Corridor(NamedTuple):
+    """Attainable stiffness of a joint without load, N m/rad (N/m)."""
+
+    lower: float
+    upper: float
+
+
+def corridor(joint: Joint) -> Corridor | None:
+    """Return the attainable range of a joint without load; None if its stiffness is not commanded."""
+    if "stiffness" not in joint.actuator.commanded:
+        return None
+    solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
+    return Corridor(float(solution.lower[0]), float(solution.upper[0]))
 
 
 @dataclass(frozen=True)
@@ -45,6 +60,11 @@ class CheckedRobot:
     def sizes(self) -> BodySizes:
         """Body sizes of the robot."""
         return BodySizes(self.joints)
+
+    @cached_property
+    def corridors(self) -> tuple[Corridor | None, ...]:
+        """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
+        return tuple(map(corridor, self.joints))
 
     @property
     def driven(self) -> Iterator[tuple[int, Joint]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, ratio, written_once
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, Corridor, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
 SMALL_SHARE = 0.003
@@ -39,21 +38,6 @@ SLIPS_OF_DAMPING = (
 )
 
 
-class Corridor(NamedTuple):
-    """Attainable stiffness of a joint without load, N m/rad (N/m)."""
-
-    lower: float
-    upper: float
-
-
-def corridor(joint: Joint) -> Corridor | None:
-    """Return the attainable range of a joint without load; None if its stiffness is not commanded."""
-    if "stiffness" not in joint.actuator.commanded:
-        return None
-    solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
-    return Corridor(float(solution.lower[0]), float(solution.upper[0]))
-
-
 def _unit(joint: Joint) -> str:
     return units.STIFFNESS.unit(joint.type)
 
@@ -66,7 +50,7 @@ def _travel(checked: CheckedRobot, joint: Joint) -> float:
 def _corridors(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
     """Yield the joints with commanded stiffness, with index and attainable range."""
     for index, joint in checked.driven:
-        found = corridor(joint)
+        found = checked.corridors[index]
         if found is not None:
             yield index, joint, found
 
@@ -149,9 +133,8 @@ def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
                 yield Measured(path, limit, _unit(joint), size, beside)
 
 
-def _least_stiffness(joint: Joint) -> float:
-    """Return the minimum stiffness of a joint without load, N m/rad (N/m)."""
-    found = corridor(joint)
+def _least_stiffness(joint: Joint, found: Corridor | None) -> float:
+    """Return the minimum stiffness of a joint without load, N m/rad (N/m), given its attainable range."""
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
     held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
@@ -162,7 +145,7 @@ def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
     for number, joint in checked.driven:
         if joint.damper is not None and joint.actuator.sprung:
-            product = float(checked.sizes.moved[number]) * _least_stiffness(joint)
+            product = float(checked.sizes.moved[number]) * _least_stiffness(joint, checked.corridors[number])
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
             path = joint_path(number, joint, "damper", "range", Entry(1))
