@@ -64,7 +64,7 @@ def commands(block: Block) -> Iterator[str]:
 
 
 def run_shell(line: str, folder: Path, scripts: Path = SCRIPTS) -> subprocess.CompletedProcess[str]:
-    """Run a shell line in a folder, with the command in `scripts` on the search path, usually the installed one."""
+    """Run a shell line in a folder, with the command in `scripts` on the search path."""
     path = os.pathsep.join([str(scripts), os.environ["PATH"]])
     return subprocess.run(
         ["sh", "-c", line],

@@ -1,6 +1,7 @@
-"""The command `vsacli` as a fork of a process that has imported everything: imports take most of a short command.
+"""The command `vsacli` as a fork of a process that has imported everything.
 
-For tests of what commands compute and print. Those of starting, signals, memory and packaging run the installed one.
+Imports take most of a short command. This is for tests of what commands compute and print; those of starting,
+signals, memory and packaging run the installed one.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def serve(address: str) -> None:
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(address)
         server.listen()
-        print("ready", flush=True)
+        os.write(sys.stdout.fileno(), b"ready\n")
         while sys.stdin not in select.select([server, sys.stdin], [], [])[0]:
             connection, _ = server.accept()
             if os.fork() == 0:
