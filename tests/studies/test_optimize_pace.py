@@ -74,6 +74,7 @@ def test_no_pace_of_a_dense_family_is_better(swing, criterion):
     assert found < 0.993 * cost(*swing, criterion, line.spline(np.zeros(1)))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_scipys_optimizer_comes_to_the_same_cost(swing):
     """Over all coefficients of a coarse spline, scaled to the duration."""

@@ -59,6 +59,7 @@ def test_noise_alone_needs_no_fine_resolution(noise: np.ndarray, monkeypatch: py
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
 @pytest.mark.parametrize("noise", ["white", pytest.param("random walk", marks=pytest.mark.slow)])
 def test_what_is_resolved_is_the_same_without_an_early_end(
