@@ -149,7 +149,7 @@ def test_on_a_slide_every_figure_has_the_size_and_texts_that_stay_apart(files: P
 @pytest.mark.parametrize("width", [6.0, 12.0, 18.3])
 def test_other_widths_are_kept(width: float) -> None:
     with drawing_with(replace(PAPER, width=width)):
-        figures = {**of_robot("panda_7r"), **of_result(7), **of_lists()}
+        figures = {**of_robot("vsa_3r"), **of_result(3), **of_lists()}
     for name, figure in figures.items():
         assert figure.get_figwidth() * CM == pytest.approx(width, rel=0.01), name
 

@@ -94,7 +94,7 @@ def test_springs_and_motors_come_out(name: str) -> None:
             assert error < 0.01 * abs(truth)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_standard_errors_say_how_far_off_numbers_are(name: str) -> None:
