@@ -57,6 +57,7 @@ def test_false_alarms_are_rare(tmp_path: Path) -> None:
     assert np.mean([number.changed for number in numbers]) < 0.015  # 0.006 by Student's t of 24 cosines
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", WORDS)
 def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> None:

@@ -115,6 +115,7 @@ def test_timing_and_stiffness_together_are_better_than_either(swing):
     assert both.joints["swing"].after < 0.99 * cheaper
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
     path = tmp_path / "shake.yaml"
