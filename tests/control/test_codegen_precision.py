@@ -120,8 +120,8 @@ def test_values_in_single_precision_are_those_of_compiled_code(name: str, tmp_pa
 
 @pytest.mark.slow
 def test_long_programs_of_calls_are_looked_at_too() -> None:
-    """Thirty joints, whose code calls a function for each structure of a joint."""
-    robot = random_chain(30)
+    """Sixteen joints, whose code calls a function for each structure of a joint."""
+    robot = random_chain(16)
     function = inverse_dynamics_function(robot)
     reference = Reference(robot)
     expected = reference.results(function)["tau_e"]
