@@ -107,7 +107,8 @@ def test_every_part_has_its_place() -> None:
 
 
 @pytest.mark.parametrize("page", [slow(page) if page.name in LONG else page for page in PAGES], ids=named)
-def test_examples_do_what_the_page_says(page: Path, folder: Path, scripts: Path) -> None:
+def test_examples_do_what_the_page_says(page: Path, folder: Path, request: pytest.FixtureRequest) -> None:
+    scripts = request.getfixturevalue("scripts") if page.name in LONG else page_examples.SCRIPTS
     printed: tuple[str, ...] = ()
     for block in blocks(page):
         if block.saved_as:

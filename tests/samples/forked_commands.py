@@ -23,10 +23,12 @@ from typing import NoReturn
 CLIENT = """#!{python} -IS
 import json, os, socket, sys
 
+request = json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ)])
+os.chdir({folder!r})  # the path of a socket is short
 with socket.socket(socket.AF_UNIX) as server:
-    server.connect({address!r})
+    server.connect("socket")
     socket.send_fds(server, [b"."], [0, 1, 2])
-    server.sendall(json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ)]).encode())
+    server.sendall(request.encode())
     server.shutdown(socket.SHUT_WR)
     code = int(server.recv(9))
 if code < 0:
@@ -47,13 +49,13 @@ FROM_ELSEWHERE = (
 @contextlib.contextmanager
 def command_server(folder: Path) -> Iterator[Path]:
     """Serve commands, and yield a folder for the search path, in which a client stands as `vsacli`."""
-    address = str(folder / "socket")
     command = folder / "bin" / "vsacli"
     command.parent.mkdir()
-    command.write_text(CLIENT.format(python=sys.executable, address=address))
+    command.write_text(CLIENT.format(python=sys.executable, folder=str(folder)))
     command.chmod(0o755)
     server = subprocess.Popen(
-        [sys.executable, __file__, address],
+        [sys.executable, "-P", __file__],
+        cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "MPLBACKEND": "agg"},
@@ -70,11 +72,11 @@ def command_server(folder: Path) -> Iterator[Path]:
         server.wait()
 
 
-def serve(address: str) -> None:
+def serve() -> None:
     """Run commands of clients until standard input is closed."""
     import_everything()
     with socket.socket(socket.AF_UNIX) as server:
-        server.bind(address)
+        server.bind("socket")
         server.listen()
         os.write(sys.stdout.fileno(), b"ready\n")
         while sys.stdin not in select.select([server, sys.stdin], [], [])[0]:
@@ -136,4 +138,4 @@ def execute(streams: list[int], arguments: list[str], folder: str, environment: 
 
 
 if __name__ == "__main__":
-    serve(sys.argv[1])
+    serve()
