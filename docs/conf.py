@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # where `site_parts` and `python_names` lie
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nbclient import NotebookClient
 from pygments.lexers.special import TextLexer
@@ -51,7 +51,8 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 120  # seconds a cell; the longest takes about 10 on one core
 nb_execution_in_temp = True
 # Commands print in pieces, which `nb_merge_streams` would put on lines of their own.
-NotebookClient.coalesce_streams = True
+notebook_client: Any = NotebookClient  # whose types know traits only
+notebook_client.coalesce_streams = True
 
 autodoc_typehints = "none"  # the docstrings say shapes and units
 autodoc_member_order = "bysource"
