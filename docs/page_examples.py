@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
+SCRIPTS = Path(sysconfig.get_path("scripts"))
 
 FENCED = re.compile(r"(?:^([^\n]*)\n\n?)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SAVED_AS = re.compile(r"Save as `(\S+)`:$")
@@ -62,9 +63,9 @@ def commands(block: Block) -> Iterator[str]:
             yield from [" && ".join(parts).replace(".venv/bin/", "")] if parts else []
 
 
-def run_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a shell line in a folder, with the installed command on the search path."""
-    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+def run_shell(line: str, folder: Path, scripts: Path = SCRIPTS) -> subprocess.CompletedProcess[str]:
+    """Run a shell line in a folder, with the command in `scripts` on the search path."""
+    path = os.pathsep.join([str(scripts), os.environ["PATH"]])
     return subprocess.run(
         ["sh", "-c", line],
         cwd=folder,
@@ -86,7 +87,7 @@ def copy_examples(folder: Path) -> None:
         shutil.copytree(ROOT / name, folder / name)
 
 
-def make_files_of_other_pages(folder: Path) -> None:
+def make_files_of_other_pages(folder: Path, scripts: Path = SCRIPTS) -> None:
     """Make the files that help texts mention: studies, motors, and the recording that is identified."""
     for name in ("identification.md", "sizing.md", "studies.md"):
         for block in blocks(ROOT / "docs" / name):
@@ -94,7 +95,7 @@ def make_files_of_other_pages(folder: Path) -> None:
                 (folder / block.saved_as).write_text(block.text)
     making = [line for block in blocks(ROOT / "docs" / "identification.md") for line in commands(block)]
     for line in takewhile(lambda line: not line.startswith("vsacli identify"), making):
-        assert run_shell(line, folder).returncode == 0
+        assert run_shell(line, folder, scripts).returncode == 0
 
 
 def renewed(page: Path) -> str:

@@ -19,6 +19,7 @@ import page_examples
 import pytest
 from page_examples import PRINTED, blocks, commands, comparable, copy_examples, run_shell
 from samples.command_line import installed
+from samples.forked_commands import command_server
 from samples.marks import slow
 from site_parts import contents
 
@@ -62,6 +63,13 @@ def folder(tmp_path: Path) -> Path:
 
 STUDY = REPOSITORY / "docs" / "recorded.md"
 """Page with the noise study, which takes longer than all other generated parts."""
+
+
+@pytest.fixture(scope="module")
+def scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a command `vsacli` that has everything imported."""
+    with command_server(tmp_path_factory.mktemp("server")) as scripts:
+        yield scripts
 
 
 def test_generated_parts_are_up_to_date() -> None:
@@ -111,7 +119,8 @@ def test_every_part_has_its_place() -> None:
 
 
 @pytest.mark.parametrize("page", [slow(page) if page.name in LONG else page for page in PAGES], ids=named)
-def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
+def test_examples_do_what_the_page_says(page: Path, folder: Path, request: pytest.FixtureRequest) -> None:
+    scripts = request.getfixturevalue("scripts") if page.name in LONG else page_examples.SCRIPTS
     printed: tuple[str, ...] = ()
     for block in blocks(page):
         if block.saved_as:
@@ -121,7 +130,7 @@ def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
             assert comparable(block.text) in printed
         printed = ()
         for line in commands(block):
-            outcome = run_shell(line, folder)
+            outcome = run_shell(line, folder, scripts)
             expected = int(match[1]) if (match := EXIT_CODE.search(line)) else 0
             assert outcome.returncode == expected, f"{line}\n{outcome.stdout}{outcome.stderr}"
             if block.language == "sh":
@@ -130,11 +139,11 @@ def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
 
 
 @slow
-def test_examples_of_help_texts_work(folder: Path) -> None:
-    page_examples.make_files_of_other_pages(folder)
+def test_examples_of_help_texts_work(folder: Path, scripts: Path) -> None:
+    page_examples.make_files_of_other_pages(folder, scripts)
     for page in COMMANDS:
         for line in (line for block in blocks(page) for line in commands(block)):
-            outcome = run_shell(line, folder)
+            outcome = run_shell(line, folder, scripts)
             assert outcome.returncode == 0, f"{line}\n{outcome.stdout}{outcome.stderr}"
 
 

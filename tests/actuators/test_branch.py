@@ -193,6 +193,7 @@ def test_below_reach_the_deflections_are_those_of_the_end():
 # Anything goes
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("decades", [0.05, 1, 2])
 def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):

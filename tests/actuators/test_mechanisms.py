@@ -52,6 +52,7 @@ def peak(values: FloatArray) -> float:
     return float(np.abs(values).max())
 
 
+@pytest.mark.cases(4)
 def test_the_state_is_that_of_the_potential(any_device: Device) -> None:
     """Torques, stiffness and their rates along any motion, and the motion back from them."""
     phi, s, q = states(any_device, 1000)
@@ -108,6 +109,7 @@ def test_there_and_back(device: Device) -> None:
     np.testing.assert_allclose(found.phi_2[clear], s[clear], rtol=1e-9)
 
 
+@pytest.mark.cases(4)
 def test_the_corridor_is_that_of_a_scan_and_what_lies_outside_is_flagged(device: Device) -> None:
     phi, s, q = states(device, 40)
     largest, scanned = peak(device.springs(q, q + phi, s).link), device.scanned or device.deflections

@@ -57,6 +57,7 @@ def variables(path: Path) -> dict[str, Any]:
         return {name: np.asarray(each) for name, each in result.items() if isinstance(each, h5py.Dataset)}
 
 
+@pytest.mark.cases(3)
 def test_the_file_is_what_the_schema_says_and_is_described(
     device: Device, vsacli: Run, tmp_path: Path
 ) -> None:
@@ -69,7 +70,7 @@ def test_the_file_is_what_the_schema_says_and_is_described(
     assert lower < min(device.stiffness) < max(device.stiffness) < (upper or np.inf)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.usefixtures("device")
 def test_results_of_both_engines_and_of_integrated_deflections(vsacli: Run, tmp_path: Path) -> None:
@@ -95,7 +96,7 @@ def test_results_of_both_engines_and_of_integrated_deflections(vsacli: Run, tmp_
     np.testing.assert_array_equal(compiled["flags"], plain["flags"])
 
 
-@pytest.mark.cases(18)
+@pytest.mark.cases(6)
 @pytest.mark.parametrize(
     ("options", "final"),
     [
@@ -112,7 +113,7 @@ def test_a_simulation_follows_the_command(vsacli: Run, options: tuple[str, ...],
     assert abs(joint["q_error"]["final"]) < final
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 def test_a_soft_demand_is_told_and_fixed(device: Device, vsacli: Run, tmp_path: Path) -> None:
     unloaded = ok(vsacli("info", "arm.yaml", "--json"))["joints"][0]["stiffness_range"]["unloaded"]
     (tmp_path / "soft.yaml").write_text(TRAJECTORY.format(device.stiffness[0], 0.8 * unloaded[0]))
@@ -123,7 +124,7 @@ def test_a_soft_demand_is_told_and_fixed(device: Device, vsacli: Run, tmp_path: 
     assert report["fixes"]
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.usefixtures("device")
 def test_figures_and_tables(vsacli: Run, tmp_path: Path) -> None:
@@ -136,6 +137,7 @@ def test_figures_and_tables(vsacli: Run, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.cases(2)
 @needs_compiler
 @needs("make", "make")
 @pytest.mark.usefixtures("device")

@@ -113,7 +113,7 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
     )
 
 
-@pytest.mark.cases(50)
+@pytest.mark.cases(16)
 @every_pair
 def test_there_and_back_on_the_branch(first: Spring, second: Spring):
     trip = round_trip(first, second, DRAWS)
@@ -137,6 +137,7 @@ def demands_about(rng: np.random.Generator, end: float) -> FloatArray:
     return end * (1 + rng.choice([-1, 1], 20) * 10 ** rng.uniform(-8, -0.01, 20))
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_every_infeasible_demand_is_flagged_and_no_other(first: Spring, second: Spring):
     rng = np.random.default_rng(5)
@@ -158,6 +159,7 @@ def test_every_infeasible_demand_is_flagged_and_no_other(first: Spring, second: 
 # Next to the ends
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_solution_next_to_the_end_of_the_corridor(first: Spring, second: Spring):
     (law_1, curve_1), (law_2, curve_2) = first, second

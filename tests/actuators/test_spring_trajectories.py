@@ -158,6 +158,7 @@ def test_passing_the_singular_set_is_near_singular_and_stays_on_the_branch(pair:
     assert result.report.verdict == "ok"
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("pair", slow_but({"cubic, unlike", "four-bar"}, PAIRS))
 def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
     laws = PAIRS[pair]

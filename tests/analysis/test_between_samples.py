@@ -176,6 +176,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
     return robot, Trajectory(trajectory.times, trajectory.position, {"stiffness": constant}, name="three")
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("block_samples", [1, 2, 7, 50])
 def test_what_is_found_does_not_depend_on_the_blocks(

@@ -14,7 +14,7 @@ QUICK = "12 bits, zero-phase 20 Hz"
 """The color that is tried at every run of the tests."""
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
 )
@@ -33,7 +33,7 @@ def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(color):
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("color", COLORS)
 def test_torques_of_steps_of_velocity_are_right_or_unreliable(color):
     for each in outcomes("velocity steps, 50 ms", color, 20, RATE):
@@ -43,7 +43,7 @@ def test_torques_of_steps_of_velocity_are_right_or_unreliable(color):
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("color", COLORS)
 def test_torques_of_minimum_jerk_are_right_or_unreliable(color):
     for each in outcomes("minimum jerk", color, 20, RATE):

@@ -173,6 +173,7 @@ def test_bound_follows_rounding_where_sampling_is_fast():
     assert error < bound / 10
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
 @pytest.mark.parametrize("defect", [1e-2, 1e-6])

@@ -60,7 +60,7 @@ def terms_noticed_by(parts: str) -> list[str]:
     return row[1].split("; ") if row else []
 
 
-@pytest.mark.cases(26)
+@pytest.mark.cases(12)
 @pytest.mark.parametrize("mutation", slow_but(QUICK, MUTATIONS), ids=lambda each: each.term)
 def test_a_wrong_term_fails(mutation: Mutation, monkeypatch: pytest.MonkeyPatch) -> None:
     assert mutation.term in terms_noticed_by(fails(mutation, monkeypatch))
@@ -73,7 +73,7 @@ def test_a_wrong_term_fails_in_compiled_code(mutation: Mutation, monkeypatch: py
 
 
 @pytest.mark.slow
-@pytest.mark.cases(9)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("seed", range(60))
 def test_a_valid_run_is_not_refused(seed: int) -> None:
     """Infeasible steps are possible where a mechanism cannot carry its load."""

@@ -30,7 +30,7 @@ def test_drift_is_reported(vsacli, motion, command):
 
 @pytest.mark.slow
 def test_end_of_the_way_is_reported(vsacli, too_soft):
-    done = vsacli("invdyn", ROBOT, too_soft, "--deflection-solver", "ode")
+    done = vsacli("invdyn", ROBOT, too_soft, "--deflection-solver", "ode", "--set", "rate=25")
     assert done.code == 3
     for joint in ("base", "shoulder", "elbow"):
         assert f"\n{joint}: deflections cannot be integrated beyond t = " in done.out

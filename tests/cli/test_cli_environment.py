@@ -62,7 +62,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     return installed(*EXAMPLE, folder=tmp_path_factory.mktemp("usual")).stdout
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("case", slow_but(QUICK, product(ENVIRONMENTS, COMMANDS)), ids=" - ".join)
 def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path: Path) -> None:
     environment, command = case
@@ -73,6 +73,7 @@ def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path:
     assert (tmp_path / "r.h5").is_file() == ("-o" in COMMANDS[command])
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("cache", ["relative", "/dev/null/cache"])

@@ -150,6 +150,7 @@ def printing(request, tmp_path, motion, feasible_result, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("printed", slow_but({"help", "report"}, TO_STDOUT))
 def test_full_stdout_is_told(printing, printed):
     arguments = TO_STDOUT[printed]
@@ -159,6 +160,7 @@ def test_full_stdout_is_told(printing, printed):
     assert done.stderr == "standard output: cannot be written: No space left on device\n"
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("printed", slow_but({"version", "report"}, TO_STDOUT))
 def test_reader_that_went_away_is_no_trouble_to_talk_about(printing, printed):
     arguments = TO_STDOUT[printed]
@@ -188,7 +190,7 @@ CLOSED = "standard output: cannot be written: it is closed\n"
 
 
 @pytest.mark.slow
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -59,6 +59,7 @@ def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, monkeypatch):
     assert not any((tmp_path / "temporary").iterdir())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--json"], ["--stop-on-infeasible"]], ids=" ".join)
 def test_report_is_the_same_with_a_figure(vsacli, too_soft, options):

@@ -125,6 +125,7 @@ def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
         tmp_path / "robot.yaml",
         ("motor: {inertia:", "motor: {max_torque: 1, inertia:"),
     )
+    edited(too_soft, too_soft, ("rate: 100 ", "rate: 20 "))
     done = vsacli("check-feasibility", robot, too_soft, *WRITE)
     assert (done.code, done.err) == (3, "fixed.yaml is not written: nothing that was tried fixes the task\n")
     assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}

@@ -79,6 +79,7 @@ def test_ended_run_leaves_the_target_and_nothing_else(tmp_path, target, writing,
     assert left == target
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 def test_killed_run_leaves_the_target_and_does_not_disturb_the_next(tmp_path, target, writing, motion):
     writing.kill()

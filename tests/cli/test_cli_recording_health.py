@@ -84,6 +84,7 @@ def test_an_infeasible_recording_is_about_its_stiffness_or_the_springs(vsacli, r
     assert advice not in vsacli("check-feasibility", ROBOT, file).out
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 1.7e9])
 def test_gap_frozen_sensor_and_stamps_since_1970(vsacli, recorded, start):

@@ -77,6 +77,7 @@ def test_results_hold_what_the_springs_are(joint, tmp_path):
     assert "self-check passed" in ok(integrated)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 def test_results_are_drawn_and_computed_again(joint):
     vsacli, _ = joint

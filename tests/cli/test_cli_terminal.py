@@ -47,6 +47,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("columns", [40, 80, 200])
 def test_a_report_is_as_wide_as_its_terminal(columns: int) -> None:

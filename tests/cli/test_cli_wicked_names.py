@@ -30,7 +30,7 @@ def bare(code: str) -> str:
     return re.sub(r'0x[0-9a-f]{8}u|"[0-9a-f]{64}"', "", re.sub(r"/\*.*?\*/", "", code, flags=re.S))
 
 
-@pytest.mark.cases(7)
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PRINTABLE.values(), ids=PRINTABLE)
@@ -72,7 +72,7 @@ def test_a_description_may_have_lines_but_no_control_characters(vsacli: Any, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["escape", "return", "break", "bidirectional", "c1"])
 def test_older_results_with_such_names_are_shown_encoded(vsacli: Any, tmp_path: Path, name: str) -> None:
     assert vsacli("invdyn", ROBOT, TRAJECTORY, "-o", "r.h5", "-q").code == 0

@@ -89,7 +89,7 @@ def files_with(text: str, folder: Path) -> dict[str, Path]:
     return files
 
 
-@pytest.mark.cases(20)
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("kind", slow_but({"markdown", "unprintable escape"}, TEXTS))
 def test_a_text_in_any_place_of_a_file_is_read_or_refused(command: Command, work: Path, kind: str) -> None:
     (work / "in").mkdir()

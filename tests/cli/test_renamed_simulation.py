@@ -72,6 +72,7 @@ def test_an_actual_variable_is_refused_with_the_simulated_one(vsacli, files, nam
         getattr(past, f"{name}_actual")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("new", "old"),
     [

@@ -175,7 +175,7 @@ def rows_of(kernel: InverseDynamics, samples: int) -> list[FloatArray]:
         (1, None),
         (2, "base"),
         (5, "end_effector"),
-        (30, None),
+        pytest.param(30, None, marks=pytest.mark.exhaustive),
     ],
 )
 def test_code_of_calls_computes_the_same_bit_for_bit(joints: int, frame: str | None, tmp_path: Path):
@@ -215,8 +215,8 @@ def test_long_chains_are_traced_by_calls_for_rows(monkeypatch: pytest.MonkeyPatc
 @needs_compiler
 @pytest.mark.slow
 def test_links_of_a_long_chain_agree_with_numpy():
-    """To what rounding of 1e-16 becomes over 200 joints, with sines of the C library and of NumPy."""
-    kernel = LinkTorques(random_chain(200))
+    """To what rounding of 1e-16 becomes over 100 joints, with sines of the C library and of NumPy."""
+    kernel = LinkTorques(random_chain(100))
     rows = list(np.random.default_rng(1).uniform(-1, 1, (kernel.inputs, 50)))
     expected = NUMPY.run(kernel, rows)
     found = choose("c", kernel, 1, 2).engine.run(kernel, rows)

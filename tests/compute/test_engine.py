@@ -96,6 +96,7 @@ STRETCH_MARGIN = {"stiffness_max": 1e-9}
 """At the end of the four-bar's domain one unit in the last place of a deflection changes it by 1e-10."""
 
 
+@pytest.mark.cases(2)
 @pytest.mark.usefixtures("quickly")
 @pytest.mark.parametrize("pair", slow_but({"cubic", "sinh", "exponential", "quadratic"}, PAIRS))
 def test_spring_laws_agree(pair: str):

@@ -64,6 +64,7 @@ def test_library_is_kept_and_found(folder: Path):
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("damage", ["changed", "truncated", "without checksum", "without library"])

@@ -68,7 +68,7 @@ def self_test(name: str, folder: Path, *flags: str, compiler: str, precision: st
     return done.stdout
 
 
-@pytest.mark.cases(7)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", slow_but({"3R", "mixed", "sinh"}, ROBOTS))
 @pytest.mark.parametrize(
     "compiler", [pytest.param(name, marks=needs(name, name)) for name in ("gcc", "clang")]
@@ -79,6 +79,7 @@ def test_it_compiles_without_a_warning_and_passes_its_own_test(
     assert self_test(name, tmp_path, compiler=compiler) == "all values agree\n"
 
 
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but({"one joint"}, SANITIZED))
 def test_no_undefined_behavior(name: str, tmp_path: Path) -> None:
@@ -86,7 +87,7 @@ def test_no_undefined_behavior(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @needs_compiler
 @pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.cases(6)
+@pytest.mark.cases(3)
 @needs_compiler
 @pytest.mark.parametrize("path", BUNDLED)
 @pytest.mark.parametrize("precision", ["double", "float"])
@@ -127,6 +128,7 @@ def test_a_potential_in_single_precision_is_feasible_along_its_trajectory(tmp_pa
     assert error <= 2e-3 * np.abs(expected.tau_motor).max()
 
 
+@pytest.mark.cases(3)
 @needs_compiler
 @pytest.mark.parametrize("precision", ["double", "float"])
 @pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
@@ -318,6 +320,7 @@ Springs whose stiffness grows tenfold over their range multiply what rounding do
 """
 
 
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but({"rp_2"}, FLOAT_BOUND))
 def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:

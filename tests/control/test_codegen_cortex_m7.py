@@ -33,7 +33,7 @@ ROBOTS: dict[str, Robot] = {
 WARNINGS = (*STRICT, "-Wconversion", "-Wdouble-promotion")
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize(
     ("name", "patterns", "optimization"),

@@ -110,7 +110,7 @@ def same(a: FloatArray, b: FloatArray) -> FloatArray:
     return (a == b) | (np.isnan(a) & np.isnan(b))
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", slow_but({"3R"}, ROBOTS))
 def test_nothing_leaves_unnoticed_and_nothing_is_invented(name: str, tmp_path: Path) -> None:
     robot = ROBOTS[name]

@@ -50,7 +50,7 @@ def with_device(name: str, gravity: float = -9.81) -> Robot:
     return replace(arm, gravity=(0.0, gravity, 0.0), joints=(joint,))
 
 
-@pytest.mark.cases(11)
+@pytest.mark.cases(4)
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but(["variable_ratio, measured scale"], DEVICES))
 def test_every_mechanism_passes_its_own_test(name: str, tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_a_sine_passes_at_its_largest_torque(tmp_path: Path) -> None:
     assert self_test(overloaded, tmp_path) == "all values agree\n"
 
 
-@pytest.mark.cases(13)
+@pytest.mark.cases(4)
 @needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
@@ -93,6 +93,7 @@ def test_what_is_refused_would_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert value in [f"{float(each):.4g}" for each in found]
 
 
+@pytest.mark.cases(2)
 @needs_compiler
 @pytest.mark.parametrize(
     "name",
@@ -119,8 +120,8 @@ def test_values_in_single_precision_are_those_of_compiled_code(name: str, tmp_pa
 
 @pytest.mark.slow
 def test_long_programs_of_calls_are_looked_at_too() -> None:
-    """Thirty joints, whose code calls a function for each structure of a joint."""
-    robot = random_chain(30)
+    """Sixteen joints, whose code calls a function for each structure of a joint."""
+    robot = random_chain(16)
     function = inverse_dynamics_function(robot)
     reference = Reference(robot)
     expected = reference.results(function)["tau_e"]

@@ -74,7 +74,7 @@ def check_inverse_dynamics(robot: Robot, folder: Path, rtol_of_upper: float = 0.
     return block
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("law", slow_but({"cubic", "sinh", "exponential", "quadratic"}, SPRINGS))
 def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> None:
     rtol = OF_STRETCHED_LINKAGES if law == "four_bar" else 0.0

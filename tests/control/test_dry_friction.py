@@ -142,6 +142,7 @@ def with_friction(robot: Robot, friction: Friction) -> Robot:
     )
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "friction", [SHARP, Friction(coulomb=(3.0, 2.0), width=0.02)], ids=["sharp", "smooth"]

@@ -39,6 +39,7 @@ def balance(robot: Robot, past: History) -> FloatArray:
     return energy - energy[0] + spline(past.time) - spline(past.time[0])
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("robot", "gains"),
     [

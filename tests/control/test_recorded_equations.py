@@ -65,18 +65,21 @@ def assert_agree(case: Loop, engine: str) -> None:
     assert np.abs(found(0.1, several) - expected).max() < AGREEMENT * np.abs(expected).max()
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("what", slow_but(QUICK, SHIPPED))
 def test_recorded_rates_are_those_of_the_text(what, engine):
     assert_agree(shipped_loop(what), engine)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("what", slow_but(["wrench"], MADE))
 def test_recorded_controllers_are_those_of_the_text(what, engine):
     assert_agree(made_loop(what), engine)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("what", [slow("smooth friction, seven joints"), slow("a lever"), slow("tendons")])
 def test_recorded_feedback_is_that_of_the_text(what, engine):
@@ -118,6 +121,7 @@ def test_the_code_of_robots_that_differ_in_numbers_is_one():
         assert_agree(case, "c")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("gains", [None, GAINS])
 def test_engines_find_the_same_motion(gains):

@@ -94,7 +94,7 @@ def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> I
         )
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("case", slow_but({"3R", "R-P"}, CASES))
 def test_motors_do_what_a_scalar_recomputation_says(case: str):
     robot, trajectory = CASES[case]()
@@ -146,6 +146,7 @@ def test_torques_of_springs_and_motors_add_up():
     np.testing.assert_allclose(motors.sum(axis=2), result.tau_e, rtol=0, atol=1e-13 * peak)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("c", marks=needs_compiler)])
 @pytest.mark.parametrize("shipped", [("measured_1r", "measured_1r"), ("qbmove_arm_manual", "qbmove_arm")])

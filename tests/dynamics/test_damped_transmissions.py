@@ -81,6 +81,7 @@ def swing(name: str, damping: Ends = (2, 8)) -> Trajectory:
     return motion_of([CASES[name][2]], [damping])
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("damping", [(2, 8), slow((8, 2)), slow((0.2, 0.1))])
 def test_the_full_model_follows(name: str, damping: Ends) -> None:
@@ -150,6 +151,7 @@ def test_two_starts_approach_each_other_as_fast_as_the_slope_says() -> None:
     np.testing.assert_allclose(rate, (sigma**2 + 4 * torque**2) / (sigma * damping), rtol=1e-4)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_little_damping_tends_to_none(name: str) -> None:
@@ -165,6 +167,7 @@ def test_little_damping_tends_to_none(name: str) -> None:
     np.testing.assert_allclose(np.divide(gaps[:-1], gaps[1:]), 2, rtol=0.02)  # what is quadratic in d
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", slow_but({"elastic"}, CASES))
 def test_neither_blocks_nor_engine_decide(name: str) -> None:
     robot, trajectory = pendulum(name), swing(name)

@@ -66,6 +66,7 @@ CASES = {
 }
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("case", slow_but({"sides differ"}, CASES))
 def test_integration_stays_at_the_root(case: str):
     robot, trajectory = CASES[case]()
@@ -136,6 +137,7 @@ def test_long_recording_drifts_a_little(monkeypatch):
     assert max(drifts(rough)) > 1e-9
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), 800.0 + 1e-4])
 def test_passing_closely_by_goes_on(floor: float):

@@ -36,7 +36,7 @@ def random_rows(kernel: InverseDynamics, samples: int, seed: int) -> list[FloatA
     return rows
 
 
-@pytest.mark.cases(14)
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", FILES)
 def test_single_samples_are_those_of_numpy_to_the_last_bit(name: str) -> None:
     kernel = InverseDynamics(load_robot(ROBOTS / f"{name}.yaml"))

@@ -78,6 +78,7 @@ def drawn(robot, trajectory, time):
     return {name: np.std(getattr(block, name), axis=0) for name in COMPUTED}
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "exerted"), [(vsa_3r(), False), (mixed(), False), (mixed(), True)], ids=["3r", "mixed", "push"]

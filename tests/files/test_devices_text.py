@@ -59,6 +59,7 @@ NAMES = sorted(
 )
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("name", slow_but(("coupled_1r", "mixed_3r"), NAMES))
 def test_every_robot_that_comes_along_can_be_described(name: str) -> None:
     lines = devices(name)

@@ -68,7 +68,7 @@ def test_mixed_arms_move_as_written(count: int, tmp_path: Path) -> None:
     assert verdict_of("RRPRRPR"[:count], mixed[:count], tmp_path) == "ok"
 
 
-@pytest.mark.cases(10)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("letter", "RP")
 @pytest.mark.parametrize("count", [slow(7)])
 @pytest.mark.parametrize("actuator", EVERY_ACTUATOR)
@@ -84,7 +84,7 @@ def test_every_kind_and_mechanism_of_seven_joints(
         assert verdict_of(letter * count, actuator, tmp_path) == "ok"
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("actuator", [slow(actuator) for actuator in EVERY_ACTUATOR])
 def test_every_kind_and_mechanism_carries_others(actuator: str, tmp_path: Path) -> None:
     """The second joint of an arm carries most; the others are the ones that follow in the list."""

@@ -65,6 +65,7 @@ def test_without_a_robot_it_suits_new_ones_with_revolute_joints(tmp_path: Path) 
         assert report_of(robot, trajectory_template(), tmp_path).verdict == "ok"
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "path", [slow(path) if path.stem in LONG else path for path in ROBOTS], ids=lambda path: path.stem
 )

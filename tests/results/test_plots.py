@@ -193,6 +193,7 @@ def test_revolute_and_prismatic_joints_get_axes_of_their_own() -> None:
     assert stiffness == 2 * [r"$\sigma$ [N m/rad]", r"$\sigma$ [N/m]"]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("joints", [1, 7, 20])
 def test_many_joints_stay_apart(joints: int, tmp_path: Path) -> None:

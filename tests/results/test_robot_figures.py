@@ -223,7 +223,7 @@ def test_ticks_count_along_the_axes_of_the_base_frame_on_a_ceiling() -> None:
     assert figure.axes[1].yaxis.get_major_formatter()(-0.25, 0) == "0.25"
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @bundled
 def test_every_bundled_robot_is_drawn(file: Path) -> None:

@@ -97,6 +97,7 @@ def test_a_run_that_ends_early(
             np.testing.assert_array_equal(result.read(name), getattr(block, name), strict=True)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("samples", [slow(33), slow(704)])
 def test_a_thousand_joints(tmp_path: Path, samples: int) -> None:
     block = random_block(samples, 1000)

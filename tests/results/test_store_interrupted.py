@@ -66,6 +66,7 @@ def interrupt(process, delay):
 
 
 # several delays, because a signal may arrive inside HDF5, inside Python, or between
+@pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.031])
 def test_interrupted_in_the_middle_of_writing(tmp_path, old, delay):
@@ -115,6 +116,7 @@ def test_a_writer_works_in_any_thread(tmp_path, block):
 
 
 # bytes: before the first write, in the layout, in the samples (4 MB), and in what closing the file adds
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [0, 3000, 2_000_000, 4_900_000])
 @pytest.mark.parametrize("behind_from", [2**30, 2**20])

@@ -24,6 +24,7 @@ QUICK = [path for path in ROBOTS if path.stem in ("scara_4", "compact_1r", "coup
 """Joints of both types, one motor and two, dampers, springs with and without limits."""
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("path", slow_but(QUICK, ROBOTS), ids=lambda path: path.stem)
 def test_bounds_of_a_file_are_those_that_steps_are_checked_against(path: Path, tmp_path: Path) -> None:
     robot = load_robot(path)

@@ -192,6 +192,7 @@ RUNS = {
 """Robots that come along, and a motion of each."""
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("name", RUNS)
 def test_mujocos_inverse_dynamics_are_ours(name):
     robot, trajectory = shipped_run(name, RUNS[name])

@@ -92,6 +92,7 @@ def refusals(path: Path) -> Iterator[str]:
             yield str(error)
 
 
+@pytest.mark.cases(14)
 @pytest.mark.parametrize(("name", "base", "tip", "letters"), ARMS)
 def test_an_arm(name, base, tip, letters):
     conversion = import_urdf(BY_NAME[name], base, tip)
@@ -99,6 +100,7 @@ def test_an_arm(name, base, tip, letters):
     check(BY_NAME[name], conversion)
 
 
+@pytest.mark.cases(14)
 @pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parts[-3]}-{path.stem}")
 def test_every_chain_from_the_root_is_exact_or_refused_for_a_listed_reason(path):
     reasons = {reason for name, reason in REFUSED if name == path.name}
@@ -115,13 +117,14 @@ def held_anywhere(conversion: Conversion) -> dict[str, float]:
     return {name: float(rng.uniform(*limits.get(name, (-2.0, 2.0)))) for name in sorted(leaders)}
 
 
+@pytest.mark.cases(14)
 @pytest.mark.parametrize(("name", "base", "tip"), CHAINS)
 def test_an_arm_whose_side_branches_are_held_anywhere(name, base, tip):
     held = held_anywhere(import_urdf(BY_NAME[name], base, tip))
     check(BY_NAME[name], import_urdf(BY_NAME[name], base, tip, hold=held), held)
 
 
-@pytest.mark.cases(9)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(("name", "base", "tip"), CHAINS)
 def test_an_arm_can_execute_its_new_trajectory(name, base, tip, tmp_path):
     """Its placeholders carry it, in the report's words: nothing is infeasible, singular or over a limit."""

@@ -31,6 +31,7 @@ def relinked(robot: Robot, rng: np.random.Generator) -> Robot:
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("types", TYPES)
 def test_the_regressor_is_lagranges(types: str) -> None:
     """Of as many sets of links as there are columns, so that each column is held to it."""
@@ -83,7 +84,7 @@ def test_number_of_base_parameters(name: str, count: int) -> None:
     assert len(base_parameters(shipped_robot(name)).kept) == count
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("types", TYPES)
 def test_base_parameters_are_all_that_torques_tell(types: str) -> None:
     """As many as the rank of Pinocchio's regressor, and any change that leaves them leaves the torques."""

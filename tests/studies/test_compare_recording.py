@@ -127,6 +127,7 @@ SLIPS = {
 }
 
 
+@pytest.mark.cases(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("sentence", SLIPS)
 def test_slips_are_named(computed, tmp_path, sentence):
@@ -136,6 +137,7 @@ def test_slips_are_named(computed, tmp_path, sentence):
     assert [note for note in found.notes if sentence in note], found.notes
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("scaled", "said"), [(("base.tau_motor_1",), False), (TORQUES, True)])
 def test_gains_of_several_torques_point_to_the_model(computed, tmp_path, scaled, said):
@@ -155,6 +157,7 @@ WRONG = {
 }
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_column_moves_neither_the_alignment_nor_the_others(computed, tmp_path, wrong):
@@ -196,6 +199,7 @@ def test_exchanged_columns_are_found_though_one_lacks_rows(computed, tmp_path):
     assert follows == {"base.theta_1": "elbow.theta_1", "elbow.theta_1": "base.theta_1"}
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [["--json"], ["--plot", "figures"], ["--plot", "p", "--format", "html"]]

@@ -3,29 +3,40 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
 from samples.command_line import REPOSITORY, edited
+
+from vsacli.cli.main import run
 
 ROBOT = REPOSITORY / "robots" / "planar_2r.yaml"
 OFF = 0.02
 """Position errors that a model with wrong parameters leaves at least, rad."""
 
 
-@pytest.fixture
-def simulated(vsacli, tmp_path):
-    """A plan, `plan.h5`, and a simulation `lab.h5` that does not follow it."""
-    edited(
-        REPOSITORY / "trajectories" / "planar_2r.yaml", tmp_path / "move.yaml", ("rate: 1000", "rate: 250")
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """A folder with a plan, `plan.h5`, and a simulation that does not follow it, `lab.h5`; kept unchanged."""
+    folder = tmp_path_factory.mktemp("computed")
+    move = edited(
+        REPOSITORY / "trajectories" / "planar_2r.yaml", folder / "move.yaml", ("rate: 1000", "rate: 250")
     )
-    assert vsacli("invdyn", ROBOT, "move.yaml", "-o", "plan.h5").code == 0
+    assert run(["invdyn", str(ROBOT), str(move), "-q", "-o", str(folder / "plan.h5")]) == 0
     options = ["--controller", "feedback-linearization", "--perturb", "0.3", "--sensor-noise", "1e-4,0.5"]
-    assert vsacli("simulate", ROBOT, "move.yaml", *options, "-o", "lab.h5").code == 3
+    assert run(["simulate", str(ROBOT), str(move), *options, "-q", "-o", str(folder / "lab.h5")]) == 3
+    return folder
+
+
+@pytest.fixture
+def simulated(vsacli, own_folder, computed):
+    """The command line, in a folder with copies of them."""
+    shutil.copytree(computed, own_folder, dirs_exist_ok=True)
     return vsacli
 
 
-def compared(run, result, recording):
-    report = json.loads(run("compare", result, recording, "--time-offset", "0", "--json").out)
+def compared(vsacli, result, recording):
+    report = json.loads(vsacli("compare", result, recording, "--time-offset", "0", "--json").out)
     return {signal["column"]: signal for signal in report["signals"]}, report["notes"]
 
 

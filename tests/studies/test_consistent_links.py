@@ -35,6 +35,7 @@ def is_body(link: Link) -> bool:
     return bool(link.mass > 0 and low > 0 and high < low + middle)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("types", "seed"), [("R", 0), ("RP", 1), ("RRR", 0), slow("RPRR", 4), slow("RRR", 7)]
 )

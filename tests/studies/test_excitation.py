@@ -65,7 +65,7 @@ def test_it_keeps_a_margin_from_every_limit_between_steps_as_well(planned: Excit
 @pytest.mark.slow
 def test_limits_of_motors_make_it_smaller() -> None:
     robot = shipped_robot("scara_4")
-    found = plan_excitation(robot, duration=10)
+    found = plan_excitation(robot, duration=5)
     run = inverse_dynamics(robot, found.trajectory)
     assert run.report.verdict == "ok"
     for index, joint in enumerate(robot.joints):

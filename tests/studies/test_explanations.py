@@ -57,6 +57,7 @@ def test_false_alarms_are_rare(tmp_path: Path) -> None:
     assert np.mean([number.changed for number in numbers]) < 0.015  # 0.006 by Student's t of 24 cosines
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", WORDS)
 def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> None:
@@ -65,7 +66,7 @@ def test_what_is_not_in_the_equations_is_named(plant: str, tmp_path: Path) -> No
     assert any(re.search(WORDS[plant], note) for note in told.notes), told.notes
 
 
-@pytest.mark.cases(1)
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", WORDS)
 def test_most_are_named(plant: str, tmp_path: Path) -> None:
@@ -114,6 +115,7 @@ def test_the_links_tell_a_gain_from_springs_and_rotors_that_differ(by_gain: bool
     assert note.endswith(end)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_chance_of_an_effect_is_uniform_where_there_is_none() -> None:
     """By random equations with white noise: of 400 a share of 0.1 +- 0.015 lies below a tenth."""

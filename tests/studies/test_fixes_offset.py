@@ -79,6 +79,7 @@ def test_only_the_joint_in_trouble_is_changed():
     assert found["base"] == found["elbow"] == 0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "limits", "expected"),
@@ -137,7 +138,7 @@ def test_steps_between_the_watched_ones_count():
     assert not accepted(robot, trajectory, MARGIN)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "spring",

@@ -75,6 +75,7 @@ def fixed(trajectory):
     return fix
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):

@@ -82,6 +82,7 @@ def found(robot: Robot, record: Recorded) -> dict[str, tuple[float, float, float
     return told
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", slow_but(["AwAS"], ROBOTS))
 def test_springs_and_motors_come_out(name: str) -> None:
     robot, motion = ROBOTS[name]
@@ -93,7 +94,7 @@ def test_springs_and_motors_come_out(name: str) -> None:
             assert error < 0.01 * abs(truth)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_standard_errors_say_how_far_off_numbers_are(name: str) -> None:
@@ -229,6 +230,7 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
         assert abs(float(off) - size) < 3 * float(error)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("torque", ["torques of shafts", "currents"])
 def test_records_may_be_of_the_other_side_of_the_gear(torque: str, tmp_path: Path) -> None:

@@ -74,6 +74,7 @@ def test_exact_equations_give_back_their_numbers() -> None:
     assert fit.unexcited.size == 0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [white, red, derivative])
 def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
@@ -86,6 +87,7 @@ def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
     assert np.all(np.abs(np.mean(off, axis=0)) < 4 / math.sqrt(DRAWS))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [blue, low_passed])
 def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(noise: Noise) -> None:

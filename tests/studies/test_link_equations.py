@@ -24,7 +24,7 @@ RUNS = {
 """Trajectories by robot: rigid, elastic, antagonistic and serial drives, a slide, friction of links."""
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("robot", slow_but(("mixed_3r", "rp_2"), RUNS))
 def test_equations_of_links_hold_and_their_slopes_are_derivatives(robot: str) -> None:
     loaded, signals = computed_signals(robot, RUNS[robot])

@@ -74,6 +74,7 @@ def test_no_pace_of_a_dense_family_is_better(swing, criterion):
     assert found < 0.993 * cost(*swing, criterion, line.spline(np.zeros(1)))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_scipys_optimizer_comes_to_the_same_cost(swing):
     """Over all coefficients of a coarse spline, scaled to the duration."""
@@ -104,11 +105,17 @@ def test_what_is_found_lasts_as_commanded_and_costs_what_the_report_says(swing):
     assert of_joint.after == pytest.approx(math.sqrt(mean), rel=1e-9)
     assert (of_joint.found, of_joint.agreeing) == (True, of_joint.starts)
     assert found.together.after == pytest.approx(of_joint.after / of_joint.before)
-    both = optimize(robot, trajectory, "torque", "both")
-    stiffness = optimize(robot, trajectory, "torque")
-    assert both.joints["swing"].after < 0.99 * min(of_joint.after, stiffness.joints["swing"].after)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
+def test_timing_and_stiffness_together_are_better_than_either(swing):
+    both, timing, stiffness = (optimize(*swing, "torque", vary) for vary in ("both", "timing", "stiffness"))
+    cheaper = min(timing.joints["swing"].after, stiffness.joints["swing"].after)
+    assert both.joints["swing"].after < 0.99 * cheaper
+
+
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
     path = tmp_path / "shake.yaml"

@@ -25,6 +25,9 @@ from vsacli.studies.search.stiffness import StiffnessSearch
 MARGIN = 0.03
 SHOULDER = 1
 
+TENDON = (REPOSITORY / "robots" / "tendon_1r.yaml", REPOSITORY / "trajectories" / "tendon_1r.yaml")
+WEAK = ("--set", "joints.*.actuator.motor.max_torque=0.5")
+
 SWING = """
 format: vsacli-trajectory/1
 name: swing
@@ -192,9 +195,7 @@ def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsa
 @pytest.mark.slow
 def test_implausible_values_are_reported(vsacli):
     implausible = ("--set", "joints.elbow.link.com=[0,0,150]", "--set", "rate=20")
-    done = vsacli(
-        "optimize", ROBOT, REST_TO_REST, "--set", "joints.*.actuator.motor.max_torque=5", *implausible
-    )
+    done = vsacli("optimize", *TENDON, *WEAK, *implausible)
     assert done.code == 3
     assert "\nwarning: joints.elbow.link.com.2 (z) = 150 m is " in done.out
 
@@ -203,8 +204,7 @@ def test_implausible_values_are_reported(vsacli):
 @pytest.mark.slow
 @pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
 def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
-    asked = ("--minimize", criterion, "--set", "joints.*.actuator.motor.max_torque=5", "-o", "best.yaml")
-    done = vsacli("optimize", ROBOT, REST_TO_REST, *asked)
+    done = vsacli("optimize", *TENDON, *WEAK, "--minimize", criterion, "-o", "best.yaml")
     assert done.code == 3
     assert "nothing feasible was found" in done.out
     assert "best.yaml is not written" in done.err

@@ -87,7 +87,7 @@ def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion
 
 @pytest.mark.cases(1)
 @pytest.mark.slow
-@pytest.mark.parametrize(("criterion", "vary"), [("peak", "timing"), ("torque", "both"), ("time", "timing")])
+@pytest.mark.parametrize(("criterion", "vary"), [("time", "timing"), ("peak", "timing"), ("torque", "both")])
 def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str) -> None:
     """At 10 Hz a pace has more detail than steps; the result has as many as describe it."""
     robot = load_robot(TENDON)
@@ -119,7 +119,7 @@ def test_costs_of_all_joints_are_those_of_runs(tmp_path: Path) -> None:
 def test_limits_hold_between_samples_of_random_motions() -> None:
     """Pendulums with motors of limited torque, from 8 to 300 steps a second; some motions are too much."""
     draw, kept = np.random.default_rng(5), 0
-    for _ in range(12):
+    for _ in range(6):
         start, end = draw.uniform(-1.5, 1.5, 2)
         rate, duration = float(np.exp(draw.uniform(*np.log([8, 300])))), draw.uniform(0.8, 2.0)
         motion = rest_to_rest(duration, (1000.0,), start=(start,), end=(end,), rate=rate)
@@ -136,7 +136,7 @@ def test_limits_hold_between_samples_of_random_motions() -> None:
         assert run.report.joints[0].margin >= MARGIN
         assert np.abs(run.tau_motor).max() <= limit
         kept += 1
-    assert kept >= 6
+    assert kept >= 3
 
 
 @pytest.mark.cases(1)
@@ -162,7 +162,7 @@ def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: flo
 def test_a_stiffness_that_is_out_of_reach_at_any_pace_is_where_a_search_begins_elsewhere() -> None:
     """What the motors cost as commanded is not known then, and the fastest motion is the same."""
     robot = load_robot(TENDON)
-    motion = load_trajectory(PULL, robot, {"rate": 500, "stiffness.start": 8, "stiffness.end": 38})
+    motion = load_trajectory(PULL, robot, {"rate": 100, "stiffness.start": 8, "stiffness.end": 38})
     found = optimize(robot, motion, "time", "both", min_margin=MARGIN)
     assert found.timing is not None
     assert np.isnan(found.timing.uniform)

@@ -48,6 +48,7 @@ def torques(robot, motion):
     return np.stack([found.tau_e, found.dtau_e, found.ddtau_e]).transpose(2, 0, 1)  # joints, orders, samples
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", slow_but(["rp_2"], ["rp_2", "mixed_3r", "scara_4"]))
 def test_torques_of_links_by_every_number(name):
     robot, trajectory = loaded(name)
@@ -181,6 +182,7 @@ def check_actuator(actuator, demand):
             np.testing.assert_array_equal(np.isnan(found.by_numbers[name][at]), np.isnan(expected))
 
 
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("law", SPRINGS)
 def test_pairs_by_every_number(law):

@@ -53,6 +53,7 @@ def generic(tmp_path):
     return path
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ARMS)
 def test_what_a_choice_does_is_what_a_run_with_that_motor_computes(name, generic, tmp_path):
     robot, trajectory = shipped(name)
@@ -183,6 +184,7 @@ def test_the_gear_of_least_copper_loss_in_closed_form(turntable, tmp_path):
     assert best.copper_loss == pytest.approx(0.5 / 0.1**2 * rms**2, rel=1e-6)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("seed", [0, *map(slow, range(1, 12))])
 def test_ranges_of_gears_against_a_dense_scan(seed, tmp_path):
     """Shares of limits in plain arithmetic, at many ratios within and beyond the ends of the range."""

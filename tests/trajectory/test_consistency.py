@@ -30,6 +30,7 @@ def complaints(*given, q=None, noise=0.0, time=TIME, method=None):
     return [w for w in SampledProfile.of(named, FitChoice(method)).warnings if "follow" in w]
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
 @pytest.mark.parametrize("step", [slow(1), 10, slow(40)])
 def test_true_derivatives_follow(noise, step):
@@ -55,6 +56,7 @@ def test_measured_derivatives_may_be_noisy():
     assert complaints(rough) == []
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     ("factor", "said"),
     [

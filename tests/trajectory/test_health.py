@@ -303,6 +303,7 @@ def frozen(_rng: np.random.Generator, q: FloatArray, _size: float) -> int:
 SPOILED = {"is off": outlier, "is off at t = 0.000": first_sample, "is frozen": frozen}
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("word", SPOILED)
 def test_faults_are_named_on_every_sensor(word: str):

@@ -62,6 +62,7 @@ def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.Mon
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "case", slow_but([("white", "vibration")], product(["white", "random walk"], MOTIONS)), ids=" - ".join
 )
@@ -83,19 +84,21 @@ def test_what_is_resolved_is_the_same_without_an_early_end(
 
 
 @pytest.mark.slow
-def test_drawn_recordings_are_fitted_the_same_without_an_early_end(monkeypatch: pytest.MonkeyPatch):
-    for seed in range(0, 120, 3):
-        drawn = draw(seed)
-        rows = drawn.position.recorded[None]
-        early = fit_samples(drawn.time, rows, 7, 4, None)
-        with monkeypatch.context() as patched:
-            patched.setattr(resolution, "enough_spans", lambda *_: np.inf)
-            late = fit_samples(drawn.time, rows, 7, 4, None)
-        one, two = early.parts[0], late.parts[0]
-        if two.smoothing is None or two.smoothing.resolved:
-            np.testing.assert_array_equal(one.spline.c, two.spline.c)
-            np.testing.assert_array_equal(early.noise, late.noise)
-        assert (one.smoothing and one.smoothing.resolved) == (two.smoothing and two.smoothing.resolved)
+@pytest.mark.cases(5)
+@pytest.mark.parametrize("seed", range(0, 120, 3))
+def test_drawn_recordings_are_fitted_the_same_without_an_early_end(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+):
+    drawn = draw(seed)
+    rows = drawn.position.recorded[None]
+    early = fit_samples(drawn.time, rows, 7, 4, None)
+    monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
+    late = fit_samples(drawn.time, rows, 7, 4, None)
+    one, two = early.parts[0], late.parts[0]
+    if two.smoothing is None or two.smoothing.resolved:
+        np.testing.assert_array_equal(one.spline.c, two.spline.c)
+        np.testing.assert_array_equal(early.noise, late.noise)
+    assert (one.smoothing and one.smoothing.resolved) == (two.smoothing and two.smoothing.resolved)
 
 
 def test_few_or_uneven_samples_are_searched_to_the_end():

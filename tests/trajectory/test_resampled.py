@@ -18,7 +18,7 @@ def fitted(row, truth):
     return part, np.sqrt(np.mean((found - truth[inside]) ** 2) / np.mean(truth[inside] ** 2))
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["linear", "cubic"])
 @pytest.mark.parametrize("name", ["sines", "sweep to 4 Hz"])

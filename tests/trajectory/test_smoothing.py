@@ -77,6 +77,7 @@ def test_clean_samples_are_interpolated_in_silence(motion, rate):
     assert part.smoothing is None
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("motion", slow_but({"sweep to 4 Hz", "velocity steps, 50 ms"}, MOTIONS))
 @pytest.mark.parametrize("color", FILTERED)
 def test_filtered_noise_is_found(color, motion):
@@ -384,6 +385,7 @@ def test_a_bandwidth_says_which_lines_are_noise():
         assert fit.parts[0].smoothing.lines.others == pytest.approx(lines, abs=0.1)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("samples", [4001, 6001])
 def test_hum_of_mains_is_not_followed_where_knots_are_close_enough(samples):

@@ -96,6 +96,7 @@ LOOKS = [
 ]
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(("name", "scheme"), LOOKS)
 def test_plots_are_drawn_without_complaint(browser: Browser, pages: Pages, name: str, scheme: str) -> None:
     browser.media(prefers_color_scheme=scheme)

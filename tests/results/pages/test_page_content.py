@@ -217,7 +217,7 @@ def test_scripts_are_those_that_the_policy_names_and_nothing_leads_outside(page:
     assert not [tag for tag, attributes in page.tags if any(map(leading_or_acting.fullmatch, attributes))]
 
 
-@pytest.mark.cases(19)
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("kind", slow_but(("markdown", "markup", "unprintable bidirectional"), TEXTS))
 def test_no_text_of_a_file_acts(vsacli: Any, page: Page, feasible_result: Path, kind: str) -> None:
     """Of files that were made by other means, or hold such texts as paths and command lines."""
