@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
@@ -109,15 +108,10 @@ def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) 
     assert ("wrote" in err) == (not {1, 2} & set(streams) and "-o" in COMMANDS[command])
 
 
-def no_room() -> None:
-    """In a child process: nothing can be written to any disk."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-
-
 @pytest.mark.parametrize("command", ["check-feasibility", slow("check-feasibility --fixes")])
 def test_the_report_needs_no_disk(command: str, report: str, tmp_path: Path) -> None:
     arguments = (*EXAMPLE, *command.split()[1:])
-    code, out, err = run(*arguments, folder=tmp_path, preexec_fn=no_room)
+    code, out, err = run(*arguments, folder=tmp_path, largest_file=0)
     assert (code, out.splitlines()[0], err) == (0, report.splitlines()[0], "")
 
 
@@ -142,7 +136,7 @@ def test_full_disks(arguments: tuple[object, ...], code: int, message: str, tmp_
     here.mkdir()
     with ROBOT.open() as robot:
         changes = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-        found, out, err = run(*arguments, folder=here, changes=changes, stdin=robot, preexec_fn=no_room)
+        found, out, err = run(*arguments, folder=here, changes=changes, stdin=robot, largest_file=0)
     assert (found, out) == (code, "")
     assert err.splitlines()[-1].startswith(message)  # Matplotlib may have complained before
     assert not contents(here)
@@ -152,7 +146,7 @@ def test_full_disks(arguments: tuple[object, ...], code: int, message: str, tmp_
 def test_figures_without_a_folder_for_what_matplotlib_keeps(feasible_result: Path, tmp_path: Path) -> None:
     homeless = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "XDG_CONFIG_HOME": "/dev/null"}
     changes = {**homeless, "MPLCONFIGDIR": None}
-    found, out, err = run("plot", feasible_result, folder=tmp_path, changes=changes, preexec_fn=no_room)
+    found, out, err = run("plot", feasible_result, folder=tmp_path, changes=changes, largest_file=0)
     assert (found, out) == (4, "")
     assert err.splitlines()[-1].startswith(
         "figures: cannot be drawn: Matplotlib has no folder for its files;"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import resource
 import subprocess
 import sys
 
@@ -108,11 +107,6 @@ def test_folder_without_permission(vsacli, tmp_path, motion, feasible_result, co
     assert "no permission to write into this folder" in done.err
 
 
-def limit_file_size():
-    """In a child process: no file grows beyond 50 kB, as if the disk were full."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
-
-
 @pytest.mark.parametrize("command", ["invdyn", "export", slow("plot")])
 def test_full_disk_leaves_the_old_file(tmp_path, motion, feasible_result, command):
     (tmp_path / "r.h5").write_bytes(b"old result")
@@ -124,7 +118,7 @@ def test_full_disk_leaves_the_old_file(tmp_path, motion, feasible_result, comman
         "plot": (feasible_result,),
     }
     before = contents(tmp_path)
-    done = installed(command, *arguments[command], "--overwrite", folder=tmp_path, preexec_fn=limit_file_size)
+    done = installed(command, *arguments[command], "--overwrite", folder=tmp_path, largest_file=50_000)
     assert (done.returncode, done.stdout) == (4, "")
     assert re.fullmatch(
         r"\S+: cannot be written: the file would exceed the largest file size allowed here\n", done.stderr

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import resource
 import subprocess
 import sysconfig
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,10 @@ SEVEN_JOINTS_MOTION = REPOSITORY / "trajectories" / "lwr_7r.yaml"
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "vsacli"
 """The installed command."""
+
+
+WITHOUT_BYTECODE = {"PYTHONDONTWRITEBYTECODE": "1"}
+"""For processes with a limit on the size of files, in which Python stores bytecode that ends too early."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +59,15 @@ def seven_joint_motion(target: Path, rate: float) -> Path:
     return edited(SEVEN_JOINTS_MOTION, target, ("rate: 1000 ", f"rate: {rate} "))
 
 
-def installed(*arguments: object, folder: Path, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run the installed command in a folder and wait for it."""
+def installed(
+    *arguments: object, folder: Path, largest_file: int | None = None, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Run the installed command in a folder and wait for it; no file grows beyond `largest_file` bytes."""
     command = [str(COMMAND), *map(str, arguments)]
+    if largest_file is not None:
+        limits = largest_file, largest_file
+        options["preexec_fn"] = partial(resource.setrlimit, resource.RLIMIT_FSIZE, limits)
+        options["env"] = {**options.get("env", os.environ), **WITHOUT_BYTECODE}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.run(command, cwd=folder, check=False, **{**pipes, **options})
 

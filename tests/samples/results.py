@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from samples.command_line import WITHOUT_BYTECODE
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
@@ -126,7 +127,8 @@ def write_result(
 def python(script: str, *arguments: str, folder: Path, **options: Any) -> subprocess.Popen[str]:
     """Start Python on a script in a folder, with this checkout and the tests importable."""
     here = Path(__file__).parents[1]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])}
+    path = os.pathsep.join([str(here.parent), str(here)])
+    environment = {**os.environ, **WITHOUT_BYTECODE, "PYTHONPATH": path}
     command = [sys.executable, "-W", "error", "-c", script, *arguments]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen(command, cwd=folder, env=environment, **pipes, **options)
