@@ -30,6 +30,7 @@ def run(actuator: Serial = COUPLED) -> Result:
     return inverse_dynamics(robot_of(LINK, [actuator]), motion_of([DEVICE.stiffness]))
 
 
+@pytest.mark.slow
 def test_the_full_model_follows() -> None:
     rigid = Rigid(motor=Motor(inertia=0.2, damping=0.1)), Drive(0.2, [0.1]), (np.nan, np.nan)
     cases = [(COUPLED, DRIVE, (300, 700)), rigid, (DEVICE.actuator, DEVICE.drive, (500, 400))]

@@ -14,10 +14,9 @@ QUICK = "12 bits, zero-phase 20 Hz"
 """The color that is tried at every run of the tests."""
 
 
+@pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize(
-    "color", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLORS]
-)
+@pytest.mark.parametrize("color", COLORS)
 def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(color):
     covered = []
     for seed in (20, 21, 22):

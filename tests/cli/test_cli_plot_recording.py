@@ -28,7 +28,8 @@ def log(own_folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("robot", [(), pytest.param(("--robot", ROBOT), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", [(), ("--robot", ROBOT)])
 def test_a_recording_is_drawn(vsacli, log, robot):
     done = vsacli("plot", log.name, *robot, "-o", "drawn", "--format", "svg")
     assert (done.code, done.out, done.err) == (0, "", "wrote drawn/log-recording.svg\n")

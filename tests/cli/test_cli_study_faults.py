@@ -106,6 +106,7 @@ def test_a_file_of_somebody_else_is_no_journal(vsacli: Any, grid_study: str, con
     assert journal.read_bytes() == content_then
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0, 7])
 def test_a_journal_that_was_cut_off_in_its_first_line_is_begun_anew(
     vsacli: Any, grid_study: str, grid_table: Path, length: int

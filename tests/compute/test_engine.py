@@ -134,6 +134,7 @@ def test_other_branch_and_followed_deflections_agree():
     assert_agree(found, block_of(kernel, motion, integrated=integrated))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 @pytest.mark.parametrize("frame", ["end_effector", "base"])
 def test_wrench_counts_in_either_frame(frame: str):

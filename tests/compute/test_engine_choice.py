@@ -123,6 +123,7 @@ def test_without_a_compiler_the_message_says_how_to_get_one(tmp_path: Path, monk
     assert str(raised.value) == f"{reason}; the engine numpy needs none"
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_compiler_of_a_package_is_found_where_the_system_has_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -214,6 +215,7 @@ def test_measured_springs_are_left_to_numpy_until_tracing_repays():
     assert choose("auto", kernel, 200_000).reason.startswith("C code computes")
 
 
+@pytest.mark.slow
 def test_what_rarely_runs_counts_little():
     """Fallbacks of the iterations are five sixths of the operations, and take a tenth of the time."""
     code = kernel_code(BalancedDynamics(shipped_robot("measured_1r"), None))

@@ -87,9 +87,10 @@ def test_no_undefined_behavior(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
 
 
+@pytest.mark.slow
 @pytest.mark.cases(1)
 @needs_compiler
-@pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
+@pytest.mark.parametrize("name", ["3R", "mixed", "sinh", "table", "four_bar"])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, compiler=COMPILERS[-1], precision="float") == "all values agree\n"
 
@@ -152,6 +153,7 @@ def test_the_self_test_notices_a_wrong_number(tmp_path: Path) -> None:
     assert re.search(r"^\d+ values differ$", done.stdout, re.MULTILINE)
 
 
+@pytest.mark.slow
 @needs_compiler
 @needs("make", "make")
 def test_the_makefile(tmp_path: Path) -> None:
@@ -193,7 +195,8 @@ def test_every_loop_is_bounded_by_a_constant(name: str) -> None:
     assert set(re.findall(r"while \(.*\)", source)) <= {"while (low < high)"}, "halving of a table"
 
 
-@pytest.mark.parametrize("name", ["table", slow("four_bar")])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["table", "four_bar"])
 def test_nothing_of_a_spring_stands_in_the_code_twice(name: str) -> None:
     source = project(name).files[f"{prefix_of(ROBOTS[name])}.c"]
     arrays = [entries.split(", ") for entries in re.findall(r"^static const .*\{(.*)\};$", source, re.M)]

@@ -211,7 +211,8 @@ def test_steps_start_from_states_that_lie_apart_in_memory():
     assert np.array_equal(apart.y, alone.y)
 
 
-@pytest.mark.parametrize("processes", [1, slow(2)])
+@pytest.mark.slow
+@pytest.mark.parametrize("processes", [1, 2])
 def test_runs_with_errors_of_the_model_are_those_of_one_by_one(processes):
     robot, trajectory = vsa_3r(), short_motion(3, rate=100, duration=0.2)
     conditions = {"gains": GAINS, "initial_error": InitialError(0.01), "engine": "numpy"}
@@ -279,6 +280,7 @@ class _Deciding(Cubic):
         return super().torque(phi if float(np.max(phi)) < 3 else 0 * phi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [_Own, _Deciding])
 def test_laws_that_cannot_be_recorded_are_left_to_the_text(law):
     laws = [each(k=380.0, k_c=3500.0) for each in (law, Cubic)]

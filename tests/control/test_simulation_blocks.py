@@ -65,6 +65,7 @@ def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
     assert not any(block.flags.any() for block in others)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_duration(monkeypatch):
     monkeypatch.setattr(history, "BLOCK", 512)
 

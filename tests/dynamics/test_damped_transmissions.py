@@ -11,7 +11,7 @@ import pytest
 import sympy
 from samples.driven_arm import ARM, DURATION, LINK, assert_follows, motion_of, robot_of
 from samples.full_model import Drive, springs_of
-from samples.marks import slow, slow_but
+from samples.marks import slow
 from samples.mechanisms import DEVICES
 
 from vsacli import Gains, Robot, inverse_dynamics, simulate
@@ -167,8 +167,9 @@ def test_little_damping_tends_to_none(name: str) -> None:
     np.testing.assert_allclose(np.divide(gaps[:-1], gaps[1:]), 2, rtol=0.02)  # what is quadratic in d
 
 
+@pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("name", slow_but({"elastic"}, CASES))
+@pytest.mark.parametrize("name", CASES)
 def test_neither_blocks_nor_engine_decide(name: str) -> None:
     robot, trajectory = pendulum(name), swing(name)
     whole = inverse_dynamics(robot, trajectory)

@@ -93,6 +93,7 @@ def test_first_step_is_the_root_itself():
     np.testing.assert_array_equal(start[..., 0], inverse_dynamics(ARM, trajectory).phi[0])
 
 
+@pytest.mark.slow
 def test_result_does_not_depend_on_the_blocks():
     trajectory = softening()
     deflections = softened()

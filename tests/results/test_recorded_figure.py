@@ -12,6 +12,7 @@ from vsacli.results.charts.reduction import Curve
 from vsacli.results.plots import recorded_figure
 
 
+@pytest.mark.slow
 def test_each_component_has_four_panels() -> None:
     figure = recorded_figure([curve(), curve("wrist.q", rms=0.0, cutoff=np.nan)], "log")
     titles = [axes.get_title(loc="left") for axes in figure.axes]

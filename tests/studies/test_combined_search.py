@@ -148,6 +148,7 @@ def test_no_combination_is_slower_than_the_slowest_that_is_tried():
     assert found.factor <= LARGEST_FACTOR
 
 
+@pytest.mark.slow
 def test_discarded_factors_are_no_better():
     """Each factor of the scan by itself; bounds of the costs are below the costs."""
     searched, every = search(), search()

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from samples.marks import slow
 from samples.noisy_records import MOTIONS, record
 from scipy.interpolate import make_interp_spline
 
@@ -34,7 +33,8 @@ def test_a_component_that_is_not_resolved_has_no_covariance_but_a_bound(stepwise
     assert list(bound.members) == [0]
 
 
-@pytest.mark.parametrize("rate", [250, slow(2000)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [250, 2000])
 def test_impulses_where_jerk_jumps_are_within_the_bound(rate):
     """Each as long as `SHORTEST_IMPULSE`: the truth is a spline through exact samples that far apart."""
     motion = MOTIONS["minimum jerk"]
@@ -63,6 +63,7 @@ def test_what_is_resolved_needs_no_bound():
     assert not list(unresolved(fit_samples(made.time, made.values[None], 7, 4, SMOOTH), 5))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("follows", [False, True])
 def test_a_vibration_that_may_be_motion_has_the_covariance_of_a_sine(stepwise, follows):
     (part,) = stepwise.parts
