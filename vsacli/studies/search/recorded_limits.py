@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
 from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import LIMITS
-from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.signals import STIFFNESS, Signal
 from vsacli.base.variables import deviation
 from vsacli.dynamics.limits import limit_flags, open_steps
@@ -79,6 +78,11 @@ class RecordedLimits:
     def _probed(self) -> FloatArray:
         return probed_times(self.trajectory)
 
+    @cached_property
+    def _known(self) -> Callable[[Robot, int, Joint, bytes], Mapping[str, AnyArray]]:
+        """Function `_known_at` of this task, with its latest results."""
+        return lru_cache(KEPT)(partial(_known_at, self))
+
     def _deviations(
         self, robot: Robot, joint: Joint, stiffness: FloatArray | None, instants: Instants
     ) -> dict[str, AnyArray]:
@@ -94,7 +98,7 @@ class RecordedLimits:
         change = self._change(index, joint, stiffness, instants)
         ends = np.hstack([[time, instants.factor, change] for time in (first, last)])
         probes, places = np.unique(ends, axis=1, return_inverse=True)  # instants between samples share them
-        known = _known(self, robot, index, joint, probes.tobytes())
+        known = self._known(robot, index, joint, probes.tobytes())
         between = {name: np.split(array[..., places], 2, axis=-1) for name, array in known.items()}
         return {name: (1 - share) * begin + share * end for name, (begin, end) in between.items()}
 
@@ -108,8 +112,7 @@ class RecordedLimits:
         return np.where(np.abs(stiffness - asked) > SAME_STIFFNESS * asked, stiffness - asked, 0.0)
 
 
-@cached_by_identity(KEPT)
-def _known(
+def _known_at(
     limits: RecordedLimits, robot: Robot, index: int, joint: Joint, probes: bytes
 ) -> Mapping[str, AnyArray]:
     """Return the standard deviations of a joint by name, (probes,) or (2, probes).
