@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -162,6 +165,26 @@ def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     whole = ladder(*load("7R"))
     monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
     assert ladder(*load("7R")) == whole
+
+
+@pytest.mark.slow
+def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatch):
+    """All times at all scales, of eight derivatives, would take three times as much."""
+    arm = load("7R")[0]
+    joints = [
+        replace(joint, name=f"joint_{number}") for number, joint in enumerate(islice(cycle(arm.joints), 40))
+    ]
+    chain = replace(arm, gravity=(0.0, 0.0, 0.0), joints=tuple(joints))
+    motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
+    stiffness = Constant(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
+    trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
+    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
+    tracemalloc.start()
+    try:
+        ladder(chain, trajectory)
+        assert tracemalloc.get_traced_memory()[1] < 16e6  # 10.4e6
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.slow

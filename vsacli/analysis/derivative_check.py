@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -240,13 +239,17 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
 class _RungErrors:
     """Errors of a derivative relative to its peak; `add` times in order, then call `relative`.
 
+    A time has all its scales only until its neighbors are known: a long chain has many columns.
+
     Args:
         steps: Difference steps of all times, (scales, times), s.
     """
 
     def __init__(self, steps: FloatArray) -> None:
         self._steps = steps
-        self._found: list[tuple[AnyArray, ...]] = []
+        self._open: tuple[AnyArray, ...] = ()  # of the times not judged yet, and of the neighbors before them
+        self._begin = self._judged = 0  # the first time in `_open`, and the first one not judged
+        self._found: list[tuple[FloatArray, ...]] = []
         self._peak: FloatArray | float = 0.0
 
     def add(
@@ -276,29 +279,41 @@ class _RungErrors:
         )
         there = np.broadcast_to(compared[..., None], difference.shape)
         of_value, of_derivative = (np.where(there, np.abs(each), 0.0) for each in noise)
-        found = difference, derivatives[:, MIDDLE], np.maximum(of_value, grain), of_derivative, there
-        self._found.append(found)
+        middle = derivatives[:, MIDDLE]
+        found: tuple[AnyArray, ...] = difference, middle, np.maximum(of_value, grain), of_derivative, there
+        if self._open:
+            found = tuple(np.concatenate(pair, axis=1) for pair in zip(self._open, found, strict=True))
+        self._open = found
         valid: BoolArray = np.any(there, axis=0)
         self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
+        self._judge(self._begin + found[0].shape[1] - NEIGHBORS)
 
-    def relative(self) -> tuple[FloatArray, FloatArray]:
-        """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each.
+    def _judge(self, end: int) -> None:
+        """Find the errors of the times before `end`, and drop what no later time needs.
 
         The step with the least sum of error and noise decides: noise grows as steps shrink, and a wrong
         derivative is wrong at each step.
         """
-        difference, derivative, *noise, there = map(
-            partial(np.concatenate, axis=1), zip(*self._found, strict=True)
-        )
-        steps = self._steps[..., None, None]
-        of_value, of_derivative = map(_largest_near, noise)
+        if end <= self._judged:
+            return
+        now = slice(self._judged - self._begin, end - self._begin)
+        difference, derivative, *noise, there = self._open
+        steps = self._steps[:, self._judged : end, None, None]
+        of_value, of_derivative = (_largest_near(each)[:, now] for each in noise)
         admitted = NOISE_GAIN * (of_value / steps + of_derivative)
-        error = np.abs(difference / steps - derivative)
-        best = np.argmin(np.where(there, error + admitted, np.inf), axis=0)[None]
-        valid = there.any(axis=0)
-        error, admitted = (
-            np.where(valid, np.take_along_axis(each, best, axis=0)[0], 0.0) for each in (error, admitted)
-        )
+        error = np.abs(difference[:, now] / steps - derivative[:, now])
+        best = np.argmin(np.where(there[:, now], error + admitted, np.inf), axis=0)[None]
+        valid = there[:, now].any(axis=0)
+        at_best = (np.take_along_axis(each, best, axis=0)[0] for each in (error, admitted))
+        self._found.append(tuple(np.where(valid, each, 0.0) for each in at_best))
+        kept = max(end - NEIGHBORS, self._begin)
+        self._open = tuple(each[:, kept - self._begin :].copy() for each in self._open)
+        self._begin, self._judged = kept, end
+
+    def relative(self) -> tuple[FloatArray, FloatArray]:
+        """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each."""
+        self._judge(self._steps.shape[1])
+        error, admitted = map(np.concatenate, zip(*self._found, strict=True))
         scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak))
         error, bound = (
             np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(len(each), -1)
