@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -19,6 +19,7 @@ from growth import chain_documents
 from subjects import PAPER, ROBOTS, SEVEN_JOINTS, TRAJECTORIES
 
 from vsacli import load_robot, load_trajectory
+from vsacli.base.arrays import FloatArray
 
 EXPORTED = 1_200_000
 """Samples of the table that is written as CSV."""
@@ -104,9 +105,8 @@ def _recordings(folder: Path, run: Callable[..., Line]) -> Iterator[tuple[str, L
     clean = np.round(0.5 * np.sin(np.pi * time / RECORDED) ** 4 / 1e-5) * 1e-5
     for name, q in (("resolved", clean), ("nothing resolved", 0.1 * noise(time.size))):
         path = folder / f"{name}.csv"
-        table = np.column_stack([time, q, np.full(time.size, 0.2)])
-        header = "time [s],elbow.q [rad],elbow.stiffness [N m/rad]"
-        np.savetxt(path, table, "%.9g", ",", header=header, comments="")
+        stiffness = np.full(time.size, 0.2)
+        _save(path, {"time [s]": time, "elbow.q [rad]": q, "elbow.stiffness [N m/rad]": stiffness})
         yield f"a recording of 10 s, {name}", run("invdyn", ONE_JOINT[0], path)
 
 
@@ -116,16 +116,19 @@ def _hurried(folder: Path) -> tuple[Path, Path]:
     trajectory = load_trajectory(SEVEN_MIXED[1], robot)
     motion = trajectory.block(0, trajectory.samples)
     signals = {"q": np.round(motion.q / 1e-5) * 1e-5, "stiffness": motion.commanded["stiffness"]}
-    columns = [
-        (f"{joint.name}.{name}", values[:, index])
-        for name, values in signals.items()
-        for index, joint in enumerate(robot.joints)
-        if name == "q" or name in joint.commanded
-    ]
-    names, values = zip(("time", HURRIED * motion.time), *columns, strict=True)
+    columns = {"time": HURRIED * motion.time}
+    for name, values in signals.items():
+        for index, joint in enumerate(robot.joints):
+            if name == "q" or name in joint.commanded:
+                columns[f"{joint.name}.{name}"] = values[:, index]
     path = folder / "hurried.csv"
-    np.savetxt(path, np.column_stack(values), "%.9g", ",", header=",".join(names), comments="")
+    _save(path, columns)
     return SEVEN_MIXED[0], path
+
+
+def _save(path: Path, columns: Mapping[str, FloatArray]) -> None:
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, "%.9g", ",", header=",".join(columns), comments="")
 
 
 def _exports(folder: Path) -> Iterator[tuple[str, Line]]:

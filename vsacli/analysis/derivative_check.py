@@ -248,7 +248,7 @@ class _RungErrors:
     def __init__(self, steps: FloatArray) -> None:
         self._steps = steps
         self._open: tuple[AnyArray, ...] = ()  # of the times not judged yet, and of the neighbors before them
-        self._begin = self._judged = 0  # the first time in `_open`, and the first one not judged
+        self._judged = 0  # number of times judged
         self._found: list[tuple[FloatArray, ...]] = []
         self._peak: FloatArray | float = 0.0
 
@@ -286,7 +286,12 @@ class _RungErrors:
         self._open = found
         valid: BoolArray = np.any(there, axis=0)
         self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
-        self._judge(self._begin + found[0].shape[1] - NEIGHBORS)
+        self._judge(self._first_open + found[0].shape[1] - NEIGHBORS)
+
+    @property
+    def _first_open(self) -> int:
+        """Index of the first time in `_open`."""
+        return max(self._judged - NEIGHBORS, 0)
 
     def _judge(self, end: int) -> None:
         """Find the errors of the times before `end`, and drop what no later time needs.
@@ -296,7 +301,8 @@ class _RungErrors:
         """
         if end <= self._judged:
             return
-        now = slice(self._judged - self._begin, end - self._begin)
+        begin = self._first_open
+        now = slice(self._judged - begin, end - begin)
         difference, derivative, *noise, there = self._open
         steps = self._steps[:, self._judged : end, None, None]
         of_value, of_derivative = (_largest_near(each)[:, now] for each in noise)
@@ -306,9 +312,8 @@ class _RungErrors:
         valid = there[:, now].any(axis=0)
         at_best = (np.take_along_axis(each, best, axis=0)[0] for each in (error, admitted))
         self._found.append(tuple(np.where(valid, each, 0.0) for each in at_best))
-        kept = max(end - NEIGHBORS, self._begin)
-        self._open = tuple(each[:, kept - self._begin :].copy() for each in self._open)
-        self._begin, self._judged = kept, end
+        self._judged = end
+        self._open = tuple(each[:, self._first_open - begin :].copy() for each in self._open)
 
     def relative(self) -> tuple[FloatArray, FloatArray]:
         """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each."""
@@ -375,7 +380,7 @@ class SelfCheck(Stored):
 
     @property
     def passed(self) -> bool:
-        """Whether all residuals and errors are within their bounds."""
+        """Return whether all residuals and errors are within their bounds."""
         springs_and_shafts = self.spring_residual <= self.spring_bound and self.shaft_residual <= SHAFT_BOUND
         return springs_and_shafts and self.ladder <= self.ladder_bound
 

@@ -23,7 +23,6 @@ from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import COMPUTED, block_of, command_of, elastic_torques, usual_block
-from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -72,9 +71,7 @@ class Uncertainty:
             motion = trajectory.at(trajectory.start + elapsed)
             covariances = {signal: each.covariance(elapsed) for signal, each in estimates.items()}
             parts.append(deviations(robot, motion, estimates, covariances, engine))
-        names = list(parts[0].deviations)
-        self._known = {name: np.concatenate([part.deviations[name] for part in parts]) for name in names}
-        self.unstated = {name: np.any([part.unstated[name] for part in parts], axis=0) for name in names}
+        self._known, self.unstated = Deviations.joined(parts, axis=0)
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
         """Return the deviations at any times by variable, and of `MARGIN`: each (samples, joints[, 2])."""
@@ -116,6 +113,15 @@ class Deviations(NamedTuple):
     deviations: dict[str, FloatArray]
     unstated: dict[str, BoolArray]
 
+    @classmethod
+    def joined(cls, parts: Sequence[Deviations], axis: int) -> Deviations:
+        """Return the deviations at the times of all parts; `axis` is that of the times."""
+        names = parts[0].deviations
+        return cls(
+            {name: np.concatenate([part.deviations[name] for part in parts], axis) for name in names},
+            {name: np.any([part.unstated[name] for part in parts], axis=0) for name in names},
+        )
+
 
 class _Shift(NamedTuple):
     """A change of one component of a signal or of a derivative by its standard deviation.
@@ -149,7 +155,7 @@ def deviations(
         covariances: Their covariances, (components, orders, orders, times), as in `SampledProfile`.
         engine: Backend.
     """
-    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
+    undamped = _without_inner_dampers(robot)
     frame = None if motion.wrench is None else motion.wrench.frame
     kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
 
@@ -183,7 +189,7 @@ def deviations_of_joint(
     Returns:
         The values that `deviations` has for the joint, except that of `MARGIN`.
     """
-    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
+    undamped = _without_inner_dampers(robot)
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
@@ -288,12 +294,13 @@ def _values_and_gradients(
     return values, gradients
 
 
-def _without_inner_damper(joint: Joint) -> Joint:
-    """Return the joint without a damper parallel to its springs.
+def _without_inner_dampers(robot: Robot) -> Robot:
+    """Return the robot without dampers parallel to its springs.
 
-    With the damper, motors respond to the links later and less, so deviations without it are upper estimates.
+    With them, motors respond to the links later and less, so deviations without them are upper estimates.
     """
-    return replace(joint, damper=joint.damper_at("link"))
+    joints = (replace(joint, damper=joint.damper_at("link")) for joint in robot.joints)
+    return replace(robot, joints=tuple(joints))
 
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:

@@ -132,12 +132,11 @@ def _known_at(
         _probe(limits, changed, index, *rows[:, start : start + several])
         for start in range(0, rows.shape[1], several)
     ]
-    known = {}
-    for name in parts[0].deviations:
-        unstated = np.any([part.unstated[name] for part in parts], axis=0)
-        array = np.concatenate([part.deviations[name] for part in parts], axis=-1)
-        known[deviation(name)] = np.where(unstated[..., None], np.nan, array)
-    return known
+    found = Deviations.joined(parts, axis=-1)
+    return {
+        deviation(name): np.where(found.unstated[name][..., None], np.nan, array)
+        for name, array in found.deviations.items()
+    }
 
 
 def _probe(
