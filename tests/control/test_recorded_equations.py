@@ -26,7 +26,7 @@ from vsacli.base.errors import InputError
 from vsacli.compute.engine import compiler
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, perturbed, simulate
-from vsacli.control.simulation.compiled_loop import dop853_with_stages
+from vsacli.control.simulation.compiled_loop import LARGEST_GROWTH, dop853_with_stages
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.loop_code import loop_code, record
 from vsacli.control.simulation.loop_equations import Computing, Equations, RecordedEquations
@@ -181,8 +181,9 @@ def test_recorded_controllers_that_hold_their_torques_ask_for_those_of_the_text(
 
 
 @needs_compiler
-def test_steps_are_those_of_scipy():
+def test_steps_are_those_of_scipy(monkeypatch):
     """The same times, to rounding: who computes the stages has no part in the control of the steps."""
+    monkeypatch.setattr("vsacli.control.simulation.compiled_loop.LARGEST_GROWTH", 10.0)  # SciPy's own
     case = shipped_loop("cubic springs")
     fast = equations(case, "c")
     options = {"rtol": 1e-9, "atol": 1e-10}
@@ -195,6 +196,25 @@ def test_steps_are_those_of_scipy():
         middle = (theirs.t_old + theirs.t) / 2
         assert ours.dense_output()(middle) == pytest.approx(theirs.dense_output()(middle), abs=1e-9)
     assert fast.budget.used >= theirs.nfev
+
+
+def test_steps_grow_no_faster_than_the_ones_before():
+    """From t = 1 to 2 the error estimate is zero; SciPy alone lengthens its steps tenfold there."""
+
+    def rates(time, _state):
+        return np.array([0.0 if 1 < time < 2 else np.cos(40 * time)])
+
+    options = {"rtol": 1e-9, "atol": 1e-10, "max_step": 0.3}
+    growths = {}
+    for method, more in ((dop853_with_stages(), {"stages": lambda *_: None}), (DOP853, {})):
+        solver, lengths = method(rates, 0.0, np.zeros(1), 3.0, **options, **more), []
+        while solver.status == "running":
+            solver.step()
+            lengths.append(solver.step_size)
+        growths[method] = np.divide(lengths[11:-1], lengths[10:-2]).max()
+    ours, theirs = growths.values()
+    assert ours <= LARGEST_GROWTH * (1 + 1e-6)  # lengths are differences of times a million times larger
+    assert theirs > 2
 
 
 @needs_compiler

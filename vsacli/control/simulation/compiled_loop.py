@@ -18,6 +18,15 @@ from vsacli.compute.engine.compiler import CompilerError
 from vsacli.control.simulation.loop_code import Recording
 from vsacli.control.simulation.tabulated import Table
 
+LARGEST_GROWTH = 1.1
+"""Largest ratio of a step to the one before, unless steps grow faster already, as they do at the start.
+
+Where the error estimate passes through zero, SciPy lengthens a step up to ten times and accepts it,
+whatever its error. Rounding decides which steps these are: with three backends and the kernels of five
+processors, the largest position error of three runs of the paper's robot was 2e-11 to 4e-9 rad without this
+bound, and 5e-11 to 1.4e-10 rad with it, after 1 to 7 % fewer evaluations, since fewer steps are rejected.
+"""
+
 
 class Stages(NamedTuple):
     """Stages of an explicit Runge-Kutta method.
@@ -39,8 +48,9 @@ def dop853_with_stages() -> Any:
     """Return a class with the step and error control of SciPy's DOP853 that computes stages in one call.
 
     Its constructor has a further argument, `stages`, a function like `Equations.stages`. If this returns
-    None, SciPy evaluates one stage after the other. SciPy has no hook for that, so the code of its
-    `_step_impl` is run with another `rk_step` among its globals. Without this name, only speed is lost.
+    None, SciPy evaluates one stage after the other. Steps grow as `LARGEST_GROWTH` allows. SciPy has no
+    hooks for that, so the code of its `_step_impl` is run with another `rk_step` and `MAX_FACTOR` among its
+    globals.
     """
     from scipy.integrate import DOP853
 
@@ -55,8 +65,15 @@ def dop853_with_stages() -> Any:
         def __init__(self, *arguments: Any, stages: Any, **options: Any) -> None:
             super().__init__(*arguments, **options)
             self._stages = stages
-            names = {**text.__globals__, "rk_step": self._rk_step}
-            self._step_impl = MethodType(FunctionType(text.__code__, names), self)
+            self._names = {**text.__globals__, "rk_step": self._rk_step}
+            self._scipy_step = MethodType(FunctionType(text.__code__, self._names), self)
+
+        def _step_impl(self) -> Any:
+            begin = self.t
+            outcome = self._scipy_step()
+            if length := abs(self.t - begin):
+                self._names["MAX_FACTOR"] = max(LARGEST_GROWTH, self.h_abs / length)
+            return outcome
 
         def _rk_step(self, fun: Any, t: Any, y: Any, f: Any, h: Any, *tableau: Any) -> Any:
             """Return the state at the end of a trial step, and its rates; store those of the stages in K."""
