@@ -147,12 +147,12 @@ def test_what_cannot_be_held(urdf, hold, reason):
             [('joint="left"', 'joint="wrist"')],
             {},
             r"14: joint 'right' outside the chain follows 'wrist' on it .*\n"
-            r"arm.urdf:15: joint 'bend' outside the chain follows 'wrist' on it .* choose a tip before",
+            r"arm.urdf:15: joint 'bend' outside the chain follows 'wrist' on it .*; hold it by --hold bend=0",
         ),
         (
             [(f' rpy="1 0 0"/><axis xyz="0 0 1"/>{LIMIT}', ' rpy="1 0 0"/><mimic joint="wrist"/>')],
             {},
-            "10: joint 'lean' below the base follows 'wrist' on it .* choose a base before",
+            "10: joint 'lean' below the base follows 'wrist' on it .*; hold it by --hold lean=0",
         ),
         (
             [('multiplier="-2"', 'multiplier="-1e9"'), ('multiplier="0.5"', 'multiplier="1e9"')],

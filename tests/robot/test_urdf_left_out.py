@@ -12,6 +12,8 @@ from vsacli.robot.urdf import Placeholders, import_urdf, robot_text
 
 LIMIT = '<limit effort="32" velocity="1"/>'
 
+UNATTACHED = "warning: arm.urdf:5: the transmission of joint 'nod', which does not exist, is ignored"
+
 
 def transmission(joints="turn", reductions=(50,), kind="transmission_interface/SimpleTransmission", motors=1):
     ends = "".join(f'<joint name="{name}"/>' for name in joints.split())
@@ -74,7 +76,7 @@ def notes(tmp_path, monkeypatch):
             transmission(kind="").replace("name=", 'type="SimpleTransmission" name=', 1),
             ["gear reductions taken over: turn 50"],
         ),
-        ("", transmission("turn nod"), ["transmission that is not simple left out: turn"]),
+        ("", transmission("turn nod"), [UNATTACHED, "transmission that is not simple left out: turn"]),
         (
             "",
             transmission(kind="a/DifferentialTransmission"),
@@ -87,7 +89,12 @@ def notes(tmp_path, monkeypatch):
             transmission() * 2,
             ["gear reductions taken over: turn 50", "transmission that is not simple left out: turn"],
         ),
-        ("", transmission("nod"), []),
+        ("", transmission("nod"), [UNATTACHED]),
+        (
+            "",
+            transmission(reductions=[]).replace('name="motor"', 'name="motor" mechanicalReduction="50"'),
+            ["gear reductions taken over: turn 50"],
+        ),
     ],
 )
 def test_what_is_said_of_a_joint(notes, rest, beside, expected):

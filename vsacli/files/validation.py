@@ -212,7 +212,8 @@ def _catalog(path: str, _: Robots) -> Checked:
 def _urdf(path: str, _: Robots) -> Checked:
     urdf = read_urdf(path)
     flaws = [link.flaw for link in urdf.links.values() if link.flaw is not None]
-    messages = tuple(Message(WARNING, path, *flaw) for flaw in flaws)
+    doubts = [*flaws, *((warning.line, warning.message) for warning in urdf.warnings)]
+    messages = tuple(Message(WARNING, path, *doubt) for doubt in doubts)
     return Checked(path, f"URDF of {urdf.name}, {counted(len(urdf.joints), 'joint')}", messages)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InvalidRecordError
+from vsacli.base.errors import InvalidRecordError, Problem
 from vsacli.base.texts import as_name, one_line
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
@@ -33,7 +33,7 @@ from vsacli.robot.urdf.dh import (
     tidy,
     tidy_angle,
 )
-from vsacli.robot.urdf.link_tree import Body, inverse, roll_pitch_yaw
+from vsacli.robot.urdf.link_tree import Body, UrdfJoint, inverse, roll_pitch_yaw
 from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, joint_loads
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.serial_chain import (
@@ -67,6 +67,7 @@ class Conversion:
         loads: largest load of each joint, to which its actuator was sized.
         snaps: axes that were made parallel.
         residual: deviation of the robot's tip from the chain's.
+        file_warnings: words of the file that are ignored, and implausible orientations, by line.
     """
 
     file: str
@@ -76,6 +77,7 @@ class Conversion:
     loads: tuple[JointLoad, ...]
     snaps: tuple[Snap, ...]
     residual: Residual
+    file_warnings: tuple[Problem, ...] = ()
 
     @property
     def one_motor_each(self) -> bool:
@@ -105,20 +107,34 @@ class Conversion:
             yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
-        """Yield sentences about implausible values."""
+        """Yield sentences about implausible values, and parts of the file that are ignored."""
+        yield from map(str, self.file_warnings)
         yield from (warning for held in self.chain.held for warning in held.warnings())
         yield from self.robot.warnings
 
     def notes(self) -> Iterator[str]:
         """Yield sentences on parts left out or changed."""
-        joints = [joint.urdf for joint in self.chain.joints]
+        joints = [*(joint.urdf for joint in self.chain.joints), *self.chain.followers]
         yield from _held("below the base", self.chain.held_below)
         yield from _held("outside the chain, their links lumped", self.chain.held_beside)
+        yield from _massless(self.chain.followers)
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()
+        yield from self._dropped_limits()
         for what in dict.fromkeys(label for joint in joints for label in joint.left_out):
             yield f"{what} left out: {', '.join(joint.name for joint in joints if what in joint.left_out)}"
+
+    def _dropped_limits(self) -> Iterator[str]:
+        """Yield a note for each kind of limits that cannot be ones, with joints, values and lines."""
+        dropped: dict[str, list[str]] = {}
+        for joint in (*self.chain.joints, *self.chain.held):
+            for phrase, value in joint.urdf.limit.dropped:
+                if isinstance(joint, ChainJoint) or phrase.startswith(
+                    "position"
+                ):  # with which held ones are compared
+                    dropped.setdefault(phrase, []).append(f"{joint.urdf.name} {value}")
+        yield from (f"{phrase}: {', '.join(values)}" for phrase, values in dropped.items())
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
@@ -140,6 +156,15 @@ def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
         yield f"held at zero {place}: {', '.join(at_zero)}"
     if elsewhere:
         yield f"held {place}: {', '.join(elsewhere)}"
+
+
+def _massless(followers: Sequence[UrdfJoint]) -> Iterator[str]:
+    """Yield notes on joints that move with the chain, but have no mass."""
+    if followers:
+        names = [f"{joint.name} (follows {joint.mimic.leader})" for joint in followers if joint.mimic]
+        yield f"outside the chain, following it without mass, so without torque: {', '.join(names)}"
+    if damped := [joint.name for joint in followers if joint.damping]:
+        yield f"damping of joints that follow the chain left out: {', '.join(damped)}"
 
 
 def _exactness(residual: Residual) -> str:
@@ -202,7 +227,7 @@ def import_urdf(
     ]
     robot = _robot(file, chain, frames, links, actuators)
     residual = kinematic_residual(chain, robot)
-    return Conversion(file, chain, robot, chosen, tuple(loads), frames.snaps, residual)
+    return Conversion(file, chain, robot, chosen, tuple(loads), frames.snaps, residual, urdf.warnings)
 
 
 def _robot(

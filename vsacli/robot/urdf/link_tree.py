@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import POSITION, Quantity
 from vsacli.documents.tree import quoted
 
@@ -34,6 +34,14 @@ def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
         ]
     )
     return transform(rotation, np.array(list(xyz)))
+
+
+def quaternion_rotation(quaternion: FloatArray) -> FloatArray:
+    """Return the rotation matrix, (3, 3), of a unit quaternion x, y, z, w, by Rodrigues' formula."""
+    *_, w = quaternion
+    cross = cross_matrix(quaternion[:3])
+    rotation: FloatArray = np.eye(3) + 2 * (w * cross + cross @ cross)
+    return rotation
 
 
 def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
@@ -108,14 +116,27 @@ class UrdfLink:
     body: Body | None
     flaw: tuple[int, str] | None = None
 
+    @property
+    def is_massless(self) -> bool:
+        """Whether the link has neither mass nor inertia."""
+        return self.flaw is None and (self.body is None or not (self.body.mass or self.body.inertia.any()))
+
+
+UNLIMITED = (-LARGEST_NUMBER, LARGEST_NUMBER)
+"""Position limits that bound nothing."""
+
 
 @dataclass(frozen=True)
 class UrdfLimit:
-    """Limits of a joint; None if the file gives none, or one that bounds nothing."""
+    """Limits of a joint; None if the file gives none, or one that bounds nothing.
+
+    `dropped` has a phrase with a reason, and a value, for each limit of the file that cannot be one.
+    """
 
     position: tuple[float, float] | None = None
     velocity: float | None = None
     effort: float | None = None
+    dropped: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -184,6 +205,7 @@ class Urdf:
         links: links by name.
         joints: joints by name.
         root: name of the link without a parent.
+        warnings: words of the file that are ignored, and implausible orientations, by line.
     """
 
     file: str
@@ -191,6 +213,7 @@ class Urdf:
     links: Mapping[str, UrdfLink]
     joints: Mapping[str, UrdfJoint]
     root: str
+    warnings: tuple[Problem, ...] = ()
 
     def above(self, link: str) -> list[UrdfJoint]:
         """Return the joints between the root and a link, from the root."""
@@ -201,10 +224,17 @@ class Urdf:
             link = parents[link].parent
         return path[::-1]
 
-    def followed(self, joint: UrdfJoint) -> Mimic:
-        """Return the relation to the last leader in a chain of mimics; to itself without a leader."""
+    def followed(self, joint: UrdfJoint, released: Collection[str] = ()) -> Mimic:
+        """Return the relation to the last leader in a chain of mimics; to itself without a leader.
+
+        Joints named in `released` follow none.
+        """
         mimic = Mimic(joint.name)
-        while (further := self.joints[mimic.leader].mimic) is not None and further.leader in self.joints:
+        while (
+            mimic.leader not in released
+            and (further := self.joints[mimic.leader].mimic) is not None
+            and further.leader in self.joints
+        ):
             multiplier, offset = mimic.multiplier, mimic.offset
             mimic = Mimic(
                 further.leader, multiplier * further.multiplier, multiplier * further.offset + offset

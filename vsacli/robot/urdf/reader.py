@@ -1,4 +1,4 @@
-"""Reading of URDF: links and joints, and extensions by vendors (transmissions, safety controllers).
+"""Reading of URDF: links, joints, and gear ratios of transmissions.
 
 All problems of a file are collected, each with its line; a faulty element is replaced by a harmless one, so
 that reading continues.
@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import math
 import os
-import re
-import shlex
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import PurePath
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.units import POSITION, TORQUE, VELOCITY
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import quoted
+from vsacli.robot.plausibility.bodies import ROUNDED, turns
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
     TYPES,
+    UNLIMITED,
     Body,
     Mimic,
     Urdf,
@@ -32,46 +32,42 @@ from vsacli.robot.urdf.link_tree import (
     UrdfLink,
     below,
     pose_matrix,
+    quaternion_rotation,
+    transform,
+)
+from vsacli.robot.urdf.vocabulary import (
+    LINK,
+    REDUCTIONS,
+    Unread,
+    is_unknown,
+    refuse_macros,
+    shown,
+    sort_words,
 )
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 SIMPLE = "SimpleTransmission"
 """Type of a transmission from one motor to one joint, in ROS control and for the PR2."""
 
-REDUCTIONS = ("mechanicalReduction", "mechanical_reduction")
-"""Tags of a gear reduction in ROS control and in ros2_control."""
 
-SPRINGS = ("springStiffness", "springReference")
+def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[str, float]:
+    """Return the motion of the only motor over that of the joint, by the names of joints.
 
-
-class Beside(NamedTuple):
-    """Data on joints outside of their elements, by the names of joints.
-
-    Attributes:
-        gear_ratios: motion of the only motor over that of the joint.
-        left_out: short phrases on properties that a robot file cannot express.
+    Joints of other transmissions are noted as left out.
     """
-
-    gear_ratios: Mapping[str, float]
-    left_out: Mapping[str, list[str]]
-
-
-def read_beside(root: Element, problems: Problems) -> Beside:
-    """Read the transmissions of a robot, and the springs of its joints."""
-    gear_ratios: dict[str, float] = {}
-    left_out: dict[str, list[str]] = {}
+    ratios: dict[str, float] = {}
     for transmission in _transmissions(root):
-        joints = [child for child in transmission.children if "joint" in child.tag.lower()]
-        for name in dict.fromkeys(joint.attributes.get("name", "").strip() for joint in joints):
-            if name in gear_ratios or len(joints) > 1 or not _is_simple(transmission):
-                left_out.setdefault(name, []).append("transmission that is not simple")
+        ends = (child for child in transmission.children if "joint" in child.tag.lower())
+        joints = [end.attributes["name"].strip() for end in ends if "name" in end.attributes]
+        for name in dict.fromkeys(joints):
+            if name not in unread.left_out:
+                message = f"the transmission of joint {quoted(name)}, which does not exist, is ignored"
+                unread.warn(transmission.line, message)
+            elif name in ratios or len(joints) > 1 or not _is_simple(transmission):
+                unread.left_out[name].append("transmission that is not simple")
             else:
-                gear_ratios[name] = _reduction(transmission, problems)
-    for gazebo in root.all("gazebo"):
-        if any(child.tag in SPRINGS for child in gazebo.children):
-            name = gazebo.attributes.get("reference", "").strip()
-            left_out.setdefault(name, []).append(f"spring parallel to the drive (<{SPRINGS[0]}>)")
-    return Beside(gear_ratios, left_out)
+                ratios[name] = _reduction(transmission, problems)
+    return ratios
 
 
 def _transmissions(root: Element) -> Iterator[Element]:
@@ -85,35 +81,44 @@ def _is_simple(transmission: Element) -> bool:
     types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
     motors = list(transmission.all("actuator"))
-    return any(word.endswith(SIMPLE) for word in says_so) and len(motors) == 1 >= len(_found(transmission))
+    is_one = len(motors) == 1 >= len(_reductions(transmission))
+    return any(word.endswith(SIMPLE) for word in says_so) and is_one
 
 
-def _found(transmission: Element) -> list[Element]:
-    return [element for element in transmission.everything() if element.tag in REDUCTIONS]
+def _reductions(transmission: Element) -> list[tuple[int, str, str]]:
+    """Return line, word and text of each gear reduction, an element or an attribute."""
+    parts = list(transmission.everything())
+    elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
+    attributes = [
+        (part.line, word, part.attributes[word])
+        for part in parts
+        for word in REDUCTIONS
+        if word in part.attributes
+    ]
+    return elements + attributes
 
 
 def _reduction(transmission: Element, problems: Problems) -> float:
     """Return the reduction of a simple transmission; 1 without one."""
-    for element in _found(transmission):
+    for line, word, text in _reductions(transmission):
         try:
-            ratio = float(element.text.replace("_", "?"))
+            ratio = float(text.replace("_", "?"))
         except ValueError:
             ratio = math.nan
         if 1 / LARGEST_NUMBER <= abs(ratio) <= LARGEST_NUMBER:
             return ratio
-        expected = "expected a number that is not zero"
-        problems.add(element.line, f"{element.tag}: {expected}, found {quoted(element.text)}")
+        problems.add(line, f"{word}: expected a number that is not zero, found {quoted(text)}")
     return 1.0
 
 
-MACRO = re.compile(r"\$\{|\$\((anon|arg|dirname|env|eval|find|optenv)\b")
-"""Beginning of an xacro expression; names may contain other dollar signs."""
-
-MESH = "filename"
-"""Attribute that names a mesh, which is never opened."""
-
 MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
+VERSIONS = ("1.0", "1.1", "1.2")
+"""Known versions of URDF; without an attribute, a file has the first. 1.1 adds quaternions."""
+
+UNIT_QUATERNION = 1e-2
+"""Deviation of a quaternion's norm from 1 that rounding to three digits cannot cause."""
+
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _Named = TypeVar("_Named", UrdfLink, UrdfJoint)
 
@@ -129,10 +134,15 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     root = parse_xml(text, problems, "a URDF")
     if root.tag != "robot":
         problems.fail(root.line, f"expected a URDF, which begins with <robot>, found <{root.tag}>")
-    _refuse_macros(root, problems)
+    refuse_macros(root, problems)
     for link in list(root.all("link"))[MAX_LINKS:]:
         problems.fail(link.line, f"more than {MAX_LINKS:,} links")
-    reader = _Reader(problems, read_beside(root, problems))
+    unread = Unread(source.path, root)
+    sort_words(root, unread, problems)
+    version = root.attributes.get("version", VERSIONS[0])
+    if version not in VERSIONS:
+        unread.warn(root.line, f"version {quoted(version)} is unknown; read as {VERSIONS[-1]}")
+    reader = _Reader(problems, version, read_gear_ratios(root, unread, problems), unread)
     links = _by_name(map(reader.link, root.all("link")), "link", problems)
     joints = _by_name(map(reader.joint, root.all("joint")), "joint", problems)
     name = reader.word(root, "name")
@@ -141,21 +151,8 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     _check_ends(links, joints, problems)
     _check_leaders(joints, problems)
     problems.check()
-    return Urdf(source.path, name, links, joints, _root(links, joints, problems))
-
-
-def _refuse_macros(root: Element, problems: Problems) -> None:
-    """Report tags and expressions of xacro; its namespace is allowed, since expanded files keep it."""
-    for element in root.everything():
-        macros = [f"<{quoted(element.tag)[1:-1]}>"] if element.tag.startswith("xacro:") else []
-        values = (word for name, word in element.attributes.items() if name != MESH)
-        macros += [quoted(word) for word in values if MACRO.search(word)]
-        for macro in macros:
-            name = PurePath(problems.file).name
-            stem = name.split(".")[0]
-            urdf = f"{stem}.urdf" if name != f"{stem}.urdf" else f"{stem}_expanded.urdf"
-            how = f"expand it first: xacro {shlex.quote(problems.file)} > {shlex.quote(urdf)}"
-            problems.fail(element.line, f"{macro} belongs to a xacro file; {how}")
+    root_link = _root(links, joints, problems)
+    return Urdf(source.path, name, links, joints, root_link, tuple(sorted(unread.warnings())))
 
 
 def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
@@ -217,18 +214,46 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], proble
     return roots[0]
 
 
+def _macro_in(link: Element, name: str) -> tuple[int, str] | None:
+    """Return the flaw of a link without inertial data that has an unknown element, which may give them."""
+    for child in link.children:
+        if is_unknown(child.tag, LINK):
+            unknown = f"the unknown element {shown(child.tag)}, perhaps a macro that was not expanded"
+            return child.line, f"link {quoted(name)} has no <inertial>, but {unknown}; expand or remove it"
+    return None
+
+
+def _dropped_limits(
+    element: Element, kind: str, lower: float, upper: float, velocity: float, effort: float
+) -> Iterator[tuple[str, str]]:
+    """Yield limits of the file that cannot be ones: their name and the reason; the value, and its line."""
+    names, unit_type = element.attributes, "prismatic" if kind == "prismatic" else "revolute"
+    place = f"(line {element.line})"
+    if not {"lower", "upper"}.isdisjoint(names) and (lower, upper) != UNLIMITED:
+        reason = "the joint is continuous" if kind == "continuous" else "lower is not below upper"
+        if kind == "continuous" or lower >= upper:
+            value = f"{lower:g} to {upper:g} {POSITION.unit(unit_type)} {place}"
+            yield f"position limits not taken over, since {reason}", value
+    for name, limit, quantity in (("velocity", velocity, VELOCITY), ("effort", effort, TORQUE)):
+        if name in names and limit <= 0:
+            value = f"{limit:g} {quantity.unit(unit_type)} {place}"
+            yield f"{name} limits not taken over, since they are not positive", value
+
+
 class _Reader:
     """A reader of elements; problems are collected, and faulty parts replaced, so that reading continues."""
 
-    def __init__(self, problems: Problems, beside: Beside) -> None:
-        self._problems = problems
-        self._beside = beside
+    def __init__(
+        self, problems: Problems, version: str, gear_ratios: Mapping[str, float], unread: Unread
+    ) -> None:
+        self._problems, self._version = problems, version
+        self._gear_ratios, self._unread = gear_ratios, unread
 
     def link(self, element: Element) -> UrdfLink:
         name = self.word(element, "name")
         inertial = self._child(element, "inertial")
         if inertial is None:
-            return UrdfLink(name, element.line, None)
+            return UrdfLink(name, element.line, None, _macro_in(element, name))
         mass, inertia = self._child(inertial, "mass"), self._child(inertial, "inertia")
         if mass is None or inertia is None:
             missing = "mass" if mass is None else "inertia"
@@ -247,7 +272,7 @@ class _Reader:
         if kind not in TYPES:
             self._problems.add(element.line, f"type: unknown word {quoted(kind)}{did_you_mean(kind, TYPES)}")
         dynamics, mimic = self._child(element, "dynamics"), self._child(element, "mimic")
-        ratio = self._beside.gear_ratios.get(name, 1.0)
+        ratio = self._gear_ratios.get(name, 1.0)
         return UrdfJoint(
             name=name,
             line=element.line,
@@ -260,22 +285,8 @@ class _Reader:
             damping=0.0 if dynamics is None else self._non_negative(dynamics, "damping", 0.0),
             mimic=None if mimic is None else self._mimic(mimic),
             gear_ratio=None if ratio == 1 else ratio,
-            left_out=(*self._left_out(element), *self._beside.left_out.get(name, ())),
+            left_out=tuple(self._unread.left_out.get(name, ())),
         )
-
-    def _left_out(self, joint: Element) -> Iterator[str]:
-        """Yield phrases on parts that a robot file cannot express, or that are ambiguous in the URDF."""
-        for dynamics in joint.all("dynamics"):
-            if self._non_negative(dynamics, "friction", 0.0):
-                yield "dry friction"
-            others = [name for name in dynamics.attributes if name not in ("damping", "friction")]
-            if others:
-                yield f"{', '.join(others)} of <dynamics>"
-        for safety in joint.all("safety_controller"):
-            if any(name.startswith("soft_") for name in safety.attributes):
-                yield "soft limits (<safety_controller>)"
-        if any(joint.all("calibration")):
-            yield "reference position (<calibration>)"
 
     def _mimic(self, element: Element) -> Mimic:
         multiplier, offset = self._number(element, "multiplier", 1.0), self._number(element, "offset", 0.0)
@@ -301,15 +312,15 @@ class _Reader:
         element = self._child(joint, "limit")
         if element is None:
             return UrdfLimit()
-        lower, upper = (self._bound(element, name) for name in ("lower", "upper"))
-        velocity, effort = (self._bound(element, name) for name in ("velocity", "effort"))
-        bounds = (
-            kind != "continuous" and lower < upper and (lower, upper) != (-LARGEST_NUMBER, LARGEST_NUMBER)
+        lower, upper, velocity, effort = (
+            self._bound(element, name) for name in ("lower", "upper", "velocity", "effort")
         )
+        bounds = kind != "continuous" and lower < upper and (lower, upper) != UNLIMITED
         return UrdfLimit(
             position=(lower, upper) if bounds else None,
             velocity=velocity if 0 < velocity < LARGEST_NUMBER else None,
             effort=effort if 0 < effort < LARGEST_NUMBER else None,
+            dropped=tuple(_dropped_limits(element, kind, lower, upper, velocity, effort)),
         )
 
     def _bound(self, element: Element, name: str) -> float:
@@ -320,14 +331,39 @@ class _Reader:
         origin = self._child(element, "origin")
         if origin is None:
             return np.eye(4)
-        return pose_matrix(self._vector(origin, "xyz"), self._vector(origin, "rpy"))
+        xyz = self._vector(origin, "xyz")
+        if "quat_xyzw" in origin.attributes:
+            return transform(self._rotation(origin), np.array(xyz))
+        rpy = self._vector(origin, "rpy")
+        most = max(rpy, key=abs)
+        if turns(most) >= 1 + ROUNDED:
+            message = f"rpy: {most:g} rad is {turns(most):.3g} turns; did you mean {most:g} deg?"
+            self._unread.warn(origin.line, message, "turns")
+        return pose_matrix(xyz, rpy)
 
-    def _vector(self, element: Element, name: str) -> list[float]:
+    def _rotation(self, origin: Element) -> FloatArray:
+        """Return the rotation of the quaternion of an origin, of any length but zero."""
+        if self._version == VERSIONS[0]:
+            fix = f'write version="{VERSIONS[1]}" in <robot>, or give rpy instead'
+            self._problems.add(origin.line, f"quat_xyzw needs URDF {VERSIONS[1]}; {fix}")
+        if "rpy" in origin.attributes:
+            self._problems.add(origin.line, "rpy and quat_xyzw in one origin; remove one of them")
+        quaternion = np.array(self._vector(origin, "quat_xyzw", 4))
+        length = float(np.linalg.norm(quaternion))
+        if not length > 1 / LARGEST_NUMBER:
+            self._problems.add(origin.line, f"quat_xyzw: {quaternion.tolist()} has no direction")
+            return np.eye(3)
+        if abs(length - 1) > UNIT_QUATERNION:
+            message = f"quat_xyzw has the length {length:.4g}, not 1; its direction is used"
+            self._unread.warn(origin.line, message, "quaternions")
+        return quaternion_rotation(quaternion / length)
+
+    def _vector(self, element: Element, name: str, length: int = 3) -> list[float]:
         words = element.attributes.get(name, "0 0 0").split()
         numbers = [self._parsed(element, name, word, LARGEST_NUMBER) for word in words]
-        if len(numbers) != 3:
-            self._problems.add(element.line, f"{name}: expected 3 numbers, found {len(numbers)}")
-            return [0.0, 0.0, 0.0]
+        if len(numbers) != length:
+            self._problems.add(element.line, f"{name}: expected {length} numbers, found {len(numbers)}")
+            return [0.0] * (length - 1) + [float(length == 4)]
         return numbers
 
     def _number(self, element: Element, name: str, default: float | None = None) -> float:

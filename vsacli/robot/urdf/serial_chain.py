@@ -5,6 +5,7 @@ Links on side branches move with the joint of the chain that carries them, with 
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -45,11 +46,13 @@ class HeldJoint(NamedTuple):
         urdf: joint of the URDF.
         position: position at which it is held, rad (m).
         leader: name of the last leader in a chain of mimics; its own without an existing leader.
+        released: whether it is held although it follows a joint of the chain.
     """
 
     urdf: UrdfJoint
     position: float
     leader: str
+    released: bool = False
 
     @property
     def follows(self) -> bool:
@@ -63,7 +66,9 @@ class HeldJoint(NamedTuple):
     def warnings(self) -> Iterator[str]:
         """Yield warnings that the position may be wrong, with a fix."""
         mimic, limit = self.urdf.mimic, self.urdf.limit.position
-        if mimic is not None and not self.follows and self.position == _resting(self.urdf):
+        if mimic is not None and self.released:
+            yield f"{self}: it follows {mimic.leader} (<mimic>), and its motion with that joint is neglected"
+        elif mimic is not None and not self.follows and self.position == _resting(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
             yield f"{self}: {reason}; if it stands elsewhere, say so by --hold {self.leader}=VALUE"
         if limit is not None and not limit[0] - LIMIT_ROUNDING <= self.position <= limit[1] + LIMIT_ROUNDING:
@@ -81,23 +86,28 @@ def held_joints(
     Args:
         urdf: robot.
         standing: joints to hold.
-        moving: names of joints that move; no held joint follows one of them.
-        hold: positions of joints that follow no other.
+        moving: names of joints that move.
+        hold: positions of joints that follow no other, or one that moves.
 
     Raises:
         InputError: a position cannot be given, or has no effect.
     """
-    followed = [(joint, urdf.followed(joint)) for joint in standing]
+    followed = [(joint, urdf.followed(joint, hold)) for joint in standing]
     leaders = {mimic.leader: _resting(urdf.joints[mimic.leader]) for _, mimic in followed}
     problems = Problems(urdf.file)
     for name, value in hold.items():
         leaders[name] = _given(urdf, name, value, leaders, moving, problems)
     problems.check()
     held = [
-        HeldJoint(joint, mimic.multiplier * leaders[mimic.leader] + mimic.offset, mimic.leader)
+        HeldJoint(
+            joint,
+            mimic.multiplier * leaders[mimic.leader] + mimic.offset,
+            mimic.leader,
+            joint.name in hold and urdf.followed(joint).leader in moving,
+        )
         for joint, mimic in followed
     ]
-    for joint, position, leader in held:
+    for joint, position, leader, _ in held:
         if not abs(position) <= LARGEST_NUMBER:
             message = f"following {quoted(leader)} it stands at {position:g} {joint.unit()}"
             problems.add(joint.line, f"joint {quoted(joint.name)}: {message}, more than can be computed with")
@@ -141,7 +151,7 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
         return f"{shown} is {joint.type}, so it has no position to choose"
     if name in moving:
         return f"{shown} belongs to the chain, where it moves"
-    if (leader := urdf.followed(joint).leader) != name:
+    if (leader := urdf.followed(joint).leader) != name and leader not in moving:
         return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
     if name not in leaders:
         return f"{shown} is neither outside the chain nor below its base, so that it has no effect"
@@ -198,6 +208,7 @@ class SerialChain:
         tip_pose: pose of the tip link, (4, 4).
         held_below: joints between root and base that could move.
         held_beside: joints on side branches that could move.
+        followers: joints on side branches that follow the chain, without mass.
     """
 
     robot_name: str
@@ -208,6 +219,7 @@ class SerialChain:
     tip_pose: FloatArray
     held_below: tuple[HeldJoint, ...]
     held_beside: tuple[HeldJoint, ...]
+    followers: tuple[UrdfJoint, ...]
 
     @property
     def held(self) -> tuple[HeldJoint, ...]:
@@ -233,11 +245,15 @@ def serial_chain(
     path = find_path(urdf, base, tip)
     carried = _carried(urdf, path)
     below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
-    beside = _beside(urdf, carried, path)
-    _check_joints(urdf, path, below_base, beside)
-    _check_links(urdf, carried)
     names = [joint.name for joint in path.moving]
-    held = held_joints(urdf, [*below_base, *beside], names, hold or {})
+    hold = hold or {}
+    beside = _beside(urdf, carried, path)
+    leaders = {joint.name: urdf.followed(joint, hold).leader for joint in beside}
+    followers = [joint for joint in beside if leaders[joint.name] in names and _is_massless(urdf, joint)]
+    beside = [joint for joint in beside if joint not in followers]
+    _check_joints(urdf, path, below_base, beside, hold)
+    _check_links(urdf, carried)
+    held = held_joints(urdf, [*below_base, *beside], names, hold)
     poses = _poses(urdf, held)
     to_base = inverse(poses[path.base])
     return SerialChain(
@@ -252,11 +268,18 @@ def serial_chain(
         tip_pose=to_base @ poses[path.tip],
         held_below=tuple(held[: len(below_base)]),
         held_beside=tuple(held[len(below_base) :]),
+        followers=tuple(followers),
     )
 
 
+def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
+    """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
+    moved = [joint, *below(joint.child, urdf.joints.values())]
+    return all(urdf.links[moving.child].is_massless for moving in moved)
+
+
 def _check_joints(
-    urdf: Urdf, path: ChainPath, below_base: Iterable[UrdfJoint], beside: Iterable[UrdfJoint]
+    urdf: Urdf, path: ChainPath, below_base: Iterable[UrdfJoint], beside: Iterable[UrdfJoint], hold: Hold
 ) -> None:
     """Raise an error for joints of the chain without a drive, and for others that follow the chain."""
     problems = Problems(urdf.file)
@@ -269,16 +292,13 @@ def _check_joints(
             reason = f"follows {quoted(joint.mimic.leader)} (<mimic>), so it has no drive of its own"
             problems.add(joint.line, f"{name} {reason}; choose a tip before it")
     on_chain = {joint.name for joint in path.moving}
-    choices = (
-        ("outside the chain", beside, "choose a tip before these two"),
-        ("below the base", below_base, "choose a base before these two, or a tip"),
-    )
-    for place, joints, choice in choices:
+    for place, joints in (("outside the chain", beside), ("below the base", below_base)):
         for joint in joints:
-            leader = urdf.followed(joint).leader
+            leader = urdf.followed(joint, hold).leader
             if leader in on_chain:
                 reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
-                problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; {choice}")
+                fix = f"hold it by --hold {shlex.quote(joint.name)}=0, which neglects its motion"
+                problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; {fix}")
     problems.check()
 
 
