@@ -169,3 +169,51 @@ def test_joints_that_cannot_follow(urdf, changes, options, problem):
         text = text.replace(old, new)
     with pytest.raises(InputError, match=f"^arm.urdf:{problem}"):
         import_urdf(urdf(text), base="torso", tip="hand", hold=options)
+
+
+FOLLOWER = (
+    link("cylinder", ""),
+    joint("slide", "arm", "cylinder", "C", rest='<mimic joint="wrist"/><dynamics damping="2"/>'),
+    link("rod", ""),
+    joint("push", "cylinder", "rod", "P", rest='<mimic joint="slide" multiplier="3"/>'),
+)
+"""A branch of two joints without mass, both of which follow the wrist."""
+
+
+def branched(*parts: str) -> str:
+    return TREE.replace("</robot>", "\n".join([*parts, "</robot>"]))
+
+
+def test_a_branch_without_mass_that_follows_the_chain_changes_nothing(urdf):
+    plain = import_urdf(urdf(TREE), base="torso", tip="hand")
+    conversion = import_urdf(urdf(branched(*FOLLOWER)), base="torso", tip="hand")
+    assert conversion.robot == plain.robot
+    assert set(conversion.notes()) - set(plain.notes()) == {
+        "outside the chain, following it without mass, so without torque: slide (follows wrist), "
+        "push (follows slide)",
+        "damping left out: slide",
+    }
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_a_branch_with_mass_that_follows_the_chain_can_be_held(urdf, number):
+    """The advice of the message works, and is the same as the file without <mimic>."""
+    heavy = [*FOLLOWER[:number], link("cylinder" if number == 0 else "rod"), *FOLLOWER[number + 1 :]]
+    path = urdf(branched(*heavy))
+    with pytest.raises(InputError) as caught:
+        import_urdf(path, base="torso", tip="hand")
+    hold = dict(re.findall(r"hold it by --hold (\w+)=(0), which neglects its motion", str(caught.value)))
+    conversion = import_urdf(path, base="torso", tip="hand", hold=hold)
+    neglected = "it follows wrist (<mimic>), and its motion with that joint is neglected"
+    assert f"slide at 0 rad: {neglected}" in list(conversion.warnings())
+    free = branched(*heavy).replace('<mimic joint="wrist"/>', "")
+    assert conversion.robot == import_urdf(urdf(free), base="torso", tip="hand").robot
+
+
+def test_a_joint_below_the_base_that_follows_the_chain_can_be_held(urdf):
+    turned = ' rpy="1 0 0"/><axis xyz="0 0 1"/>'
+    text = TREE.replace(f"{turned}{LIMIT}", f'{turned}<mimic joint="wrist"/>')
+    held = import_urdf(urdf(text), base="torso", tip="hand", hold={"lean": "30 deg"})
+    free = import_urdf(urdf(TREE), base="torso", tip="hand", hold={"lean": "30 deg"})
+    assert held.robot == free.robot
+    assert "lean at 0.523599 rad: it follows wrist" in next(held.warnings())

@@ -29,9 +29,10 @@ def notes(tmp_path, monkeypatch):
     """The lines of the report that are not about rows and kinematics, for a file of one joint and more."""
     monkeypatch.chdir(tmp_path)
 
-    def of(rest="", *beside, actuator="elastic"):
-        text = robot(link("base"), link("arm"), joint("turn", "base", "arm", rest=rest), *beside)
-        conversion = import_urdf(write(tmp_path / "arm.urdf", text).name, placeholders=Placeholders(actuator))
+    def of(rest="", *beside, actuator="elastic", kind="R", tip=None):
+        text = robot(link("base"), link("arm"), joint("turn", "base", "arm", kind, rest=rest), *beside)
+        path = write(tmp_path / "arm.urdf", text).name
+        conversion = import_urdf(path, tip=tip, placeholders=Placeholders(actuator))
         return [line for line in str(conversion).splitlines()[5:] if "placeholder" not in line]
 
     return of
@@ -99,6 +100,42 @@ def notes(tmp_path, monkeypatch):
 )
 def test_what_is_said_of_a_joint(notes, rest, beside, expected):
     assert notes(rest, beside) == expected
+
+
+NOT_POSITIVE = "limits not taken over, since they are not positive: turn"
+REVERSED = "position limits not taken over, since lower is not below upper: turn"
+CONTINUOUS = "position limits not taken over, since the joint is continuous: turn"
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit", "expected"),
+    [
+        ("R", 'lower="2" upper="-2"', [f"{REVERSED} 2 to -2 rad (line 4)"]),
+        ("P", 'lower="0" upper="0"', [f"{REVERSED} 0 to 0 m (line 4)"]),
+        ("R", 'lower="1"', [f"{REVERSED} 1 to 0 rad (line 4)"]),
+        ("C", 'lower="-1" upper="1"', [f"{CONTINUOUS} -1 to 1 rad (line 4)"]),
+        ("P", 'velocity="0"', [f"velocity {NOT_POSITIVE} 0 m/s (line 4)"]),
+        (
+            "R",
+            'velocity="-2" effort="-1e-3"',
+            [f"velocity {NOT_POSITIVE} -2 rad/s (line 4)", f"effort {NOT_POSITIVE} -0.001 N m (line 4)"],
+        ),
+        ("R", 'lower="-inf" upper="inf" velocity="inf" effort="1e16"', []),
+        ("C", 'lower="-1e16" upper="1e16"', []),
+        ("R", "", []),
+        ("R", 'lower="-1" upper="1" jerk="3" acceleration="inf"', ["jerk of <limit> left out: turn"]),
+    ],
+)
+def test_limits_that_cannot_be_ones_are_named(notes, kind, limit, expected):
+    assert notes(f"<limit {limit}/>", kind=kind) == expected
+
+
+def test_limits_of_held_joints_are_named_where_they_matter(notes):
+    """Their positions are compared with their limits; their velocity is none."""
+    side = joint("nod", "arm", "head", rest='<limit lower="1" upper="-1" velocity="0"/>')
+    lines = notes("", link("head"), side, tip="arm")
+    assert "position limits not taken over, since lower is not below upper: nod 1 to -1 rad (line 6)" in lines
+    assert not any("velocity" in line for line in lines)
 
 
 def test_two_motors_do_not_take_what_holds_for_one(notes, tmp_path):

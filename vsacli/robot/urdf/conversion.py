@@ -33,7 +33,7 @@ from vsacli.robot.urdf.dh import (
     tidy,
     tidy_angle,
 )
-from vsacli.robot.urdf.link_tree import Body, UrdfJoint, inverse, roll_pitch_yaw
+from vsacli.robot.urdf.link_tree import POSITION_LIMITS, Body, UrdfJoint, inverse, roll_pitch_yaw
 from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, joint_loads
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.serial_chain import (
@@ -114,27 +114,27 @@ class Conversion:
 
     def notes(self) -> Iterator[str]:
         """Yield sentences on parts left out or changed."""
-        joints = [*(joint.urdf for joint in self.chain.joints), *self.chain.followers]
         yield from _held("below the base", self.chain.held_below)
         yield from _held("outside the chain, their links lumped", self.chain.held_beside)
-        yield from _massless(self.chain.followers)
+        if followers := [
+            f"{each.name} (follows {each.mimic.leader})" for each in self.chain.followers if each.mimic
+        ]:
+            yield f"outside the chain, following it without mass, so without torque: {', '.join(followers)}"
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()
-        yield from self._dropped_limits()
-        for what in dict.fromkeys(label for joint in joints for label in joint.left_out):
-            yield f"{what} left out: {', '.join(joint.name for joint in joints if what in joint.left_out)}"
+        left_out: dict[str, list[str]] = {}
+        for joint, phrase, value in self._left_out():
+            left_out.setdefault(phrase, []).append(f"{joint.name} {value}".rstrip())
+        yield from (f"{phrase}: {', '.join(values)}" for phrase, values in left_out.items())
 
-    def _dropped_limits(self) -> Iterator[str]:
-        """Yield a note for each kind of limits that cannot be ones, with joints, values and lines."""
-        dropped: dict[str, list[str]] = {}
-        for joint in (*self.chain.joints, *self.chain.held):
-            for phrase, value in joint.urdf.limit.dropped:
-                if isinstance(joint, ChainJoint) or phrase.startswith(
-                    "position"
-                ):  # with which held ones are compared
-                    dropped.setdefault(phrase, []).append(f"{joint.urdf.name} {value}")
-        yield from (f"{phrase}: {', '.join(values)}" for phrase, values in dropped.items())
+    def _left_out(self) -> Iterator[tuple[UrdfJoint, str, str]]:
+        """Yield properties of moving joints that are not taken over, and position limits of held ones."""
+        for joint in (*(joint.urdf for joint in self.chain.joints), *self.chain.followers):
+            yield from ((joint, *entry) for entry in dict.fromkeys(joint.left_out))
+        for joint in (held.urdf for held in self.chain.held):
+            yield from ((joint, *entry) for entry in joint.left_out if entry[0].startswith(POSITION_LIMITS))
+        yield from ((joint, "damping left out", "") for joint in self.chain.followers if joint.damping)
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
@@ -156,15 +156,6 @@ def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
         yield f"held at zero {place}: {', '.join(at_zero)}"
     if elsewhere:
         yield f"held {place}: {', '.join(elsewhere)}"
-
-
-def _massless(followers: Sequence[UrdfJoint]) -> Iterator[str]:
-    """Yield notes on joints that move with the chain, but have no mass."""
-    if followers:
-        names = [f"{joint.name} (follows {joint.mimic.leader})" for joint in followers if joint.mimic]
-        yield f"outside the chain, following it without mass, so without torque: {', '.join(names)}"
-    if damped := [joint.name for joint in followers if joint.damping]:
-        yield f"damping of joints that follow the chain left out: {', '.join(damped)}"
 
 
 def _exactness(residual: Residual) -> str:

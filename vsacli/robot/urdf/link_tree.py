@@ -122,21 +122,20 @@ class UrdfLink:
         return self.flaw is None and (self.body is None or not (self.body.mass or self.body.inertia.any()))
 
 
+POSITION_LIMITS = "position limits"
+"""Beginning of phrases on position limits that are not taken over."""
+
 UNLIMITED = (-LARGEST_NUMBER, LARGEST_NUMBER)
 """Position limits that bound nothing."""
 
 
 @dataclass(frozen=True)
 class UrdfLimit:
-    """Limits of a joint; None if the file gives none, or one that bounds nothing.
-
-    `dropped` has a phrase with a reason, and a value, for each limit of the file that cannot be one.
-    """
+    """Limits of a joint; None if the file gives none, or one that bounds nothing."""
 
     position: tuple[float, float] | None = None
     velocity: float | None = None
     effort: float | None = None
-    dropped: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -152,8 +151,8 @@ class Mimic:
 class UrdfJoint:
     """A joint; at position zero its child has the pose `placement` in its parent.
 
-    `gear_ratio` is the motion of its only motor over its own, None if 1 or unknown; `left_out` has a short
-    phrase for each property that a robot file cannot express.
+    `gear_ratio` is the motion of its only motor over its own, None if 1 or unknown; `left_out` has a phrase
+    for each property that is not taken over, and its value, which may be empty.
     """
 
     name: str
@@ -167,7 +166,7 @@ class UrdfJoint:
     damping: float
     mimic: Mimic | None
     gear_ratio: float | None
-    left_out: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
 
     @property
     def is_fixed(self) -> bool:

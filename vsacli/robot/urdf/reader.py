@@ -22,6 +22,7 @@ from vsacli.robot.plausibility.bodies import ROUNDED, turns
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
+    POSITION_LIMITS,
     TYPES,
     UNLIMITED,
     Body,
@@ -64,7 +65,7 @@ def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[
                 message = f"the transmission of joint {quoted(name)}, which does not exist, is ignored"
                 unread.warn(transmission.line, message)
             elif name in ratios or len(joints) > 1 or not _is_simple(transmission):
-                unread.left_out[name].append("transmission that is not simple")
+                unread.left_out[name].append(("transmission that is not simple left out", ""))
             else:
                 ratios[name] = _reduction(transmission, problems)
     return ratios
@@ -223,23 +224,6 @@ def _macro_in(link: Element, name: str) -> tuple[int, str] | None:
     return None
 
 
-def _dropped_limits(
-    element: Element, kind: str, lower: float, upper: float, velocity: float, effort: float
-) -> Iterator[tuple[str, str]]:
-    """Yield limits of the file that cannot be ones: their name and the reason; the value, and its line."""
-    names, unit_type = element.attributes, "prismatic" if kind == "prismatic" else "revolute"
-    place = f"(line {element.line})"
-    if not {"lower", "upper"}.isdisjoint(names) and (lower, upper) != UNLIMITED:
-        reason = "the joint is continuous" if kind == "continuous" else "lower is not below upper"
-        if kind == "continuous" or lower >= upper:
-            value = f"{lower:g} to {upper:g} {POSITION.unit(unit_type)} {place}"
-            yield f"position limits not taken over, since {reason}", value
-    for name, limit, quantity in (("velocity", velocity, VELOCITY), ("effort", effort, TORQUE)):
-        if name in names and limit <= 0:
-            value = f"{limit:g} {quantity.unit(unit_type)} {place}"
-            yield f"{name} limits not taken over, since they are not positive", value
-
-
 class _Reader:
     """A reader of elements; problems are collected, and faulty parts replaced, so that reading continues."""
 
@@ -315,13 +299,31 @@ class _Reader:
         lower, upper, velocity, effort = (
             self._bound(element, name) for name in ("lower", "upper", "velocity", "effort")
         )
+        self._name_dropped(joint, element, kind, (lower, upper, velocity, effort))
         bounds = kind != "continuous" and lower < upper and (lower, upper) != UNLIMITED
         return UrdfLimit(
             position=(lower, upper) if bounds else None,
             velocity=velocity if 0 < velocity < LARGEST_NUMBER else None,
             effort=effort if 0 < effort < LARGEST_NUMBER else None,
-            dropped=tuple(_dropped_limits(element, kind, lower, upper, velocity, effort)),
         )
+
+    def _name_dropped(
+        self, joint: Element, limit: Element, kind: str, values: tuple[float, float, float, float]
+    ) -> None:
+        """Note limits of the file that cannot be ones, with reason, value and line."""
+        lower, upper, velocity, effort = values
+        is_continuous, sign = kind == "continuous", "they are not positive"
+        dropped = (lower >= upper or is_continuous) and (lower, upper) != UNLIMITED
+        reason = "the joint is continuous" if is_continuous else "lower is not below upper"
+        for is_dropped, words, name, why, value, quantity in (
+            (dropped, {"lower", "upper"}, POSITION_LIMITS, reason, f"{lower:g} to {upper:g}", POSITION),
+            (velocity <= 0, {"velocity"}, "velocity limits", sign, f"{velocity:g}", VELOCITY),
+            (effort <= 0, {"effort"}, "effort limits", sign, f"{effort:g}", TORQUE),
+        ):
+            if is_dropped and words & limit.attributes.keys():
+                unit = quantity.unit("prismatic" if kind == "prismatic" else "revolute")
+                entry = (f"{name} not taken over, since {why}", f"{value} {unit} (line {limit.line})")
+                self._unread.left_out[joint.attributes.get("name", "").strip()].append(entry)
 
     def _bound(self, element: Element, name: str) -> float:
         """Return a limit, clipped; files write infinite or very large ones for no limit."""

@@ -221,12 +221,12 @@ class Unread:
     """What the reader does not take from a file.
 
     Attributes:
-        left_out: phrases on properties that a robot file cannot express, by the names of joints.
+        left_out: properties that are not taken over, a phrase and a value each, by the names of joints.
     """
 
     def __init__(self, file: str, root: Element) -> None:
         names = (joint.attributes.get("name", "").strip() for joint in root.all("joint"))
-        self.left_out: dict[str, list[str]] = {name: [] for name in names}
+        self.left_out: dict[str, list[tuple[str, str]]] = {name: [] for name in names}
         self._file = file
         self._warnings: dict[str, tuple[str, list[int]]] = {}
 
@@ -246,7 +246,7 @@ def sort_words(root: Element, unread: Unread, problems: Problems) -> None:
     for joint, element, rule in _ruled(root, ROBOT, ""):
         for phrase in _left_out(element, rule):
             if joint in unread.left_out:
-                unread.left_out[joint].append(phrase)
+                unread.left_out[joint].append((f"{phrase} left out", ""))
             else:
                 unread.warn(element.line, f"{phrase} is left out")
         for word, line, _ in _words(element):
