@@ -118,7 +118,7 @@ CONTINUOUS = "position limits not taken over, since the joint is continuous: tur
         (
             "R",
             'velocity="-2" effort="-1e-3"',
-            [f"velocity {NOT_POSITIVE} -2 rad/s (line 4)", f"effort {NOT_POSITIVE} -0.001 N m (line 4)"],
+            [f"velocity {NOT_POSITIVE} -2 rad/s (line 4)", f"effort {NOT_POSITIVE} -1e-3 N m (line 4)"],
         ),
         ("R", 'lower="-inf" upper="inf" velocity="inf" effort="1e16"', []),
         ("C", 'lower="-1e16" upper="1e16"', []),

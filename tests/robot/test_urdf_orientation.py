@@ -84,6 +84,7 @@ def warnings(conversion) -> list[str]:
         ('quat_xyzw="0 0.707 0 0.707"', ""),
         ('rpy="0 90 0"', "arm.urdf:5: rpy: 90 rad is 14.3 turns; did you mean 90 deg?"),
         ('rpy="-180 0 45"', "arm.urdf:5: rpy: -180 rad is 28.6 turns; did you mean -180 deg?"),
+        ('rpy="7 9.42477796 0"', "arm.urdf:5: rpy: 7 rad is 1.11 turns; did you mean 7 deg?"),
         ('rpy="0 6.2831853 0"', ""),
         ('rpy="0 9.42477796 0"', ""),  # a computed multiple of a right angle
     ],

@@ -176,6 +176,14 @@ def test_a_macro_in_place_of_inertial_data(tmp_path, name, line):
         assert f"arm.urdf:{line}: {flaw}" in done.error
 
 
+@pytest.mark.parametrize("number", [7, 8])
+def test_links_within_unknown_elements_are_not_ignored(tmp_path, number):
+    lines = WHOLE.splitlines()
+    lines[number - 1] = lines[number - 1].replace("<origin", '<group><link name="n"/></group><origin')
+    problem = f"arm.urdf:{number}: unknown element <group> may stand for links or joints"
+    assert problem in report("\n".join(lines), tmp_path).error
+
+
 def test_a_macro_left_over_is_named_before_what_is_missing(vsacli, tmp_path):
     write(tmp_path / "arm.urdf", WHOLE.replace(link("hand"), '<arm_link name="hand" length="0.2"/>'))
     done = vsacli("import-urdf", "arm.urdf", "--tip", "hand")

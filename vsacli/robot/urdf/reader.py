@@ -313,16 +313,17 @@ class _Reader:
         """Note limits of the file that cannot be ones, with reason, value and line."""
         lower, upper, velocity, effort = values
         is_continuous, sign = kind == "continuous", "they are not positive"
-        dropped = (lower >= upper or is_continuous) and (lower, upper) != UNLIMITED
+        no_range = (lower >= upper or is_continuous) and (lower, upper) != UNLIMITED
         reason = "the joint is continuous" if is_continuous else "lower is not below upper"
-        for is_dropped, words, name, why, value, quantity in (
-            (dropped, {"lower", "upper"}, POSITION_LIMITS, reason, f"{lower:g} to {upper:g}", POSITION),
-            (velocity <= 0, {"velocity"}, "velocity limits", sign, f"{velocity:g}", VELOCITY),
-            (effort <= 0, {"effort"}, "effort limits", sign, f"{effort:g}", TORQUE),
+        for is_none, names, limits, why, quantity in (
+            (no_range, ("lower", "upper"), POSITION_LIMITS, reason, POSITION),
+            (velocity <= 0, ("velocity",), "velocity limits", sign, VELOCITY),
+            (effort <= 0, ("effort",), "effort limits", sign, TORQUE),
         ):
-            if is_dropped and words & limit.attributes.keys():
+            if is_none and not limit.attributes.keys().isdisjoint(names):
+                value = " to ".join(limit.attributes.get(name, "0").strip() for name in names)
                 unit = quantity.unit("prismatic" if kind == "prismatic" else "revolute")
-                entry = (f"{name} not taken over, since {why}", f"{value} {unit} (line {limit.line})")
+                entry = (f"{limits} not taken over, since {why}", f"{value} {unit} (line {limit.line})")
                 self._unread.left_out[joint.attributes.get("name", "").strip()].append(entry)
 
     def _bound(self, element: Element, name: str) -> float:
@@ -337,8 +338,8 @@ class _Reader:
         if "quat_xyzw" in origin.attributes:
             return transform(self._rotation(origin), np.array(xyz))
         rpy = self._vector(origin, "rpy")
-        most = max(rpy, key=abs)
-        if turns(most) >= 1 + ROUNDED:
+        if many := [angle for angle in rpy if turns(angle) >= 1 + ROUNDED]:
+            most = max(many, key=abs)
             message = f"rpy: {most:g} rad is {turns(most):.3g} turns; did you mean {most:g} deg?"
             self._unread.warn(origin.line, message, "turns")
         return pose_matrix(xyz, rpy)

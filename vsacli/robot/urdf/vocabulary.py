@@ -319,7 +319,8 @@ def _refusal(word: str, element: Element, rule: ElementRule, file: str) -> str:
         return ""
     if near := difflib.get_close_matches(word.lower(), rule.read, n=1, cutoff=MISSPELLED):
         return f"unknown {_subject(word, element)}; did you mean {shown(near[0])}?"
-    if rule is ROBOT and not word.startswith("@"):
+    inner = {part.tag for child in element.all(word) for part in child.everything()}
+    if inner and (rule is ROBOT or (rule in (LINK, JOINT) and inner & {"link", "joint"})):
         reason = "may stand for links or joints, as a macro that was not expanded"
         return f"unknown element {shown(word)} {reason}; {expansion(file)}, or remove it"
     return ""
