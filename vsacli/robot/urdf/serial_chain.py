@@ -245,12 +245,12 @@ def serial_chain(
     path = find_path(urdf, base, tip)
     carried = _carried(urdf, path)
     below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
-    names = [joint.name for joint in path.moving]
-    hold = hold or {}
-    beside = _beside(urdf, carried, path)
-    leaders = {joint.name: urdf.followed(joint, hold).leader for joint in beside}
-    followers = [joint for joint in beside if leaders[joint.name] in names and _is_massless(urdf, joint)]
-    beside = [joint for joint in beside if joint not in followers]
+    names, hold = [joint.name for joint in path.moving], hold or {}
+    side = _beside(urdf, carried, path)
+    follow = {
+        joint.name: urdf.followed(joint, hold).leader in names and _is_massless(urdf, joint) for joint in side
+    }
+    beside = [joint for joint in side if not follow[joint.name]]
     _check_joints(urdf, path, below_base, beside, hold)
     _check_links(urdf, carried)
     held = held_joints(urdf, [*below_base, *beside], names, hold)
@@ -268,7 +268,7 @@ def serial_chain(
         tip_pose=to_base @ poses[path.tip],
         held_below=tuple(held[: len(below_base)]),
         held_beside=tuple(held[len(below_base) :]),
-        followers=tuple(followers),
+        followers=tuple(joint for joint in side if follow[joint.name]),
     )
 
 

@@ -55,11 +55,6 @@ class ElementRule:
     refused: Mapping[str, str] = field(default_factory=dict)
     has_text: bool = False
 
-    @property
-    def read(self) -> list[str]:
-        """Words that the reader uses."""
-        return [*self.used, *self.children]
-
 
 NAMESPACES = ("@xmlns", "@xmlns:", "@xml:", "@xsi:")
 """Attributes about the document itself, without effect anywhere; `@xml:` stands for its whole namespace."""
@@ -287,7 +282,7 @@ def _subject(word: str, element: Element) -> str:
 
 def is_unknown(word: str, rule: ElementRule) -> bool:
     """Return whether neither a word nor its namespace is in a list."""
-    listed = (*rule.read, *rule.without_effect, *rule.left_out, *rule.refused, *NAMESPACES)
+    listed = (*rule.used, *rule.children, *rule.without_effect, *rule.left_out, *rule.refused, *NAMESPACES)
     return word not in listed and word[: word.find(":") + 1] not in listed
 
 
@@ -317,7 +312,7 @@ def _refusal(word: str, element: Element, rule: ElementRule, file: str) -> str:
         return f"{_subject(word, element)} is not read; {rule.refused[word]}"
     if not is_unknown(word, rule):
         return ""
-    if near := difflib.get_close_matches(word.lower(), rule.read, n=1, cutoff=MISSPELLED):
+    if near := difflib.get_close_matches(word.lower(), [*rule.used, *rule.children], n=1, cutoff=MISSPELLED):
         return f"unknown {_subject(word, element)}; did you mean {shown(near[0])}?"
     inner = {part.tag for child in element.all(word) for part in child.everything()}
     if inner and (rule is ROBOT or (rule in (LINK, JOINT) and inner & {"link", "joint"})):
