@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 from samples.command_line import REPOSITORY
-from samples.urdf import joint, link, robot, write
+from samples.urdf import INERTIAL, joint, link, robot, write
 
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
@@ -132,7 +132,7 @@ def test_unknown_words_are_reported(changed, number):
     attribute, element = changed(number, ["@qqqq"]), changed(number, ["qqqq"])
     assert f"unknown attribute 'qqqq' of <{tag}> is ignored" in "\n".join(attribute.lines)
     if tag == "robot":
-        assert "unknown element <qqqq> may stand for links or joints, as a macro" in element.error
+        assert "unknown element <qqqq> of <robot> may stand for links, joints or masses" in element.error
     else:
         assert f"unknown element <qqqq> of <{tag}> is ignored" in "\n".join(element.lines)
 
@@ -165,22 +165,20 @@ def test_a_repeated_warning_is_one_line(tmp_path):
 MACRO = '<default_inertial mass="2"/>'
 
 
-@pytest.mark.parametrize(("name", "line"), [("base", 2), ("arm", 3)])
-def test_a_macro_in_place_of_inertial_data(tmp_path, name, line):
-    """Without it the link would have no mass, which matters for links that move."""
-    done = report(WHOLE.replace(link(name), link(name, MACRO)), tmp_path)
-    if name == "base":
-        assert any("unknown element <default_inertial> of <link> is ignored" in line for line in done.lines)
-    else:
-        flaw = "link 'arm' has no <inertial>, but the unknown element <default_inertial>, perhaps a macro"
-        assert f"arm.urdf:{line}: {flaw}" in done.error
+def test_a_macro_in_place_of_inertial_data_is_refused(tmp_path):
+    """Without it the link would have no mass."""
+    text = WHOLE.replace(link("arm"), link("arm", MACRO))
+    problem = "unknown element <default_inertial> of <link> may stand for links, joints or masses"
+    assert f"arm.urdf:3: {problem}" in report(text, tmp_path).error
+    beside = WHOLE.replace(link("arm"), link("arm", MACRO + INERTIAL))
+    assert any("<default_inertial> of <link> is ignored" in line for line in report(beside, tmp_path).lines)
 
 
-@pytest.mark.parametrize("number", [7, 8])
-def test_links_within_unknown_elements_are_not_ignored(tmp_path, number):
+@pytest.mark.parametrize(("number", "tag", "place"), [(7, "joint", "<origin"), (3, "link", "<inertial")])
+def test_links_within_unknown_elements_are_not_ignored(tmp_path, number, tag, place):
     lines = WHOLE.splitlines()
-    lines[number - 1] = lines[number - 1].replace("<origin", '<group><link name="n"/></group><origin')
-    problem = f"arm.urdf:{number}: unknown element <group> may stand for links or joints"
+    lines[number - 1] = lines[number - 1].replace(place, f'<group><link name="n"/></group>{place}')
+    problem = f"arm.urdf:{number}: unknown element <group> of <{tag}> may stand for links, joints or masses"
     assert problem in report("\n".join(lines), tmp_path).error
 
 
@@ -190,7 +188,7 @@ def test_a_macro_left_over_is_named_before_what_is_missing(vsacli, tmp_path):
     assert done.code == 2
     first = done.err.splitlines()[0]
     assert first.startswith(
-        "arm.urdf:4: unknown element <arm_link> may stand for links or joints, as a macro"
+        "arm.urdf:4: unknown element <arm_link> of <robot> may stand for links, joints or masses"
     )
     assert first.endswith("expand it first: xacro arm.urdf > arm_expanded.urdf, or remove it")
 

@@ -38,9 +38,8 @@ def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
 
 def quaternion_rotation(quaternion: FloatArray) -> FloatArray:
     """Return the rotation matrix, (3, 3), of a unit quaternion x, y, z, w, by Rodrigues' formula."""
-    *_, w = quaternion
     cross = cross_matrix(quaternion[:3])
-    rotation: FloatArray = np.eye(3) + 2 * (w * cross + cross @ cross)
+    rotation: FloatArray = np.eye(3) + 2 * (quaternion[3] * cross + cross @ cross)
     return rotation
 
 
@@ -115,11 +114,6 @@ class UrdfLink:
     line: int
     body: Body | None
     flaw: tuple[int, str] | None = None
-
-    @property
-    def is_massless(self) -> bool:
-        """Whether the link has neither mass nor inertia."""
-        return self.flaw is None and (self.body is None or not (self.body.mass or self.body.inertia.any()))
 
 
 POSITION_LIMITS = "position limits"

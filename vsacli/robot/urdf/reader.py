@@ -36,15 +36,7 @@ from vsacli.robot.urdf.link_tree import (
     quaternion_rotation,
     transform,
 )
-from vsacli.robot.urdf.vocabulary import (
-    LINK,
-    REDUCTIONS,
-    Unread,
-    is_unknown,
-    refuse_macros,
-    shown,
-    sort_words,
-)
+from vsacli.robot.urdf.vocabulary import REDUCTIONS, Unread, refuse_macros, sort_words
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 SIMPLE = "SimpleTransmission"
@@ -215,15 +207,6 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], proble
     return roots[0]
 
 
-def _macro_in(link: Element, name: str) -> tuple[int, str] | None:
-    """Return the flaw of a link without inertial data that has an unknown element, which may give them."""
-    for child in link.children:
-        if is_unknown(child.tag, LINK):
-            unknown = f"the unknown element {shown(child.tag)}, perhaps a macro that was not expanded"
-            return child.line, f"link {quoted(name)} has no <inertial>, but {unknown}; expand or remove it"
-    return None
-
-
 class _Reader:
     """A reader of elements; problems are collected, and faulty parts replaced, so that reading continues."""
 
@@ -237,7 +220,7 @@ class _Reader:
         name = self.word(element, "name")
         inertial = self._child(element, "inertial")
         if inertial is None:
-            return UrdfLink(name, element.line, None, _macro_in(element, name))
+            return UrdfLink(name, element.line, None)
         mass, inertia = self._child(inertial, "mass"), self._child(inertial, "inertia")
         if mass is None or inertia is None:
             missing = "mass" if mass is None else "inertia"

@@ -274,8 +274,8 @@ def serial_chain(
 
 def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
     """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
-    moved = [joint, *below(joint.child, urdf.joints.values())]
-    return all(urdf.links[moving.child].is_massless for moving in moved)
+    links = [urdf.links[moved.child] for moved in (joint, *below(joint.child, urdf.joints.values()))]
+    return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
 
 
 def _check_joints(

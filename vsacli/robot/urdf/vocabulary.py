@@ -247,7 +247,7 @@ def sort_words(root: Element, unread: Unread, problems: Problems) -> None:
         for word, line, _ in _words(element):
             if refusal := _refusal(word, element, rule, problems.file):
                 problems.add(line, refusal)
-            elif is_unknown(word, rule):
+            elif _is_unknown(word, rule):
                 unread.warn(line, f"unknown {_subject(word, element)} is ignored")
         if element.text and not rule.has_text:
             unread.warn(element.line, f"text of <{element.tag}> is ignored")
@@ -270,17 +270,17 @@ def _words(element: Element) -> Iterator[tuple[str, int, str]]:
         yield child.tag, child.line, " ".join([child.text, *child.attributes.values()])
 
 
-def shown(word: str) -> str:
+def _shown(word: str) -> str:
     """Return a word as it stands in messages."""
     return quoted(word[1:]) if word.startswith("@") else f"<{quoted(word)[1:-1]}>"
 
 
 def _subject(word: str, element: Element) -> str:
     kind = "attribute" if word.startswith("@") else "element"
-    return f"{kind} {shown(word)} of <{element.tag}>"
+    return f"{kind} {_shown(word)} of <{element.tag}>"
 
 
-def is_unknown(word: str, rule: ElementRule) -> bool:
+def _is_unknown(word: str, rule: ElementRule) -> bool:
     """Return whether neither a word nor its namespace is in a list."""
     listed = (*rule.used, *rule.children, *rule.without_effect, *rule.left_out, *rule.refused, *NAMESPACES)
     return word not in listed and word[: word.find(":") + 1] not in listed
@@ -295,7 +295,7 @@ def _left_out(element: Element, rule: ElementRule) -> Iterator[str]:
     }
     yield from filter(None, phrases.values())
     if bare := [word for word, phrase in phrases.items() if not phrase]:
-        names = (word[1:] if word.startswith("@") else shown(word) for word in bare)
+        names = (word[1:] if word.startswith("@") else _shown(word) for word in bare)
         yield f"{', '.join(names)} of <{element.tag}>"
 
 
@@ -310,15 +310,25 @@ def _refusal(word: str, element: Element, rule: ElementRule, file: str) -> str:
     """Return why a word must not be ignored; empty if it may be."""
     if word in rule.refused:
         return f"{_subject(word, element)} is not read; {rule.refused[word]}"
-    if not is_unknown(word, rule):
+    if not _is_unknown(word, rule):
         return ""
     if near := difflib.get_close_matches(word.lower(), [*rule.used, *rule.children], n=1, cutoff=MISSPELLED):
-        return f"unknown {_subject(word, element)}; did you mean {shown(near[0])}?"
-    inner = {part.tag for child in element.all(word) for part in child.everything()}
-    if inner and (rule is ROBOT or (rule in (LINK, JOINT) and inner & {"link", "joint"})):
-        reason = "may stand for links or joints, as a macro that was not expanded"
-        return f"unknown element {shown(word)} {reason}; {expansion(file)}, or remove it"
+        return f"unknown {_subject(word, element)}; did you mean {_shown(near[0])}?"
+    if _may_be_a_macro(word, element, rule):
+        reason = "may stand for links, joints or masses, as a macro that was not expanded"
+        return f"unknown {_subject(word, element)} {reason}; {expansion(file)}, or remove it"
     return ""
+
+
+def _may_be_a_macro(word: str, element: Element, rule: ElementRule) -> bool:
+    """Return whether an unknown element is beside links and joints, has some, or is in place of a mass."""
+    inner = {part.tag for child in element.all(word) for part in child.everything()}
+    in_place_of_mass = rule is LINK and not any(element.all("inertial"))
+    return bool(inner) and (
+        rule is ROBOT
+        or in_place_of_mass
+        or (rule in (LINK, JOINT) and not inner.isdisjoint(("link", "joint")))
+    )
 
 
 MACRO = re.compile(r"\$\{|\$\((anon|arg|dirname|env|eval|find|optenv)\b")
@@ -335,7 +345,7 @@ def refuse_macros(root: Element, problems: Problems) -> None:
         InputError: there is one.
     """
     for element in root.everything():
-        macros = [shown(element.tag)] if element.tag.startswith("xacro:") else []
+        macros = [_shown(element.tag)] if element.tag.startswith("xacro:") else []
         values = (word for name, word in element.attributes.items() if name != MESH)
         macros += [quoted(word) for word in values if MACRO.search(word)]
         for macro in macros:
