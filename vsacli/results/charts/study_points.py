@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,19 +10,20 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import counted
 from vsacli.results.charts.parameter_words import parameter_words
-from vsacli.results.store.study_table import StoredStudy
+from vsacli.results.charts.run_shares import (
+    OK,
+    Shares,
+    count_verdicts,
+    runs_are_independent,
+    verdict_shares_lines,
+)
+from vsacli.results.store.study_table import FIRST_LIMIT, StoredStudy
 
 NAMED_RUNS = 3
 """Number of runs with the smallest margins that are labeled with their numbers."""
 
 METHODS = {"grid": "grid", "random": "random samples", "latin_hypercube": "Latin hypercube samples"}
 """Sampling methods in words."""
-
-DRAWN = ("random", "latin_hypercube")
-"""Methods whose runs are random draws, so that shares of runs estimate probabilities."""
-
-NORMAL_95 = 1.96
-"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
 COSTS = {
     "cost_after": "{}",
@@ -40,21 +40,8 @@ ADDED = "J"
 """Unit of costs that are summed over the joints; of other costs the maximum counts."""
 
 
-class Shares(NamedTuple):
-    """Shares of runs, with the ends of their intervals of 95 % confidence; all arrays of one shape."""
-
-    values: FloatArray
-    low: FloatArray
-    high: FloatArray
-
-    @classmethod
-    def of(cls, counts: FloatArray, runs: int) -> Shares:
-        """Return the shares of counts in a number of runs, with Wilson's intervals (1927)."""
-        values, square = counts / runs, NORMAL_95**2
-        center = (values + square / (2 * runs)) / (1 + square / runs)
-        spread = np.sqrt(values * (1 - values) / runs + square / (4 * runs**2))
-        half = NORMAL_95 * spread / (1 + square / runs)
-        return cls(values, np.maximum(0.0, center - half), np.minimum(1.0, center + half))
+ROOM_BESIDE, LEAST_ROOM = 0.04, 0.002
+"""Space next to the smallest and the largest margin, relative to their distance, and its minimum."""
 
 
 class StudyPoints:
@@ -64,7 +51,10 @@ class StudyPoints:
         name: name of the study.
         runs: numbers of the runs, (rows,).
         margin: smallest margin of all joints, (rows,), relative; NaN if a run failed.
-        feasible: whether every sample was feasible and regular, (rows,).
+        verdicts: verdict of each run.
+        counts: number of runs by verdict, ok first.
+        ok: whether the run is feasible, regular, and within every limit, (rows,).
+        first_limits: joint and limit first exceeded in each run; empty where none is.
         random: whether the runs are independent random draws, so that shares of them have intervals.
 
     Raises:
@@ -77,10 +67,15 @@ class StudyPoints:
             raise InputError.one(f"nothing can be drawn: it has {what}", table.path)
         self.name, self.runs, self._table = table.study_name, table.read("run"), table
         self.margin = _least(table.read("margin"))
-        self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "unreliable"))
+        self.verdicts, self.first_limits = table.texts("verdict"), table.texts(FIRST_LIMIT)
+        self.counts = count_verdicts(self.verdicts)
+        self.ok: BoolArray = self.having(OK)
+        self.random = runs_are_independent(table)
         self._method = str(table.attributes.get("method", ""))
-        # each trajectory has the same draws, so that runs of several are not independent
-        self.random = self._method in DRAWN and len(set(table.texts("trajectory"))) == 1
+
+    def having(self, verdict: str) -> BoolArray:
+        """Return whether each run has a verdict, (rows,)."""
+        return np.array(self.verdicts) == verdict
 
     @property
     def title(self) -> str:
@@ -130,16 +125,28 @@ class StudyPoints:
         return f"{words} [{unit}]", values.sum(axis=1) if unit == ADDED else values.max(axis=1)
 
     @property
-    def share(self) -> tuple[float, float, float]:
-        """Share of the feasible runs, with its interval of 95 % confidence, which holds for random draws."""
-        share, low, high = Shares.of(np.array(float(self.feasible.sum())), len(self.feasible))
-        return float(share), float(low), float(high)
+    def shares_lines(self) -> list[str]:
+        """Share of the ok runs, and shares of the runs with other verdicts, in words."""
+        return verdict_shares_lines(self.counts, random=self.random)
 
-    @property
-    def exceedance(self) -> tuple[FloatArray, Shares]:
-        """Margins, ascending, and for each the share of runs with at least this margin."""
-        margins = np.sort(self.margin[np.isfinite(self.margin)])
-        return margins, Shares.of(np.arange(len(margins), 0.0, -1), len(self.margin))
+    def exceedance(self, counted_runs: BoolArray) -> tuple[FloatArray, Shares]:
+        """Return margins, ascending, and for each the share of runs that keep at least this margin.
+
+        The first and the last margin lie beyond those of all runs: there the share is that of all runs that
+        are counted, and zero. Both are empty if no run has a margin.
+
+        Args:
+            counted_runs: whether each run is counted, (rows,); the others are so in the number of runs alone.
+        """
+        finite = np.isfinite(self.margin)
+        if not finite.any():
+            return np.empty(0), Shares.of(np.empty(0), len(finite))
+        least, largest = (float(end(self.margin[finite])) for end in (np.min, np.max))
+        room = max(ROOM_BESIDE * (largest - least), LEAST_ROOM)
+        margins = np.sort(self.margin[finite & counted_runs])
+        counts = [len(margins), *range(len(margins), -1, -1)]
+        ends = np.concatenate(([least - room], margins, [largest + room]))
+        return ends, Shares.of(np.array(counts, dtype=float), len(finite))
 
     def words(self, path: str) -> str:
         """Return a parameter in words."""
@@ -158,9 +165,9 @@ class StudyPoints:
 
     @property
     def front(self) -> IndexArray:
-        """Pareto front: feasible rows that cost less than any with a larger margin, by ascending margin."""
+        """Pareto front: ok rows that cost less than any with a larger margin, by ascending margin."""
         assert self.cost is not None, "a front requires a cost"
-        rows = np.flatnonzero(self.feasible & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
+        rows = np.flatnonzero(self.ok & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
         rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
         cost = self.cost[1][rows]
         before = np.concatenate([[np.inf], np.minimum.accumulate(cost)[:-1]])

@@ -5,7 +5,9 @@
   if (data.kind !== "study") return;
   const { newFigure, addTools, copyForPaper, removeCopy } = vsacli.figures;
   const place = document.getElementById("plots");
-  const FEASIBLE = 2, LOST = 1;  // colors of curves
+  /* Color of a curve and mark by verdict, as in the figures. */
+  const MARKS = { ok: [2, "circle"], "over limit": [4, "triangle"], singular: [5, "diamond"], infeasible: [1, "x"], unreliable: [3, "square"] };
+  const OTHER = [7, "cross"], PALE = 0.3;
   let plots = [], section;
 
   const MOST_COPIED = 3000;  // runs of a study, since copying a point for paper takes 0.1 ms
@@ -42,19 +44,19 @@
     legend.append(element("span", { class: "key" }, area, words));
   }
 
-  /* A plot of points, each a run: x and y, (runs,), NaN where there is none. */
-  function scatter(study, parent, title, [x, xLabel], [y, yLabel]) {
+  /* A plot of points, each a run: x and y, (runs,), NaN where there is none; runs that are not ok are pale on request. */
+  function scatter(study, parent, title, [x, xLabel], [y, yLabel], alphaOfOthers = 1) {
     const { plot, legend } = card(parent, title, true);
     const figure = newFigure({ x_range: rangeOf([x]), y_range: rangeOf([y]) }, [xLabel, yLabel]);
     finish(figure);
-    const feasible = array(study.feasible);
-    for (const [wanted, words, curve, marker] of [[1, "feasible", FEASIBLE, "circle"], [0, "infeasible", LOST, "x"]]) {
-      const rows = [...feasible.keys()].filter((row) => feasible[row] === wanted && Number.isFinite(x[row] + y[row]));
+    for (const verdict of study.verdicts_drawn) {
+      const [curve, marker] = MARKS[verdict] || OTHER, alpha = verdict === "ok" ? 1 : alphaOfOthers;
+      const rows = [...study.verdicts.keys()].filter((row) => study.verdicts[row] === verdict && Number.isFinite(x[row] + y[row]));
       if (!rows.length) continue;
       const source = new Bokeh.ColumnDataSource({ data: { x: rows.map((row) => x[row]), y: rows.map((row) => y[row]) } });
-      figure.scatter({ field: "x" }, { field: "y" }, { source, size: 6, marker, line_color: curveColor(curve),
-                                                       fill_color: curveColor(curve), fill_alpha: 0.5 });
-      addKey(legend, curve, words);
+      figure.scatter({ field: "x" }, { field: "y" }, { source, size: 6, marker, line_color: curveColor(curve), line_alpha: alpha,
+                                                       fill_color: curveColor(curve), fill_alpha: 0.5 * alpha });
+      addKey(legend, curve, verdict);
     }
     const chosen = new Bokeh.ColumnDataSource({ data: { x: [], y: [] } });
     figure.scatter({ field: "x" }, { field: "y" }, { source: chosen, size: 14, line_color: color("cursor"), line_width: 2.5,
@@ -83,7 +85,7 @@
   }
 
   function line(study, row) {
-    const cells = [study.runs[row], study.verdicts[row], number(array(study.margin)[row])];
+    const cells = [study.runs[row], study.verdicts[row], ...(study.first_limits ? [study.first_limits[row]] : []), number(array(study.margin)[row])];
     if (study.cost !== null) cells.push(number(array(study.cost)[row]));
     cells.push(...study.varying.map(({ values }) => number(array(values)[row])));
     const made = element("tr", { "data-row": row, tabindex: 0 }, ...cells.map((cell) => element("td", {}, String(cell))));
@@ -94,7 +96,7 @@
 
   /* The runs with the smallest margins; a run that is chosen in a plot is added. */
   function addTable(study, parent) {
-    const heads = ["run", "verdict", "smallest margin [%]", ...(study.cost === null ? [] : [study.cost_words]),
+    const heads = ["run", "verdict", ...(study.first_limits ? ["first limit exceeded"] : []), "smallest margin [%]", ...(study.cost === null ? [] : [study.cost_words]),
                    ...study.varying.map(({ words, unit }) => (unit ? `${words} [${unit}]` : words))];
     study.table = element("table", { class: "runs" },
       element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
@@ -104,16 +106,18 @@
   }
 
   function addExceedance() {
-    const { plot, legend } = card(section, "share of runs with at least this margin", true);
-    const margins = data.studies.map((study) => array(study.exceeded));
+    const { plot, legend } = card(section, "share of ok runs with at least this margin; dashed: of runs of any verdict", true);
+    const margins = data.studies.map((study) => array(study.exceedance.margins));
     const figure = newFigure({ x_range: rangeOf(margins), y_range: rangeOf([[0, 100]]) }, ["smallest margin [%]", "runs [%]"]);
     finish(figure);
+    const step = (curve, look) => {
+      const source = new Bokeh.ColumnDataSource({ data: { x: Float64Array.from(array(curve.margins)), y: array(curve.shares) } });
+      figure.step({ field: "x" }, { field: "y" }, "before", { source, ...look });
+    };
     data.studies.forEach((study, index) => {
-      const source = new Bokeh.ColumnDataSource({ data: { x: Float64Array.from(array(study.exceeded)), y: array(study.exceeding) } });
-      figure.step({ field: "x" }, { field: "y" }, "before", { source, line_color: curveColor(index), line_width: 1.8 });
-      const [share, low, high] = study.share.map((each) => number(Number((100 * each).toPrecision(3))));
-      const interval = low === undefined ? "" : ` (95 % interval ${low} to ${high} %)`;  // a grid has none
-      addKey(legend, index, `${study.label}: ${share} % feasible${interval}`);
+      step(study.exceedance, { line_color: curveColor(index), line_width: 1.8 });
+      if (study.exceedance_of_all) step(study.exceedance_of_all, { line_color: curveColor(index), line_width: 1, line_dash: "dashed" });
+      addKey(legend, index, data.studies.length > 1 ? `${study.label}: ${study.shares}` : study.shares);
     });
     figure.add_layout(new Bokeh.Span({ dimension: "height", location: 0, line_color: color("soft"), line_width: 1 }));
     plots.push({ figure, plot, choose: () => {} });
@@ -130,7 +134,7 @@
     details.append(charts);
     const margin = [array(study.margin), "smallest margin [%]"];
     const cost = study.cost === null ? null : [array(study.cost), study.cost_words];
-    if (cost) addFront(study, scatter(study, charts, "cost over margin, and the Pareto front", margin, cost), margin[0], cost[0]);
+    if (cost) addFront(study, scatter(study, charts, "cost over margin, and the Pareto front of ok runs", margin, cost, PALE), margin[0], cost[0]);
     for (const { words, unit, values } of study.varying) {
       const varied = [array(values), unit ? `[${unit}]` : ""];
       const figure = scatter(study, charts, `margin over ${words}`, varied, margin);

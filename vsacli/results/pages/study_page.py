@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import IndexArray, evenly
+from vsacli.base.arrays import BoolArray, IndexArray, evenly
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
+from vsacli.results.charts.run_shares import verdict_counts_text, verdict_words
 from vsacli.results.charts.study_points import StudyPoints
 from vsacli.results.pages.document import PageTexts, input_text, plotting_library, rendered
 from vsacli.results.pages.packing import Packed
@@ -34,24 +35,24 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
     studies = [StudyPoints(table) for table in tables]
     data = {
         "kind": "study",
-        "studies": [_study(points, table, packed) for points, table in zip(studies, tables, strict=True)],
+        "studies": [_study(points, packed) for points in studies],
     }
     texts = [_texts(*each) for each in zip(studies, tables, reports, strict=True)]
     return rendered(library, " / ".join(points.title for points in studies), texts, data, packed)
 
 
-def _study(points: StudyPoints, table: StoredStudy, packed: Packed) -> dict[str, Any]:
+def _study(points: StudyPoints, packed: Packed) -> dict[str, Any]:
     """Return the values of a study for the scripts, with arrays of the drawn runs."""
     drawn = _drawn(points)
-    verdicts = table.texts("verdict")
-    margins, shares = points.exceedance
-    kept = evenly(len(margins), MOST_RUNS)
+    ok, every = (_curve(points, chosen, packed) for chosen in (points.ok, np.ones_like(points.ok)))
+    first_limits = [points.first_limits[row] for row in drawn]
     return {
         "label": points.name,
         "of": len(points.runs),
         "runs": [int(run) for run in points.runs[drawn]],
-        "verdicts": [verdicts[row] for row in drawn],
-        "feasible": packed.add(points.feasible[drawn]),
+        "verdicts": [verdict_words(points.verdicts[row]) for row in drawn],
+        "verdicts_drawn": [verdict_words(verdict) for verdict in points.counts],
+        "first_limits": first_limits if any(first_limits) else None,
         "margin": packed.add(100 * points.margin[drawn]),
         "cost": None if points.cost is None else packed.add(points.cost[1][drawn]),
         "cost_words": "" if points.cost is None else points.cost[0],
@@ -61,10 +62,17 @@ def _study(points: StudyPoints, table: StoredStudy, packed: Packed) -> dict[str,
             {"words": points.words(path), "unit": points.unit(path), "values": packed.add(values[drawn])}
             for path, values in points.varying.items()
         ],
-        "share": points.share if points.random else points.share[:1],
-        "exceeded": packed.add(100 * margins[kept]),
-        "exceeding": packed.add(100 * shares.values[kept]),
+        "shares": ", ".join(points.shares_lines),
+        "exceedance": ok,
+        "exceedance_of_all": None if points.ok.all() else every,
     }
+
+
+def _curve(points: StudyPoints, chosen: BoolArray, packed: Packed) -> dict[str, int]:
+    """Return the arrays of the share of chosen runs, %, with at least each margin, %."""
+    margins, shares = points.exceedance(chosen)
+    kept = evenly(len(margins), MOST_RUNS)
+    return {"margins": packed.add(100 * margins[kept]), "shares": packed.add(100 * shares.values[kept])}
 
 
 def _drawn(points: StudyPoints) -> IndexArray:
@@ -77,12 +85,11 @@ def _drawn(points: StudyPoints) -> IndexArray:
 
 def _texts(points: StudyPoints, table: StoredStudy, report: ReportText) -> PageTexts:
     made = table.provenance()
-    feasible = int(points.feasible.sum())
     return PageTexts(
         title=points.title,
         label=points.name,
-        verdict=f"{feasible} of {table.rows} feasible",
-        tone="good" if feasible == table.rows else "fair" if feasible else "bad",
+        verdict=verdict_counts_text(points.counts),
+        tone="good" if points.ok.all() else "fair" if points.ok.any() else "bad",
         report=report,
         provenance=[(name.replace("_", " "), one_line(text)) for name, text in made.items() if text],
         inputs=[input_text(each) for each in table.inputs()],

@@ -131,8 +131,9 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
         figure.suptitle(_title(title, figure), fontsize=1.1 * look.font_size, parse_math=False)
     by_label = {str(handle.get_label()): handle for handle in handles}
     if by_label:
-        labels = [shortened(label) for label in by_label]
-        width = look.scale * (_INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels)))
+        labels = ["\n".join(map(shortened, label.split("\n"))) for label in by_label]
+        longest = max(len(line) for label in labels for line in label.split("\n"))
+        width = look.scale * (_INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * longest)
         rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
         columns = math.ceil(len(labels) / rows)
         legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)

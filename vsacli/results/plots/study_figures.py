@@ -24,13 +24,21 @@ from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.ranking import Ranking
+from vsacli.results.charts.run_shares import OK, verdict_words
 from vsacli.results.charts.study_points import StudyPoints
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
 from vsacli.results.plots.point_labels import BELOW, LETTER, label_points
 from vsacli.results.plots.sheets import AxesGrid, complete
-from vsacli.results.plots.styles import line_handle, line_style, new_figure, scaled, shortened
+from vsacli.results.plots.styles import (
+    LONGEST_LABEL,
+    line_handle,
+    line_style,
+    new_figure,
+    scaled,
+    shortened,
+)
 from vsacli.results.store.study_table import StoredStudy
 
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
@@ -58,17 +66,21 @@ for it, relative to the longest bar."""
 MOST_TICKS = 8
 """Maximum number of values of a grid that are ticks of a map; of more, some are."""
 
-ROOM_BESIDE, LEAST_ROOM = 0.04, 0.002
-"""Space next to the smallest and the largest margin, relative to their distance, and its minimum."""
-
 ROOM_FOR_RUNS = 0.13
 """Space around a Pareto front for the labels of its ends, relative to its size."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 _POINT: dict[str, Any] = {"linestyle": "", "markersize": 3}
-_FEASIBLE: dict[str, Any] = {**_POINT, "marker": "o", "color": line_style(2).color}
-_INFEASIBLE: dict[str, Any] = {**_POINT, "marker": "x", "markersize": 4, "color": line_style(1).color}
+_OK: dict[str, Any] = {**_POINT, "marker": "o", "color": line_style(2).color}
+_MARKS: dict[str, dict[str, Any]] = {
+    OK: _OK,
+    "over_limit": {**_POINT, "marker": "^", "markersize": 4, "color": line_style(4).color},
+    "singular": {**_POINT, "marker": "D", "color": line_style(5).color},
+    "infeasible": {**_POINT, "marker": "x", "markersize": 4, "color": line_style(1).color},
+    "unreliable": {**_POINT, "marker": "s", "color": line_style(3).color},
+}
+"""Marks of runs by verdict."""
 _BEFORE: dict[str, Any] = {
     **_POINT,
     "marker": "o",
@@ -76,7 +88,9 @@ _BEFORE: dict[str, Any] = {
     "color": line_style(1).color,
     "markerfacecolor": "none",
 }
-_ANY: dict[str, Any] = {**_POINT, "marker": "o", "color": "0.6"}
+_OTHER: dict[str, Any] = {**_POINT, "marker": "+", "markersize": 4, "color": "0.4"}
+_PALE: dict[str, Any] = {"alpha": 0.3}
+_OF_ALL: dict[str, Any] = {"linestyle": ":", "linewidth": 1.2}
 _NAMED: dict[str, Any] = {"linestyle": "", "marker": r"$\mathrm{7}$", "color": "black", "markersize": 6}
 _BOUNDARY: dict[str, Any] = {
     "color": "black",
@@ -93,7 +107,7 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
         InputError: there is nothing to draw.
     """
     points = StudyPoints(table)
-    figures = {FEASIBILITY_OF_RUNS: _feasibility([points], ["feasible"], points.title)}
+    figures = {FEASIBILITY_OF_RUNS: _feasibility([points], [""], points.title)}
     if points.varying:
         figures[COST if points.optimized else MARGIN] = (
             _over_map(points) if _is_grid(points) else _over_numbers(points)
@@ -109,7 +123,7 @@ def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Fi
     Raises:
         InputError: a study has nothing to draw.
     """
-    title = f"comparison of {counted(len(tables), 'study', 'studies')}: feasible runs"
+    title = f"comparison of {counted(len(tables), 'study', 'studies')}: ok runs"
     return _feasibility([StudyPoints(table) for table in tables], labels, title)
 
 
@@ -180,8 +194,7 @@ def _most_followed(points: StudyPoints) -> list[str]:
 def _margins_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
     """Draw margins with the numbers of the worst runs; yield legend entries."""
     margin = 100 * points.margin
-    yield from _scatter(axes, x, margin, points.feasible, "feasible", _FEASIBLE)
-    yield from _scatter(axes, x, margin, ~points.feasible, "infeasible", _INFEASIBLE)
+    yield from _runs_by_verdict(axes, points, x, margin)
     axes.axhline(0.0, **scaled(ZERO))
     worst = points.worst
     if worst.size:
@@ -197,10 +210,18 @@ def _costs_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Arti
     if points.optimized:
         before = points.cost_before[1]
         yield from _scatter(axes, x, before, every, _known("as commanded", before), _BEFORE)
-        yield from _scatter(axes, x, cost, every, _known("optimum", cost), _FEASIBLE)
+        yield from _scatter(axes, x, cost, every, _known("optimum", cost), _OK)
     else:
-        yield from _scatter(axes, x, cost, points.feasible, "feasible", _FEASIBLE)
-        yield from _scatter(axes, x, cost, ~points.feasible, "infeasible", _INFEASIBLE)
+        yield from _runs_by_verdict(axes, points, x, cost)
+
+
+def _runs_by_verdict(
+    axes: Axes, points: StudyPoints, x: FloatArray, y: FloatArray, **of_others: float
+) -> Iterator[Artist]:
+    """Draw runs with the marks of their verdicts, those that are not ok with further keywords."""
+    for verdict in points.counts:
+        look = {**_MARKS.get(verdict, _OTHER), **(of_others if verdict != OK else {})}
+        yield from _scatter(axes, x, y, points.having(verdict), verdict_words(verdict), look)
 
 
 def _known(label: str, costs: FloatArray) -> str:
@@ -241,6 +262,7 @@ def _over_map(points: StudyPoints) -> Figure:
     order, shape = np.lexsort((x, y)), (len(np.unique(y)), len(np.unique(x)))
     margin = points.margin[order].reshape(shape)
     bounded = not points.optimized and np.nanmin(margin, initial=0.0) < 0 < np.nanmax(margin, initial=0.0)
+    marks: list[Artist] = []
     with new_figure(natural(columns)) as figure:
         panels = figure.subplots(math.ceil(len(maps) / columns), columns, squeeze=False, sharey=True)
         for axes in panels[:, 0]:
@@ -248,11 +270,29 @@ def _over_map(points: StudyPoints) -> Figure:
         for axes, (label, values) in zip(panels.flat, maps, strict=True):
             place = [each[order].reshape(shape) for each in (x, y, values)]
             _draw_map(axes, place, margin if bounded else None, label)
+            marks += _marks_on_map(axes, points, (x, y), values)
             axes.set_xlabel(_label(points, across, MOST_LETTERS), parse_math=False)
         handles: list[Artist] = [Line2D([], [], **_BOUNDARY, label="margin zero")] if bounded else []
-        if any(np.isnan(values).any() for _, values in maps):
-            handles.append(Patch(**_NOTHING, label="infeasible"))
-        return complete(figure, points.title, handles)
+        empty = np.isnan([values for _, values in maps]).any(axis=0)
+        if empty.any():
+            handles.append(Patch(**_NOTHING, label=_words_without_value(points, empty)))
+        return complete(figure, points.title, [*handles, *marks])
+
+
+def _words_without_value(points: StudyPoints, empty: BoolArray) -> str:
+    """Return the verdicts of runs without a value; the commanded motions of optima have none of their own."""
+    verdicts = dict.fromkeys(points.verdicts[row] for row in np.flatnonzero(empty))
+    return " or ".join(verdict_words(verdict) for verdict in verdicts if verdict != OK) or "infeasible"
+
+
+def _marks_on_map(
+    axes: Axes, points: StudyPoints, place: tuple[FloatArray, FloatArray], values: FloatArray
+) -> Iterator[Artist]:
+    """Mark the runs whose value does not show that they are not ok, as the margin of infeasible ones does."""
+    for verdict in points.counts.keys() - {OK, "infeasible"}:
+        rows = points.having(verdict) & np.isfinite(values)
+        look = {**_MARKS.get(verdict, _OTHER), "color": "black", "markerfacecolor": "white"}
+        yield from _scatter(axes, *place, rows, verdict_words(verdict), look)
 
 
 def _draw_map(axes: Axes, place: Sequence[FloatArray], margin: FloatArray | None, label: str) -> None:
@@ -284,13 +324,13 @@ def _fitting(label: str, length: int = MOST_LETTERS) -> str:
 
 
 def _pareto(points: StudyPoints) -> Figure:
-    """Draw cost over margin of the feasible runs, with the Pareto front."""
+    """Draw cost over margin, with the Pareto front of the ok runs; other runs are pale."""
     assert points.cost is not None, "see study_figures"
     words, cost = points.cost
     with new_figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT)) as figure:
         axes = figure.add_subplot()
         margin, front = 100 * points.margin, points.front
-        runs = list(_scatter(axes, margin, cost, points.feasible, "feasible runs", _ANY))
+        runs = list(_runs_by_verdict(axes, points, margin, cost, **_PALE))
         axes.plot(margin[front], cost[front], **line_style(2).words)
         axes.margins(ROOM_FOR_RUNS)
         named = list(dict.fromkeys([front[0], front[-1], front[len(front) // 2]]))
@@ -302,41 +342,48 @@ def _pareto(points: StudyPoints) -> Figure:
 
 
 def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: str) -> Figure:
-    """Draw the share of runs with at least a given margin; the legend gives the share of feasible runs.
+    """Draw the share of ok runs with at least a given margin; the legend gives the share of each verdict.
 
-    Shares of random draws estimate probabilities, and have a band of their 95 % intervals; shares of a grid
-    have none, since its runs are chosen.
+    Where not all runs are ok, a dotted line is the share of all of them with this margin. Shares of random
+    draws estimate probabilities, and have a band of their 95 % intervals; shares of a grid have none, since
+    its runs are chosen.
     """
     with new_figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT)) as figure:
         axes, handles = figure.add_subplot(), []
         for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
             style = replace(line_style(index), marker="")
             _draw_shares(axes, points, style.words)
-            share, low, high = (100 * each for each in points.share)
-            interval = f" ({low:.3g} to {high:.3g} %)" if points.random else ""
-            handles.append(line_handle(style, f"{label}: {share:.3g} %{interval}"))
+            handles.append(line_handle(style, _lines_of_study(points, label)))
+        if not all(points.ok.all() for points in studies):
+            handles.append(Line2D([], [], color="black", **scaled(_OF_ALL), label="runs of any verdict"))
         if any(points.random for points in studies):
             handles.append(Patch(facecolor="0.3", **_INTERVAL, label="95 % interval (random samples)"))
         axes.axvline(0.0, **scaled(ZERO))
         axes.set_xlabel("smallest margin [%]")
-        axes.set_ylabel("runs with at least this margin [%]")
+        axes.set_ylabel(_fitting("ok runs with at least this margin [%]"))
         axes.set_ylim(0, 103)
         return complete(figure, title, handles)
 
 
+def _lines_of_study(points: StudyPoints, label: str) -> str:
+    """Return the shares of verdicts for the legend, with the label of the study unless it is empty."""
+    ok, *others = points.shares_lines
+    named = f"{label}: {ok}"
+    first = [ok] if not label else [named] if len(named) <= LONGEST_LABEL else [label, ok]
+    return "\n".join([*first, *others])
+
+
 def _draw_shares(axes: Axes, points: StudyPoints, look: Mapping[str, Any]) -> None:
-    """Draw the share of runs over the margin, which falls to zero beyond the largest margin."""
-    margins, shares = points.exceedance
-    if not margins.size:
-        return
-    room = max(ROOM_BESIDE * float(np.ptp(margins)), LEAST_ROOM)
-    x = 100 * np.concatenate([margins[:1] - room, margins, margins[-1] + np.array([0.0, room])])
-    values, low, high = (100 * np.concatenate([each[:1], each, np.zeros(2)]) for each in shares)
-    axes.step(x, values, where="pre", **look)
+    """Draw the share of ok runs over the margin, with its interval, and that of all runs if it differs."""
+    margins, shares = points.exceedance(points.ok)
+    axes.step(100 * margins, 100 * shares.values, where="pre", **look)
     if points.random:
-        inside = slice(1, len(margins) + 1)
         area = {"color": look["color"], **_INTERVAL}
-        axes.fill_between(x[inside], low[inside], high[inside], step="pre", **area)
+        axes.fill_between(100 * margins, 100 * shares.low, 100 * shares.high, step="pre", **area)
+    if not points.ok.all():
+        margins, shares = points.exceedance(np.ones_like(points.ok))
+        dotted = {**look, **scaled(_OF_ALL)}
+        axes.step(100 * margins, 100 * shares.values, where="pre", **dotted)
 
 
 def _label(points: StudyPoints, path: str, length: int) -> str:

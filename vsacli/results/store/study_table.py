@@ -33,12 +33,20 @@ from vsacli.results.store.reader import StoredFile, kind_of_format
 from vsacli.results.store.schema import TEXT, storable, unit_attributes
 
 FORMAT = "vsacli-study-table/1"
+FIRST_LIMIT = "first_limit"
 TEXTS = {
     "trajectory": "file of the trajectory",
     "verdict": "verdict of the run's report; failed if it cannot be computed, impossible without an optimum",
+    FIRST_LIMIT: "joint and limit that the run exceeds first, else empty",
     "error": "why there are no numbers, else empty",
     "key": "digest of all that the row depends on",
 }
+
+OF_RUN = tuple(name for name in TEXTS if name != "trajectory")
+"""Texts that a run results in; the trajectory is one of its inputs."""
+
+ADDED = (FIRST_LIMIT,)
+"""Texts that tables of earlier versions lack; there they are empty."""
 
 
 ROWS_AT_ONCE = 8192
@@ -190,7 +198,7 @@ class StudyWriter(NewFile):
             }
             along = [scales[dim] for dim in ("run", *column.dims)]
             self._dataset(column.name, self._shape(column), "<f8", attributes, along)
-        for name in ("verdict", "error", "key"):
+        for name in OF_RUN:
             file[name].attrs["coordinates"] = coordinates
         write_sources(file.create_group("inputs", track_order=True), head.sources)
 
@@ -296,9 +304,13 @@ class StoredStudy(StoredFile):
             raise
 
     def _check(self) -> None:
-        for name in (*TEXTS, *self.parameters, *self.columns):
+        stored = [name for name in TEXTS if not self._lacks(name)]
+        for name in (*stored, *self.parameters, *self.columns):
             if self._dataset(name).shape[0] != self.rows:
                 raise DamageError(f"{name} has not {self.rows} rows")
+
+    def _lacks(self, name: str) -> bool:
+        return name in ADDED and name not in self._file
 
     def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
         """Return the texts of rows, or the labels of a dimension.
@@ -307,7 +319,7 @@ class StoredStudy(StoredFile):
             InputError: the texts are damaged.
         """
         with reporting_damage(self.path, name):
-            return self._labels(name, rows)
+            return ("",) * len(range(self.rows)[rows]) if self._lacks(name) else self._labels(name, rows)
 
     def read(self, name: str, rows: slice = ALL) -> AnyArray:
         """Return a numeric column, (rows, ...), or the numbers of the runs.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.report import Report
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import LIMITS
 from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS, UNCERTAIN, VARIABLES, Block, deviation
 
@@ -131,6 +132,20 @@ def scalars(kept: Sequence[Column], report: Report) -> FloatArray:
     """Return the concatenated values of a run, (columns,)."""
     values = ([each.scalar(joint) for joint in report.joints] for each in kept)
     return np.concatenate([np.array(each, dtype=float).ravel() for each in values])
+
+
+def first_limit(joints: Sequence[JointReport]) -> str:
+    """Return joint and limit that a run exceeds first, such as `base motor_torque_limit`; "" if none.
+
+    Of limits that are exceeded at the same time, the one of the joint nearest to the base comes first.
+    """
+    exceeded = [
+        (joint.first_time[flag.label], f"{joint.name} {flag.label}")
+        for joint in joints
+        for flag in LIMITS
+        if flag.label in joint.first_time
+    ]
+    return min(exceeded, default=(0.0, ""), key=itemgetter(0))[1]
 
 
 def width(columns: Sequence[Column], joints: int) -> int:

@@ -165,13 +165,15 @@ class Journal:
         os.lseek(self._file, start, os.SEEK_SET)
         content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
         values, curves = (np.frombuffer(base64.b64decode(content[name])) for name in _ARRAYS)
-        return Row(run, key, content["verdict"], content["error"], values, curves)
+        return Row(run, key, *(content[name] for name in _TEXTS), values, curves)
 
     def remove(self) -> None:
         """Remove the file."""
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
 
+
+_TEXTS = ("verdict", "first_limit", "error")
 
 _ARRAYS = ("values", "curves")
 
@@ -184,7 +186,7 @@ _BEGINNING = re.compile(rb'[0-9a-f]{8} \{"key": ')
 
 def _line(row: Row) -> bytes:
     arrays = {name: base64.b64encode(getattr(row, name).tobytes()).decode() for name in _ARRAYS}
-    content = {"key": row.key, "verdict": row.verdict, "error": row.error, **arrays}
+    content = {"key": row.key, **{name: getattr(row, name) for name in _TEXTS}, **arrays}
     text = json.dumps(content).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)
 

@@ -21,7 +21,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import one_line
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
-from vsacli.studies.sweeps.columns import Recorder, scalars
+from vsacli.studies.sweeps.columns import Recorder, first_limit, scalars
 from vsacli.studies.sweeps.study import ChangedError, Point, Study, load_study
 from vsacli.trajectory.changes import Divided
 from vsacli.trajectory.devices import with_devices
@@ -45,6 +45,7 @@ class Row(NamedTuple):
         run: number of the run.
         key: digest of everything that the row depends on.
         verdict: verdict of the report, `FAILED` or `IMPOSSIBLE`.
+        first_limit: joint and limit that the run exceeds first, see `first_limit`; empty if none.
         error: reason for `FAILED` or `IMPOSSIBLE`; otherwise empty.
         values: costs of the optimum, if there is one, and the kept columns, (columns,); empty without a
             report.
@@ -54,6 +55,7 @@ class Row(NamedTuple):
     run: int
     key: str
     verdict: str
+    first_limit: str
     error: str
     values: FloatArray
     curves: FloatArray
@@ -70,7 +72,7 @@ def failed(run: int, key: str, reason: str) -> Row:
 
 
 def _without_values(run: int, key: str, verdict: str, reason: str) -> Row:
-    return Row(run, key, verdict, one_line(reason), np.empty(0), np.empty(0))
+    return Row(run, key, verdict, "", one_line(reason), np.empty(0), np.empty(0))
 
 
 def lost(study: Study, run: int, how: str) -> Row:
@@ -127,7 +129,7 @@ class Computer:
             recorder.add(block)
         report = computed.report()
         values = np.concatenate([*costs, scalars(self._study.kept, report)])
-        return Row(run, key, report.verdict, "", values, recorder.curves)
+        return Row(run, key, report.verdict, first_limit(report.joints), "", values, recorder.curves)
 
     def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)

@@ -24,6 +24,7 @@ from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import Mapping, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
+from vsacli.results.store.study_table import TEXTS
 from vsacli.robot.file import ReadRobot, read_robot
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import KEPT, Column, over_time
@@ -155,7 +156,7 @@ class Study:
     def digest(self) -> str:
         """Hexadecimal digest of everything that rows depend on, except trajectory and values of a run."""
         robot = [source.sha256 for source in self.robot.sources]
-        kept = [each.name for each in self.kept]
+        kept = [*TEXTS, *(each.name for each in self.kept)]
         curves = [self.file.every, *(each.name for each in self.over_time)]
         optimized = [] if self.file.optimize is None else [repr(self.file.optimize)]
         files = [*self._named_files.values()]

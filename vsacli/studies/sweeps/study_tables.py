@@ -16,6 +16,7 @@ from vsacli.base.outputs import Staged
 from vsacli.base.texts import counted
 from vsacli.documents.source import Source
 from vsacli.results.store.study_table import (
+    OF_RUN,
     TEXTS,
     Head,
     Parameter,
@@ -98,7 +99,7 @@ def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
     points = [study.point(row.run) for row in rows]
     arrays: dict[str, Any] = {
         "trajectory": [study.trajectories[point.trajectory] for point in points],
-        **{name: [getattr(row, name) for row in rows] for name in ("verdict", "error", "key")},
+        **{name: [getattr(row, name) for row in rows] for name in OF_RUN},
     }
     for dimension in study.dimensions:
         values = [point.values[dimension.path] for point in points]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -12,8 +12,17 @@ import numpy as np
 from vsacli.base.json_records import Stored, named
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted
-from vsacli.results.store.study_table import StoredStudy
+from vsacli.results.charts.run_shares import (
+    count_verdicts,
+    ok_share,
+    runs_are_independent,
+    verdict_counts_text,
+)
+from vsacli.results.store.study_table import FIRST_LIMIT, StoredStudy
 from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
+
+MOST_LIMITS = 5
+"""Largest number of limits that the text lists."""
 
 MOST_ERRORS = 3
 """Largest number of failed runs that the text lists."""
@@ -49,16 +58,27 @@ class Extreme(Stored):
 
 
 @dataclass(frozen=True)
+class OkShare(Stored):
+    """Share of ok runs among random draws, with the ends of its interval of 95 % confidence."""
+
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class StudySummary(Stored):
     """The findings of a study.
 
     Attributes:
         study, robot: names of study and robot.
         runs: number of runs in the table.
-        verdicts: number of runs by verdict.
+        verdicts: number of runs by verdict, ok first.
         failures: runs that could not be computed.
         worst: smallest margin of each joint that has one.
         warnings: warnings about the study.
+        ok_share: share of ok runs; None if the runs are not independent random draws.
+        first_limits: number of runs by joint and limit that they exceed first.
     """
 
     study: str
@@ -68,10 +88,15 @@ class StudySummary(Stored):
     failures: tuple[Failure, ...]
     worst: tuple[Extreme, ...]
     warnings: tuple[str, ...] = ()
+    ok_share: OkShare | None = None
+    first_limits: dict[str, int] = field(default_factory=dict)
 
     format: ClassVar = "vsacli-study-summary/1"
     shape: ClassVar = {
-        **named("format", "study", "robot", "runs", "verdicts", "failures", "worst"),
+        **named("format", "study", "robot", "runs", "verdicts"),
+        "ok_share?": "ok_share",
+        "first_limits?": "first_limits",
+        **named("failures", "worst"),
         "warnings?": "warnings",
     }
 
@@ -79,11 +104,12 @@ class StudySummary(Stored):
     def of(cls, table: StoredStudy) -> StudySummary:
         """Return the summary of a table."""
         verdicts, errors, runs = table.texts("verdict"), table.texts("error"), table.read("run").tolist()
+        counts, random = count_verdicts(verdicts), table.rows > 0 and runs_are_independent(table)
         return cls(
             study=table.study_name,
             robot=table.robot_name,
             runs=table.rows,
-            verdicts=dict(Counter(verdicts).most_common()),
+            verdicts=counts,
             failures=tuple(
                 Failure(run, error)
                 for run, verdict, error in zip(runs, verdicts, errors, strict=True)
@@ -91,6 +117,8 @@ class StudySummary(Stored):
             ),
             worst=tuple(_worst(table)),
             warnings=() if table.parameters or table.runs > 1 else ("nothing varies; add vary:",),
+            ok_share=OkShare(*ok_share(counts)) if random else None,
+            first_limits=dict(Counter(filter(None, table.texts(FIRST_LIMIT))).most_common()),
         )
 
     def __str__(self) -> str:
@@ -99,13 +127,14 @@ class StudySummary(Stored):
     @property
     def title(self) -> str:
         """Name of the study, number of runs, and how many have each verdict."""
-        counts = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in self.verdicts.items())
+        counts = verdict_counts_text(self.verdicts)
         runs = f"{self.study}: {counted(self.runs, 'run')} of {self.robot}"
         return f"{runs}: {counts}" if counts else runs
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
-        lines = [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
+        lines = [] if self.ok_share is None else [_share_line(self.ok_share)]
+        lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
         if len(self.failures) > MOST_ERRORS:
             others = counted(len(self.failures) - MOST_ERRORS, "other run")
             lines.append(f"{others} failed; the column error of the table says why")
@@ -120,6 +149,12 @@ class StudySummary(Stored):
         if impossible := self.verdicts.get(IMPOSSIBLE, 0):
             runs = counted(impossible, "run")
             yield f"nothing feasible was found in {runs}; the column error of the table says why"
+
+        if self.first_limits:
+            listed = [f"{limit} ({counted(runs, 'run')})" for limit, runs in self.first_limits.items()]
+            more = len(listed) - MOST_LIMITS
+            listed[MOST_LIMITS:] = [f"and {counted(more, 'other limit')}"] if more > 0 else []
+            yield f"first limit exceeded: {', '.join(listed)}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the table of the smallest margin of each joint, smallest first."""
@@ -138,6 +173,11 @@ class StudySummary(Stored):
             for each in sorted(self.worst, key=lambda each: each.margin)
         ]
         return rows
+
+
+def _share_line(ok: OkShare) -> str:
+    share, low, high = (f"{100 * each:.3g}" for each in (ok.share, ok.low, ok.high))
+    return f"share of ok runs: {share} %, 95 % confidence interval {low} to {high} %"
 
 
 def _worst(table: StoredStudy) -> list[Extreme]:
