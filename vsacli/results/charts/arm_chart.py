@@ -128,15 +128,19 @@ def arm_chart(robot: Robot) -> ArmChart:
     size = max(float(extents.max()), SMALLEST_SIZE)
     length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
     centers = _centers(chain, length)
-    gravity = np.array(robot.gravity)
-    strength = float(np.linalg.norm(gravity))
-    down = gravity / strength if strength else np.zeros(3)
+    down = direction_of(np.array(robot.gravity))
     drawn = np.concatenate((line, centers))
     middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     title = f"{robot.name}: arm at {_configuration(robot, q)}"
     views = _views(down, extents, size)
     size = max(size, float(np.ptp(drawn, axis=0).max()))
     return ArmChart(title, robot.joints, q, chain, line, centers, down, size, length, middle, views)
+
+
+def direction_of(gravity: FloatArray) -> FloatArray:
+    """Return the unit vector along gravity, (3,); zero without gravity."""
+    strength = float(np.linalg.norm(gravity))
+    return gravity / strength if strength else np.zeros(3)
 
 
 def _configuration(robot: Robot, q: FloatArray) -> str:

@@ -20,7 +20,7 @@ from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted, one_line
 from vsacli.base.variables import deviation
-from vsacli.results.charts.arm_chart import Chain
+from vsacli.results.charts.arm_chart import Chain, direction_of
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.measured import MeasuredCurve
@@ -210,7 +210,7 @@ def unreliable(result: StoredResult) -> list[list[float]]:
     return [span for span in clipped if span[0] < span[1]]
 
 
-def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, int] | None:
+def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, Any] | None:
     """Return the motion of the chain, for the animation; None if positions are not stored.
 
     Args:
@@ -220,7 +220,7 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
 
     Returns:
         Numbers of the arrays `time`, (instants,), s after the start of the page, and `origins`, `elbows` and
-        `axes` of the `Chain` at these instants.
+        `axes` of the `Chain` at these instants; and the unit vector `down` along gravity, zero without it.
     """
     if "q" not in result.variables:
         return None
@@ -234,6 +234,7 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
         "origins": packed.add(chain.origins),
         "elbows": packed.add(chain.elbows),
         "axes": packed.add(chain.axes),
+        "down": direction_of(result.gravity()).tolist(),
     }
 
 

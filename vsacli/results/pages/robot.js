@@ -1,38 +1,52 @@
 "use strict";
-/* The robot at the time cursor: prisms in orthographic view, painted from the back to the front. */
+/* The robot at the time cursor: prisms in orthographic view, painted from the back to the front. Up is against gravity. */
 vsacli.robot = (() => {
   const { data, state, array, after, color, curveColor } = vsacli;
   const THICK = 0.034, THIN = 0.014;  // radii of joints and links, relative to the size of the motion
+  const SHORTEST = 0.3;  // share of its length below which the arrow of gravity is left out
   const ISOMETRIC = { turn: -0.75 * Math.PI, tilt: 0.6155 };
   const view = { ...ISOMETRIC };
   const canvas = document.getElementById("chain"), note = document.getElementById("chain-note");
   const chains = data.files ? data.files.map((file) => file.chain).map(unpacked).filter(Boolean) : [];
   const joints = data.joints || [];
-  const box = bounds();
-
   const add = (a, b, share = 1) => [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const scaled = (a, factor) => a.map((each) => factor * each);
   const size = (a) => Math.sqrt(dot(a, a));
+  const down = (chains.find((chain) => size(chain.down) > 0) || { down: [0, 0, 0] }).down;
+  const frame = level(size(down) > 0 ? scaled(down, -1) : [0, 0, 1]);
+  const box = bounds();
 
   function unpacked(chain, file) {
     if (!chain) return null;
     const [time, origins, elbows, axes] = [chain.time, chain.origins, chain.elbows, chain.axes].map(array);
-    return { file, time, origins, elbows, axes, points: origins.length / time.length / 3, count: axes.length / time.length / 3 };
+    return { file, down: chain.down, time, origins, elbows, axes, points: origins.length / time.length / 3, count: axes.length / time.length / 3 };
   }
 
-  /* Middle and radius of all points that any chain passes. */
+  /* Upright unit vector, and two level ones: of a base frame that stands upright its axes x and y. */
+  function level(up) {
+    const x = Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], ahead = add(x, up, -dot(x, up));
+    const first = scaled(ahead, 1 / size(ahead));
+    return { first, second: cross(up, first), up };
+  }
+
+  /* Middle and radius of all points that any chain passes, and the height of the lowest. */
   function bounds() {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    let lowest = Infinity;
     for (const { origins } of chains) {
-      origins.forEach((value, index) => {
-        if (value < low[index % 3]) low[index % 3] = value;
-        if (value > high[index % 3]) high[index % 3] = value;
-      });
+      for (let at = 0; at < origins.length; at += 3) {
+        const point = [...origins.subarray(at, at + 3)], height = dot(point, frame.up);
+        if (height < lowest) lowest = height;
+        point.forEach((value, axis) => {
+          if (value < low[axis]) low[axis] = value;
+          if (value > high[axis]) high[axis] = value;
+        });
+      }
     }
     const middle = low.map((value, axis) => (value + high[axis]) / 2);
-    return { middle, radius: Math.hypot(...low.map((value, axis) => (high[axis] - value) / 2)) || 1, low };
+    return { middle, radius: Math.hypot(...low.map((value, axis) => (high[axis] - value) / 2)) || 1, lowest };
   }
 
   /* Points of an array at the cursor, linear between instants. */
@@ -49,13 +63,14 @@ vsacli.robot = (() => {
   function camera() {
     const { width, height } = canvas;
     const [c, s, ct, st] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.tilt), Math.sin(view.tilt)];
-    const right = [-s, c, 0], up = [-c * st, -s * st, ct], towards = [c * ct, s * ct, st];
+    const inBase = ([x, y, z]) => add(add(scaled(frame.first, x), frame.second, y), frame.up, z);
+    const right = inBase([-s, c, 0]), up = inBase([-c * st, -s * st, ct]), towards = inBase([c * ct, s * ct, st]);
     const scale = 0.49 * Math.min(width, height) / (box.radius * (1 + THICK));
     const flat = (point) => {
       const from = add(point, box.middle, -1);
       return [width / 2 + scale * dot(from, right), height / 2 - scale * dot(from, up)];
     };
-    return { flat, towards };
+    return { flat, up, towards };
   }
 
   /* The faces of a prism from one point to another, each with its depth and how bright it is. */
@@ -96,9 +111,8 @@ vsacli.robot = (() => {
     const origins = pointsAt(chain, chain.origins, chain.points);
     const elbows = pointsAt(chain, chain.elbows, chain.count), axes = pointsAt(chain, chain.axes, chain.count);
     const link = { fill: color("soft") };
-    const base = origins[0];
-    prism([base[0], base[1], base[2] - 2.4 * THICK * radius], [base[0], base[1], base[2] - THICK * radius],
-          2 * THICK * radius, 4, link, faces, eye);
+    const [base, upright] = [origins[0], axes[0]];  // the plate stands across the first axis
+    prism(add(base, upright, -2.4 * THICK * radius), add(base, upright, -THICK * radius), 2 * THICK * radius, 4, link, faces, eye);
     axes.forEach((axis, joint) => {
       const bad = trouble(chain.file, joint)[0];
       const paint = { fill: bad ? color("bad") : curveColor(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
@@ -124,15 +138,31 @@ vsacli.robot = (() => {
   }
 
   function drawGround(context, flat) {
-    const { middle, radius } = box, level = chains[0].origins[2] - 2.4 * THICK * radius, step = radius / 3;
+    const { middle, radius, lowest } = box, step = radius / 3;
+    const center = add(middle, frame.up, lowest - 2.4 * THICK * radius - dot(middle, frame.up));
     context.strokeStyle = color("line");
     context.lineWidth = devicePixelRatio;
     for (let line = -3; line <= 3; line += 1) {
       for (const [a, b] of [[[line, -3], [line, 3]], [[-3, line], [3, line]]]) {
-        path(context, [a, b].map(([x, y]) => [middle[0] + x * step, middle[1] + y * step, level]), flat);
+        path(context, [a, b].map(([x, y]) => add(add(center, frame.first, x * step), frame.second, y * step)), flat);
         context.stroke();
       }
     }
+  }
+
+  /* The direction of gravity, unless it is seen from its end. */
+  function drawGravity(context, eye) {
+    const unit = 0.01 * Math.min(canvas.width, canvas.height), length = -12 * unit * dot(down, eye.up);
+    if (length < SHORTEST * 12 * unit) return;
+    const x = 7 * unit, start = 5 * unit, end = start + length;
+    context.strokeStyle = context.fillStyle = color("ink");
+    context.lineWidth = 1.5 * devicePixelRatio;
+    for (const [draw, corners] of [["stroke", [[x, start], [x, end]]], ["fill", [[x, end], [x - unit, end - 3 * unit], [x + unit, end - 3 * unit]]]]) {
+      path(context, corners, (corner) => corner);
+      context[draw]();
+    }
+    context.font = `${4 * unit}px system-ui, sans-serif`;
+    context.fillText("g", x + 2 * unit, end);
   }
 
   function drawTrace(context, chain, flat) {
@@ -171,6 +201,7 @@ vsacli.robot = (() => {
       }
     });
     context.globalAlpha = 1;
+    drawGravity(context, eye);
     tellTroubles();
   }
 
@@ -217,5 +248,5 @@ vsacli.robot = (() => {
     document.getElementById("columns").className = "beside";
     follow();
   }
-  return { draw, view };
+  return { draw, view, frame, down, eye: camera };
 })();

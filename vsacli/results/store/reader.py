@@ -272,6 +272,15 @@ class StoredResult(StoredFile):
             ]
             return StoredGeometry.of(self.joint_types, np.stack(rows, axis=-1), *poses)
 
+    def gravity(self) -> FloatArray:
+        """Return the gravity acceleration in the base frame, (3,), m/s^2.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            return np.asarray(self._dataset("inputs/robot/gravity")[...], dtype=np.float64).reshape(3)
+
     def has(self, variable: Variable) -> bool:
         """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
         if variable.requires in MOTOR_CONSTANTS:
