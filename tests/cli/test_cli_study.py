@@ -13,6 +13,7 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, edited
 from samples.marks import needs_compiler, slow_but
 from samples.studies import HEAD, column, content, study
+from scipy.stats import binomtest
 
 from vsacli import InputError, StorageError, StudySummary, run_study
 from vsacli.studies.sweeps.study import load_study
@@ -206,3 +207,62 @@ def test_implausible_values_are_reported_once(vsacli: Any, tmp_path: Path) -> No
     done = vsacli("study", str(path), "--processes", "1")
     assert done.err.count("warning: ") == 1
     assert "joints.base.link.com.2 (z) = 150 m is " in done.err
+
+
+LIMITED = (
+    "vary:\n  joints.*.actuator.motor.max_torque: [60, 200]\n  joints.shoulder.limits.position: [[-3, 0.1]]\n"
+)
+
+
+def test_the_first_limit_that_a_run_exceeds_is_named(vsacli: Any, own_folder: Path) -> None:
+    """The earliest of all joints and limits in the report of its run; the study's report counts it."""
+    done = vsacli("study", study(own_folder, LIMITED))
+    assert done.out.startswith("springs: 2 runs of vsa-3r: 2 over limit\n")
+    expected = []
+    for torque in (30, 200):
+        options = (
+            "--set",
+            f"joints.*.actuator.motor.max_torque={torque}",
+            "--set",
+            "joints.shoulder.limits.position=[-3, 0.1]",
+        )
+        report = json.loads(vsacli("check-feasibility", "arm.yaml", "move.yaml", *options, "--json").out)
+        times = {
+            f"{joint['name']} {kind}": time
+            for joint in report["joints"]
+            for kind, time in joint["first_time"].items()
+            if kind.endswith("_limit") and kind != "over_limit"
+        }
+        expected.append(min(times, key=lambda name: times[name]))
+    assert column("study.h5", "first_limit").tolist() == expected
+    assert expected[1] == "shoulder position_limit"
+    assert f"first limit exceeded: {expected[0]} (1 run), shoulder position_limit (1 run)" in done.out
+    assert json.loads(vsacli("info", "study.h5", "--json").out)["first_limits"] == dict.fromkeys(expected, 1)
+
+
+def test_runs_within_all_limits_name_none(vsacli: Any, grid_table: Path) -> None:
+    assert set(column(grid_table, "first_limit")) == {""}
+    shown = vsacli("info", grid_table, "--json").out
+    assert not {"first_limits", "ok_share"} & json.loads(shown).keys()  # its runs are no random draws
+
+
+def test_a_table_from_before_limits_were_named_is_read(vsacli: Any, grid_table: Path) -> None:
+    shutil.copy(grid_table, "old.h5")
+    with h5py.File("old.h5", "r+") as file:
+        del file["first_limit"]
+    assert vsacli("validate", "old.h5").code == 0
+    assert vsacli("info", "old.h5").out.startswith("springs: 6 runs of vsa-3r: 4 ok, 2 infeasible\n")
+    assert vsacli("plot", "old.h5").code == 0
+    assert vsacli("study", "--merge", "old.h5", "-o", "whole.h5").code == 0
+    assert set(column("whole.h5", "first_limit")) == {""}
+
+
+def test_the_share_of_ok_runs_has_its_interval_for_random_draws(vsacli: Any, own_folder: Path) -> None:
+    drawn = "method: random\nsamples: 8\nvary:\n  joints.*.actuator.spring.k: {normal: 8 %}\n"
+    found = json.loads(vsacli("study", study(own_folder, drawn), "--json").out)
+    interval = binomtest(found["verdicts"]["ok"], 8).proportion_ci(method="wilson")
+    assert found["ok_share"] == pytest.approx(
+        {"share": found["verdicts"]["ok"] / 8, "low": interval.low, "high": interval.high}, abs=1e-5
+    )  # 1.96 for the quantile
+    low, high = (f"{100 * end:.3g}" for end in interval)
+    assert f"95 % confidence interval {low} to {high} %" in vsacli("info", "study.h5").out
