@@ -72,6 +72,13 @@ class Pages:
         self._run("invdyn", *files, "-o", self.folder / "scara.h5")
         return [self.folder / "scara.h5"]
 
+    def planar(self, gravity: list[float]) -> Path:
+        """A planar arm under this gravity; its own is along -y, in the plane of the arm."""
+        files = [REPOSITORY / folder / "planar_2r.yaml" for folder in ("robots", "trajectories")]
+        target = self.folder / f"planar{'_'.join(map(str, gravity))}.h5"
+        self._run("invdyn", *files, "--set", f"gravity={gravity}", "--set", "rate=20", "-o", target)
+        return self._page(target)
+
     def _simulated(self) -> list[Path]:
         motion = edited(REST_TO_REST, self.folder / "short.yaml", ("rate: 1000 ", "rate: 50 "))
         self._run("simulate", ROBOT, motion, "-o", self.folder / "simulated.h5")
@@ -190,6 +197,47 @@ def test_time_runs_and_the_robot_moves(page: Browser) -> None:
     page.find("#play").click()
     assert moved > 0.1
     assert page.settled(picture) != still
+
+
+FALL = """const { flat } = vsacli.robot.eye(), [from, to] = [flat([0, 0, 0]), flat(arguments[0])];
+return [to[0] - from[0], to[1] - from[1]]"""
+"""The way of a point that moves along a vector, to the right and down in the picture, pixels."""
+
+DARKEST = """const chain = document.getElementById('chain'), [wide, high] = [0.12 * chain.width, 0.25 * chain.height];
+const { data } = chain.getContext('2d').getImageData(0, 0, wide, high);
+let darkest = 255;
+for (let at = 0; at < data.length; at += 4) if (data[at + 3] > 250) darkest = Math.min(darkest, data[at]);
+return darkest"""
+"""Smallest red component of an opaque pixel in the corner of the arrow; the ground's lines are light."""
+
+GRAVITIES = [[0, -9.81, 0], [9.81, 0, 0], [0, 0, 9.81], [3, -8, 2]]
+
+
+@pytest.mark.parametrize("gravity", GRAVITIES)
+def test_up_is_against_gravity_with_its_arrow(browser: Browser, pages: Pages, gravity: list[float]) -> None:
+    browser.media(prefers_color_scheme="light")
+    browser.open(pages.planar(gravity), whole=False)
+    for turned in ("", "vsacli.robot.view.turn += 1;", "vsacli.robot.view.tilt = -0.3;"):
+        aside, down = browser.run(turned + FALL, gravity)
+        assert down > 10 * abs(gravity[1])
+        assert abs(aside) < 1e-9 * down
+    heights = browser.run(
+        """const { chain } = vsacli.data.files[0], origins = vsacli.array(chain.origins), heights = [];
+        for (let at = 0; at < origins.length; at += 3) {
+          heights.push(-[0, 1, 2].reduce((sum, axis) => sum + vsacli.robot.down[axis] * origins[at + axis], 0));
+        }
+        return heights"""
+    )
+    assert min(heights) > browser.run("return vsacli.robot.ground()")  # nothing is below the ground
+    assert browser.settled(DARKEST) < 80
+
+
+def test_the_z_axis_is_up_without_gravity_and_there_is_no_arrow(browser: Browser, pages: Pages) -> None:
+    browser.media(prefers_color_scheme="light")
+    browser.open(pages.planar([0, 0, 0]), whole=False)
+    aside, down = browser.run(FALL, [0, 0, -1])
+    assert (aside, down > 10) == (pytest.approx(0, abs=1e-9), True)
+    assert browser.settled(DARKEST) > 200
 
 
 def test_a_filter_hides_a_joint_everywhere_and_axes_follow(page: Browser) -> None:

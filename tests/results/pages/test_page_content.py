@@ -160,6 +160,7 @@ def test_the_chain_moves_as_forward_kinematics_says(page: Page, feasible_result:
     axes = page.array(chain["axes"]).reshape(401, 3, 3)
     np.testing.assert_allclose(axes[:, 1:], poses[:, :2, :3, 2], atol=2 * SINGLE)
     elbows = page.array(chain["elbows"]).reshape(401, 3, 3)
+    assert chain["down"] == [0, 0, -1]
     lengths = np.linalg.norm(origins[:, 1:4] - elbows, axis=-1)
     np.testing.assert_allclose(
         lengths, np.tile([abs(joint.dh.a) for joint in robot.joints], (401, 1)), atol=4 * SINGLE

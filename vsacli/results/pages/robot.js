@@ -137,9 +137,12 @@ vsacli.robot = (() => {
     corners.map(flat).forEach(([x, y], index) => (index ? context.lineTo(x, y) : context.moveTo(x, y)));
   }
 
+  /* Height of the ground: all of the motion is above it, and the plate of a base that stands at the bottom is on it. */
+  const ground = () => box.lowest - 2.4 * THICK * box.radius;
+
   function drawGround(context, flat) {
-    const { middle, radius, lowest } = box, step = radius / 3;
-    const center = add(middle, frame.up, lowest - 2.4 * THICK * radius - dot(middle, frame.up));
+    const { middle, radius } = box, step = radius / 3;
+    const center = add(middle, frame.up, ground() - dot(middle, frame.up));
     context.strokeStyle = color("line");
     context.lineWidth = devicePixelRatio;
     for (let line = -3; line <= 3; line += 1) {
@@ -248,5 +251,5 @@ vsacli.robot = (() => {
     document.getElementById("columns").className = "beside";
     follow();
   }
-  return { draw, view, frame, down, eye: camera };
+  return { draw, view, down, eye: camera, ground };
 })();
