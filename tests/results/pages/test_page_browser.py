@@ -203,8 +203,8 @@ FALL = """const { flat } = vsacli.robot.eye(), [from, to] = [flat([0, 0, 0]), fl
 return [to[0] - from[0], to[1] - from[1]]"""
 """The way of a point that moves along a vector, to the right and down in the picture, pixels."""
 
-DARKEST = """const chain = document.getElementById('chain'), [wide, high] = [0.12 * chain.width, 0.25 * chain.height];
-const { data } = chain.getContext('2d').getImageData(0, 0, wide, high);
+DARKEST = """const chain = document.getElementById('chain');
+const { data } = chain.getContext('2d').getImageData(0, 0, 0.12 * chain.width, 0.25 * chain.height);
 let darkest = 255;
 for (let at = 0; at < data.length; at += 4) if (data[at + 3] > 250) darkest = Math.min(darkest, data[at]);
 return darkest"""
@@ -222,11 +222,9 @@ def test_up_is_against_gravity_with_its_arrow(browser: Browser, pages: Pages, gr
         assert down > 10 * abs(gravity[1])
         assert abs(aside) < 1e-9 * down
     heights = browser.run(
-        """const { chain } = vsacli.data.files[0], origins = vsacli.array(chain.origins), heights = [];
-        for (let at = 0; at < origins.length; at += 3) {
-          heights.push(-[0, 1, 2].reduce((sum, axis) => sum + vsacli.robot.down[axis] * origins[at + axis], 0));
-        }
-        return heights"""
+        """const { data, array, robot: { down } } = vsacli, points = array(data.files[0].chain.origins);
+        return Array.from({ length: points.length / 3 }, (_, at) =>
+          -down.reduce((sum, part, axis) => sum + part * points[3 * at + axis], 0));"""
     )
     assert min(heights) > browser.run("return vsacli.robot.ground()")  # nothing is below the ground
     assert browser.settled(DARKEST) < 80

@@ -10,8 +10,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, IndexArray, evenly
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
-from vsacli.results.charts.run_shares import verdict_counts_text, verdict_words
-from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.charts.study_points import StudyPoints, verdict_counts_text, verdict_words
 from vsacli.results.pages.document import PageTexts, input_text, plotting_library, rendered
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.study_table import StoredStudy

@@ -24,8 +24,7 @@ from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.ranking import Ranking
-from vsacli.results.charts.run_shares import OK, verdict_words
-from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.charts.study_points import OK, StudyPoints, verdict_words
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
@@ -273,7 +272,7 @@ def _over_map(points: StudyPoints) -> Figure:
             marks += _marks_on_map(axes, points, (x, y), values)
             axes.set_xlabel(_label(points, across, MOST_LETTERS), parse_math=False)
         handles: list[Artist] = [Line2D([], [], **_BOUNDARY, label="margin zero")] if bounded else []
-        empty = np.isnan([values for _, values in maps]).any(axis=0)
+        empty: BoolArray = np.any([np.isnan(values) for _, values in maps], axis=0)
         if empty.any():
             handles.append(Patch(**_NOTHING, label=_words_without_value(points, empty)))
         return complete(figure, points.title, [*handles, *marks])

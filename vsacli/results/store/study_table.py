@@ -45,7 +45,7 @@ TEXTS = {
 OF_RUN = tuple(name for name in TEXTS if name != "trajectory")
 """Texts that a run results in; the trajectory is one of its inputs."""
 
-ADDED = (FIRST_LIMIT,)
+LATER_TEXTS = (FIRST_LIMIT,)
 """Texts that tables of earlier versions lack; there they are empty."""
 
 
@@ -310,7 +310,7 @@ class StoredStudy(StoredFile):
                 raise DamageError(f"{name} has not {self.rows} rows")
 
     def _lacks(self, name: str) -> bool:
-        return name in ADDED and name not in self._file
+        return name in LATER_TEXTS and name not in self._file
 
     def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
         """Return the texts of rows, or the labels of a dimension.

@@ -165,7 +165,8 @@ class Journal:
         os.lseek(self._file, start, os.SEEK_SET)
         content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
         values, curves = (np.frombuffer(base64.b64decode(content[name])) for name in _ARRAYS)
-        return Row(run, key, *(content[name] for name in _TEXTS), values, curves)
+        verdict, first_limit, error = (content[name] for name in _TEXTS)
+        return Row(run, key, verdict, first_limit, error, values, curves)
 
     def remove(self) -> None:
         """Remove the file."""

@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.json_records import Stored, named
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted
-from vsacli.results.charts.run_shares import (
+from vsacli.results.charts.study_points import (
     count_verdicts,
     ok_share,
     runs_are_independent,
