@@ -193,13 +193,13 @@ class StudyPoints:
         return verdict_shares_lines(self.counts, random=self.random)
 
     def exceedance(self, counted_runs: BoolArray) -> tuple[FloatArray, Shares]:
-        """Return margins, ascending, and for each the share of runs that keep at least this margin.
+        """Return margins, ascending, and for each the share of counted runs with at least this margin.
 
-        The first and the last margin lie beyond those of all runs: there the share is that of all runs that
-        are counted, and zero. Both are empty if no run has a margin.
+        The first margin is below, and the last one above, those of all runs: the share begins with that of
+        all counted runs, and ends with zero. Both arrays are empty if no run has a margin.
 
         Args:
-            counted_runs: whether each run is counted, (rows,); the others are so in the number of runs alone.
+            counted_runs: whether each run is counted, (rows,); shares are relative to all runs.
         """
         finite = np.isfinite(self.margin)
         if not finite.any():

@@ -149,7 +149,6 @@ class StudySummary(Stored):
         if impossible := self.verdicts.get(IMPOSSIBLE, 0):
             runs = counted(impossible, "run")
             yield f"nothing feasible was found in {runs}; the column error of the table says why"
-
         if self.first_limits:
             listed = [f"{limit} ({counted(runs, 'run')})" for limit, runs in self.first_limits.items()]
             more = len(listed) - MOST_LIMITS
