@@ -52,6 +52,9 @@ MOST_LETTERS = 30
 MOST_PANELS = 6
 """Maximum number of parameters in one figure: those with the highest correlation to the margin."""
 
+LINE_HEIGHT = 0.2
+"""Height of a line of a legend, inches."""
+
 MAP_WIDTH = 1.5 * PANEL_WIDTH
 """Width of a map with its color bar, inches."""
 
@@ -347,7 +350,8 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: s
     draws estimate probabilities, and have a band of their 95 % intervals; shares of a grid have none, since
     its runs are chosen.
     """
-    with new_figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT)) as figure:
+    lines = sum(len(points.shares_lines) for points in studies)
+    with new_figure((2 * PANEL_WIDTH, 1.5 * PANEL_HEIGHT + LINE_HEIGHT * lines)) as figure:
         axes, handles = figure.add_subplot(), []
         for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
             style = replace(line_style(index), marker="")
