@@ -251,6 +251,7 @@ def test_a_page_counts_runs_over_a_limit_apart_and_names_the_limit(limited_path:
     assert '"base motor_torque_limit"' in page
 
 
+@pytest.mark.slow
 def test_runs_over_a_limit_are_marked_on_a_map(own_folder: Path) -> None:
     """Their margin, alone, would look as if they were ok."""
     grid = (
