@@ -45,10 +45,10 @@ NOT_FOR_THE_MAIN_JOB = (
 )
 """Modules, here and elsewhere, that take time to import and have no part in the paper's example."""
 
-MOST_FILES, MOST_LINES, MOST_SHARED_NAMES, MOST_HEADLESS = 462, 88_130, 19, 1
-"""How many files and lines of Python the package has at most, names of files that several folders have, and
-docstrings that begin without a verb or a noun. A change that needs more raises these, with its reason in its
-message; one that needs less lowers them."""
+MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 470, 51_567, 19, 1
+"""How many files and statements of Python the package has at most, names of files that several folders
+have, and docstrings that begin without a verb or a noun. A change that needs more raises these, with its
+reason in its message; one that needs less lowers them."""
 
 HEADLESS = re.compile(
     r"(and|as|at|but|by|each|for|from|has|how|if|in|is|its?|of|on|so|than|that|those|to|what|when|where|which|while"
@@ -133,7 +133,8 @@ def test_modules_form_no_circle() -> None:
 def test_the_package_grows_only_on_purpose() -> None:
     names = Counter(source.name for source in SOURCES if not is_folder(source))
     assert len(SOURCES) <= MOST_FILES
-    assert sum(len(source.read_text(encoding="utf-8").splitlines()) for source in SOURCES) <= MOST_LINES
+    trees = (ast.parse(source.read_text(encoding="utf-8")) for source in SOURCES)
+    assert sum(isinstance(node, ast.stmt) for tree in trees for node in ast.walk(tree)) <= MOST_STATEMENTS
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
 
 

@@ -75,14 +75,14 @@ def count_verdicts(verdicts: Sequence[str]) -> dict[str, int]:
     return dict(sorted(by_frequency, key=lambda entry: entry[0] != OK))
 
 
-def verdict_words(verdict: str) -> str:
+def verdict_label(verdict: str) -> str:
     """Return a verdict as people read it."""
     return verdict.replace("_", " ")
 
 
 def verdict_counts_text(counts: Mapping[str, int]) -> str:
     """Return how many runs have each verdict, such as `26 ok, 24 infeasible`."""
-    return ", ".join(f"{count} {verdict_words(verdict)}" for verdict, count in counts.items())
+    return ", ".join(f"{count} {verdict_label(verdict)}" for verdict, count in counts.items())
 
 
 def runs_are_independent(table: StoredStudy) -> bool:
@@ -103,7 +103,7 @@ def verdict_shares_lines(counts: Mapping[str, int], *, random: bool) -> list[str
     share, low, high = (100 * each for each in ok_share(counts))
     interval = f" ({low:.3g} to {high:.3g} %)" if random else ""
     percent = {verdict: 100 * count / sum(counts.values()) for verdict, count in counts.items()}
-    others = [f"{verdict_words(verdict)} {percent[verdict]:.3g} %" for verdict in counts if verdict != OK]
+    others = [f"{verdict_label(verdict)} {percent[verdict]:.3g} %" for verdict in counts if verdict != OK]
     return [f"{OK} {share:.3g} %{interval}", *([", ".join(others)] if others else [])]
 
 

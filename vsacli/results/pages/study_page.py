@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, IndexArray, evenly
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
-from vsacli.results.charts.study_points import StudyPoints, verdict_counts_text, verdict_words
+from vsacli.results.charts.study_points import StudyPoints, verdict_counts_text, verdict_label
 from vsacli.results.pages.document import PageTexts, input_text, plotting_library, rendered
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.study_table import StoredStudy
@@ -49,8 +49,8 @@ def _study(points: StudyPoints, packed: Packed) -> dict[str, Any]:
         "label": points.name,
         "of": len(points.runs),
         "runs": [int(run) for run in points.runs[drawn]],
-        "verdicts": [verdict_words(points.verdicts[row]) for row in drawn],
-        "verdicts_drawn": [verdict_words(verdict) for verdict in points.counts],
+        "verdicts": [verdict_label(points.verdicts[row]) for row in drawn],
+        "verdicts_drawn": [verdict_label(verdict) for verdict in points.counts],
         "first_limits": first_limits if any(first_limits) else None,
         "margin": packed.add(100 * points.margin[drawn]),
         "cost": None if points.cost is None else packed.add(points.cost[1][drawn]),

@@ -24,7 +24,7 @@ from vsacli.base.texts import counted
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.ranking import Ranking
-from vsacli.results.charts.study_points import OK, StudyPoints, verdict_words
+from vsacli.results.charts.study_points import OK, StudyPoints, verdict_label
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import broken
 from vsacli.results.plots.panels import ZERO
@@ -223,7 +223,7 @@ def _runs_by_verdict(
     """Draw runs with the marks of their verdicts, those that are not ok with further keywords."""
     for verdict in points.counts:
         look = {**_MARKS.get(verdict, _OTHER), **(of_others if verdict != OK else {})}
-        yield from _scatter(axes, x, y, points.having(verdict), verdict_words(verdict), look)
+        yield from _scatter(axes, x, y, points.having(verdict), verdict_label(verdict), look)
 
 
 def _known(label: str, costs: FloatArray) -> str:
@@ -284,7 +284,7 @@ def _over_map(points: StudyPoints) -> Figure:
 def _words_without_value(points: StudyPoints, empty: BoolArray) -> str:
     """Return the verdicts of runs without a value; the commanded motions of optima have none of their own."""
     verdicts = dict.fromkeys(points.verdicts[row] for row in np.flatnonzero(empty))
-    return " or ".join(verdict_words(verdict) for verdict in verdicts if verdict != OK) or "infeasible"
+    return " or ".join(verdict_label(verdict) for verdict in verdicts if verdict != OK) or "infeasible"
 
 
 def _marks_on_map(
@@ -294,7 +294,7 @@ def _marks_on_map(
     for verdict in points.counts.keys() - {OK, "infeasible"}:
         rows = points.having(verdict) & np.isfinite(values)
         look = {**_MARKS.get(verdict, _OTHER), "color": "black", "markerfacecolor": "white"}
-        yield from _scatter(axes, *place, rows, verdict_words(verdict), look)
+        yield from _scatter(axes, *place, rows, verdict_label(verdict), look)
 
 
 def _draw_map(axes: Axes, place: Sequence[FloatArray], margin: FloatArray | None, label: str) -> None:
