@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.drives import motion
+from samples.long_chains import random_chain
 from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
 
@@ -22,6 +23,7 @@ from vsacli.analysis.derivative_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.analysis.report import Report
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.compute.engine.engines import Kernel
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.robot.model import Robot
@@ -165,6 +167,28 @@ def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     whole = ladder(*load("7R"))
     monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
     assert ladder(*load("7R")) == whole
+
+
+class Counted:
+    """An engine that counts its calls; results of zero have no error, so that the first steps decide."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+        self.calls += 1
+        return np.zeros((kernel.outputs, len(rows[0])))
+
+
+@pytest.mark.parametrize("joints", [160, slow(1000)])
+def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
+    """A block is as much work as the chain is long, and the shorter; in blocks the check must not grow."""
+    robot = random_chain(joints)
+    still = [Constant(signal=each, span=(0.0, 1.0), value=(900.0,) * joints) for each in (POSITION, STIFFNESS)]
+    hold = Trajectory(UniformTimes(1.0, 20.0), still[0], {"stiffness": still[1]}, name="hold")
+    counted = Counted()
+    ladder(robot, hold, counted)
+    assert counted.calls == 2  # 4 and 20 if there were as many times as for short ones
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """The self-check of a run: residuals of its equations, and derivatives against finite differences.
 
 `ladder` compares each derivative of `RUNGS`, and the energy balances, with differences over several steps at
-about 200 times. `BalanceCheck` collects the residuals of (14) and of the shafts at all samples.
+about 200 times, or fewer for long chains. `BalanceCheck` collects the residuals of (14) and of the shafts at all samples.
 """
 
 from __future__ import annotations
@@ -78,6 +78,11 @@ stiffness where it is not commanded."""
 PROBES = 200
 """Approximate number of times of the derivative check, and of samples at which `BalanceCheck` recomputes."""
 
+JOINTS_AT_ALL_TIMES = 80
+"""Number of joints up to which derivatives are checked at `PROBES` times. Longer chains are checked at fewer, in
+inverse proportion: their blocks are shorter, so that the check would take a time in the square of the joints.
+A time compares all joints, whose equations are the same."""
+
 STEP_SCALES = np.array([8.0**-power for power in range(5)])
 """Difference steps tried at each time; the best decides, since a wrong derivative is wrong at every step.
 
@@ -123,12 +128,13 @@ def ladder(
 ) -> tuple[float, float]:
     """Return the largest error of a derivative of `RUNGS` or of a power, relative to its peak, and its bound.
 
-    Differences are taken at about 200 times with individual steps, over which the trajectory is analytic.
+    Differences are taken at about 200 times, for long chains at fewer, with individual steps, over which the
+    trajectory is analytic.
     Motor motion is compared where it is smooth over the difference. The error returned is the one nearest to,
     or farthest beyond, its bound. Engine and internal motions of damped transmissions are those of the run.
     """
     trajectory = trajectory.from_zero()
-    times, reach = trajectory.check_points(PROBES)
+    times, reach = trajectory.check_points(_number_of_times(len(robot.joints)))
     steps = np.minimum(reach / 3, trajectory.duration / 500)
 
     frame = None if trajectory.wrench is None else trajectory.wrench.frame
@@ -146,6 +152,11 @@ def ladder(
     bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
     worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
     return float(errors[worst]), float(bounds[worst])
+
+
+def _number_of_times(joints: int) -> int:
+    """Return the number of times to check, at least as many as estimate the noise."""
+    return max(2 * NEIGHBORS + 1, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES))
 
 
 def _ladder(

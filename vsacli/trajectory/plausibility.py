@@ -123,7 +123,7 @@ class CheckedTrajectory:
         for path, measured, value, _ in self.numbers:
             if measured == quantity and isinstance(path[-1], Entry):
                 joint = path[-1].number
-                unit = quantity.unit(self.robot.joint_types[joint])
+                unit = quantity.unit(self.robot.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
 
     def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
