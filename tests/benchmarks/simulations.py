@@ -67,7 +67,7 @@ def _cases() -> dict[str, Callable[..., Simulation]]:
 
 def _from_text(run: Callable[..., Simulation]) -> None:
     """Without anything recorded."""
-    with patch.object(RecordedEquations, "_improve", lambda _self: None):
+    with patch.object(RecordedEquations, "_improve", lambda *_: None):
         run(engine="numpy")
 
 

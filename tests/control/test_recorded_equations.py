@@ -48,7 +48,7 @@ def equations(case: Loop, engine: str) -> RecordedEquations:
     )
     while np.isfinite(made._due):
         made.budget.used = int(made._due) + 1
-        made._improve()
+        made._improve(*next(iter(case.states(1))))
     return made
 
 
@@ -152,7 +152,7 @@ def _run(engine, **conditions):
 
 def _run_text(**conditions):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RecordedEquations, "_improve", lambda _self: None)
+        patch.setattr(RecordedEquations, "_improve", lambda *_: None)
         return _run("numpy", **conditions)
 
 
@@ -249,7 +249,7 @@ def test_code_that_serves_many_runs_is_compiled_sooner(monkeypatch):
     """Compiling takes as long as 4000 evaluations of this robot's program, more than a run has."""
     asked = []
 
-    def load(_code, _opened, _compiler, _tell, worthwhile):
+    def load(_code, _opened, _compiler, _tell, _trying, worthwhile):
         asked.append(worthwhile(1))
 
     monkeypatch.setattr("vsacli.control.simulation.loop_equations.load", load)

@@ -1,7 +1,8 @@
 """The self-check of a run: residuals of its equations, and derivatives against finite differences.
 
 `ladder` compares each derivative of `RUNGS`, and the energy balances, with differences over several steps at
-about 200 times, or fewer for long chains. `BalanceCheck` collects the residuals of (14) and of the shafts at all samples.
+about 200 times, or fewer for long chains. `BalanceCheck` collects the residuals of (14) and of the shafts at
+all samples.
 """
 
 from __future__ import annotations
@@ -79,9 +80,9 @@ PROBES = 200
 """Approximate number of times of the derivative check, and of samples at which `BalanceCheck` recomputes."""
 
 JOINTS_AT_ALL_TIMES = 80
-"""Number of joints up to which derivatives are checked at `PROBES` times. Longer chains are checked at fewer, in
-inverse proportion: their blocks are shorter, so that the check would take a time in the square of the joints.
-A time compares all joints, whose equations are the same."""
+"""Number of joints up to which derivatives are checked at `PROBES` times, longer chains at fewer, in inverse
+proportion: their blocks are shorter, so that the check would take a time in the square of the joints. A time
+compares all joints, whose equations are the same."""
 
 STEP_SCALES = np.array([8.0**-power for power in range(5)])
 """Difference steps tried at each time; the best decides, since a wrong derivative is wrong at every step.

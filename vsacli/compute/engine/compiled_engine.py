@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
+import numpy as np
+
 from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Tell
 from vsacli.compute.engine.compiler import Compiler, Library
 from vsacli.compute.engine.costs import BRANCH_SHARE, CONDITIONAL_OPERATIONS, USUAL_ITERATIONS
-from vsacli.compute.engine.engines import Kernel, kernel_program
+from vsacli.compute.engine.engines import Kernel, NumPyEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.engine.libraries import Code, Loaded, Worthwhile, load
+from vsacli.compute.engine.trial import Trial
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.program import NESTED, conditional_count, operation_count
+
+TRIED_SAMPLES = 19
+"""Samples of a trial: whole vectors of any processor, and some left over."""
 
 
 class CompiledEngine:
@@ -39,7 +45,8 @@ class CompiledEngine:
         """
         if kernel not in self._loaded:
             opened = partial(Library, outputs=kernel.outputs)
-            loaded = load(kernel_code(kernel), opened, self._compiler, self._tell, worthwhile)
+            trying = partial(_trial, kernel)
+            loaded = load(kernel_code(kernel), opened, self._compiler, self._tell, trying, worthwhile)
             if loaded is None:
                 return None
             self._loaded[kernel] = loaded
@@ -49,6 +56,15 @@ class CompiledEngine:
         """See `Engine.run`."""
         self.prepare(kernel)
         return self._loaded[kernel].library(rows, self._threads)
+
+
+def _trial(kernel: Kernel) -> Trial:
+    """Return a call of a kernel's code on drawn samples, of sizes that positions and stiffnesses have."""
+    inputs = 10.0 ** np.random.default_rng(0).uniform(-1, 3.5, (kernel.inputs, TRIED_SAMPLES))
+    with np.errstate(all="ignore"):
+        expected = NumPyEngine().run(kernel, inputs)
+    results = [(row.nbytes,) for row in expected]
+    return Trial("run", [0, TRIED_SAMPLES, [row.tobytes() for row in inputs], results], expected)
 
 
 @lru_cache(maxsize=32)

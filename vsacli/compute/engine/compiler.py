@@ -7,9 +7,10 @@ import os
 import platform
 import re
 import shlex
+import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -55,7 +56,7 @@ class Compiler:
 
     Attributes:
         command: Command that calls it.
-        identity: Everything that its code depends on: version, processor, C library, flags.
+        identity: Everything that its code depends on: command, version, processor, C library, flags.
     """
 
     command: tuple[str, ...]
@@ -109,7 +110,14 @@ def _examined(command: tuple[str, ...], _path: str) -> Compiler:
         raise CompilerError(
             f"{_spoken(command)!r} enables -ffast-math or a similar option, under which NaN goes unnoticed"
         )
-    return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS)))
+    return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS, *command, *_files(command))))
+
+
+def _files(command: tuple[str, ...]) -> Iterator[str]:
+    """Yield place, size and time of the programs in a command: a script has the version of what it calls."""
+    for program in filter(None, map(shutil.which, command)):
+        status = os.stat(program)
+        yield f"{os.path.realpath(program)} {status.st_size} {status.st_mtime_ns}"
 
 
 def _spoken(command: tuple[str, ...]) -> str:

@@ -1,4 +1,4 @@
-"""Shared libraries of C code: loaded from the cache, or compiled."""
+"""Shared libraries of C code: loaded from the cache, or compiled and tried."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from vsacli.compute.engine.costs import (
     TRACED_SECONDS,
     UNTRACED_SECONDS,
 )
+from vsacli.compute.engine.trial import Trying, check_library
 
 LONG_SECONDS = 5.0
 """Estimated time of the compiler, s, from which on it is announced to the user."""
@@ -76,6 +77,7 @@ def load(
     opened: Callable[[Path], _Opened],
     compiler: Compiler,
     tell: Tell,
+    trying: Trying,
     worthwhile: Worthwhile = lambda _code: True,
 ) -> Loaded[_Opened] | None:
     """Return the library of some code; None if it is not cached and not worth compiling.
@@ -85,10 +87,11 @@ def load(
         opened: Function that loads a library, equal for equal code; the file may be removed once loaded.
         compiler: Compiler to use.
         tell: Callback for problems with the cache, which are no errors, and announcements of long work.
+        trying: Trial of new code; only code that passes is loaded and kept.
         worthwhile: Whether to compile code that is not in the cache.
 
     Raises:
-        CompilerError: The code cannot be compiled or loaded.
+        CompilerError: The code cannot be compiled or loaded, or fails its trial.
     """
     key = key_of(code.text, compiler.identity)
     if key not in _loaded:
@@ -98,7 +101,9 @@ def load(
             _loaded[key] = Loaded(kept, compiled=False)
         elif worthwhile(code):
             _announce(code, tell)
-            _loaded[key] = Loaded(_built(code.text, key, opened, compiler, cache, tell), compiled=True)
+            _loaded[key] = Loaded(
+                _built(code.text, key, opened, compiler, trying, cache, tell), compiled=True
+            )
     return _loaded.get(key)
 
 
@@ -146,6 +151,7 @@ def _built(
     key: str,
     opened: Callable[[Path], _Opened],
     compiler: Compiler,
+    trying: Trying,
     cache: Cache | None,
     tell: Tell,
 ) -> _Opened:
@@ -155,6 +161,7 @@ def _built(
             with reporting_temporary_errors():
                 text.write_text(source, encoding="utf-8")
             compiler.build(text, library)
+            check_library(library, trying())
             loaded = opened(library)
             if cache is not None:
                 _keep(cache, key, library, tell)

@@ -15,6 +15,8 @@ import numpy as np
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.compute.aligned_rows import address
 from vsacli.compute.engine.compiler import CompilerError
+from vsacli.compute.engine.trial import Trial
+from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.loop_code import Recording
 from vsacli.control.simulation.tabulated import Table
 
@@ -152,6 +154,27 @@ def open_loop(path: Path) -> dict[str, Any]:
         function.argtypes = [c_void_p, *_ARGUMENTS[name]]
         function.restype = c_int64 if name == "stages" else None
     return functions
+
+
+def loop_trial(
+    loop: ClosedLoop, time: float, vectors: FloatArray, numbers: FloatArray, recording: Recording
+) -> Trial:
+    """Return a call of the compiled equations of motion at state vectors, (..., entries)."""
+    tables = [
+        word
+        for table in recording.rates.tables
+        for word in (*table.coefficients.shape, table.ends.tobytes(), table.coefficients.tobytes())
+    ]
+    states = vectors.reshape(-1, recording.entries)
+    expected = loop.derivative(time, states)
+    arguments = [
+        [numbers.tobytes(), len(recording.rates.tables), tables],
+        float(time),
+        len(states),
+        states.tobytes(),
+        (expected.nbytes,),
+    ]
+    return Trial("derivatives", arguments, expected.reshape(-1, 1))
 
 
 class CompiledLoop:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from vsacli.compute.engine.libraries import Code, Worthwhile, load
 from vsacli.compute.tracing.python_functions import number_function
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.compiled_loop import CompiledLoop, Stages, open_loop
+from vsacli.control.simulation.compiled_loop import CompiledLoop, Stages, loop_trial, open_loop
 from vsacli.control.simulation.ending import Budget, Ending
 from vsacli.control.simulation.loop_code import Recorded, Recording, loop_code, record
 
@@ -171,6 +172,7 @@ class RecordedEquations(Equations):
         self._law: NumberProgram | None = None
         self._compiled: CompiledLoop | None = None
         self._compiler = ""
+        self._last = 0.0, np.zeros(0)
         self._later = self._compiling() if computing.engine == "c" else self._improving()
         self._due = next(self._later)
 
@@ -183,7 +185,7 @@ class RecordedEquations(Equations):
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
         """See `Equations.__call__`; NumPy evaluates again where a result is not finite."""
-        self._improve()
+        self._improve(time, vectors)
         self.budget.check(evaluations := vectors.size // vectors.shape[-1])
         rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
         if rates is None:
@@ -200,7 +202,7 @@ class RecordedEquations(Equations):
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
     ) -> FloatArray | None:
         """See `Equations.stages`."""
-        self._improve()
+        self._improve(time, vector)
         if self._compiled is None:
             return None
         self.budget.check(evaluations := which.last - which.first + 1)
@@ -213,9 +215,10 @@ class RecordedEquations(Equations):
         """See `Equations.distance`."""
         return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
 
-    def _improve(self) -> None:
-        """Change to the next backend if it is due."""
+    def _improve(self, time: float, vectors: FloatArray) -> None:
+        """Change to the next backend if it is due; compiled code is tried at this time and these states."""
         if self.budget.used >= self._due:
+            self._last = time, vectors
             self._due = next(self._later, math.inf)
 
     def _improving(self) -> Iterator[float]:
@@ -254,7 +257,8 @@ class RecordedEquations(Equations):
             CompilerError: the code cannot be compiled or loaded.
         """
         compiler = system_compiler()
-        loaded = load(code, open_loop, compiler, self._computing.tell, worthwhile)
+        trying = partial(loop_trial, self.loop, *self._last, numbers, recording)
+        loaded = load(code, open_loop, compiler, self._computing.tell, trying, worthwhile)
         if loaded is not None:
             self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
 
