@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -9,7 +10,15 @@ import time
 
 import h5py
 import pytest
-from samples.command_line import COMMAND, ROBOT, SEVEN_JOINTS, contents, installed, seven_joint_motion
+from samples.command_line import (
+    COMMAND,
+    REST_TO_REST,
+    ROBOT,
+    SEVEN_JOINTS,
+    contents,
+    installed,
+    seven_joint_motion,
+)
 from samples.disturbed import allow_interrupts
 from samples.marks import slow
 
@@ -194,3 +203,20 @@ def test_a_signal_in_the_making_of_a_class_is_no_bug(vsacli, monkeypatch) -> Non
     monkeypatch.setattr(group, "main", command)
     outcome = vsacli("schema")
     assert (outcome.code, outcome.err) == (143, "ended from outside by SIGTERM\n")
+
+
+@pytest.mark.slow
+def test_interrupt_while_workers_start_is_quiet(tmp_path):
+    """It reaches all processes of the terminal, here when a worker has begun to import."""
+    head = f"format: vsacli-study/1\nname: many\nrobot: {ROBOT}\ntrajectory: {REST_TO_REST}\n"
+    (tmp_path / "study.yaml").write_text(f"{head}vary: {{rate: {[*range(10, 90)]}}}\n")
+    command = [sys.executable, "-X", "importtime", "-m", "vsacli", "study", "study.yaml", "--processes", "2"]
+    with started(*command, folder=tmp_path, start_new_session=True) as process:
+        begun = 0
+        while begun < 2:  # the module that starts workers, here and then in the first of them
+            line = process.stderr.readline()
+            assert line, "no worker has started"
+            begun += line.rstrip().endswith(" multiprocessing.spawn")
+        os.killpg(process.pid, signal.SIGINT)
+        said = [line for line in process.stderr if not line.startswith("import time:")]
+    assert (process.returncode, said) == (130, ["interrupted\n"])

@@ -64,6 +64,26 @@ def leave_interrupts_to_others() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+@contextlib.contextmanager
+def starting_worker() -> Iterator[None]:
+    """Start a worker process within this context: Ctrl-C neither reaches it nor cuts off what it is sent.
+
+    A process inherits blocked signals, and else would print a traceback before it can ignore them.
+    """
+    with interrupts_deferred():
+        if not hasattr(signal, "pthread_sigmask"):
+            yield
+            return
+        from multiprocessing import resource_tracker
+
+        resource_tracker.ensure_running()  # it ends with unblocking Ctrl-C
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _unwind(number: int, _frame: object) -> None:
     raise Interrupted(number)
 

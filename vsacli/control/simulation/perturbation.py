@@ -15,7 +15,7 @@ import numpy as np
 from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.base.interrupts import leave_interrupts_to_others
+from vsacli.base.interrupts import leave_interrupts_to_others, starting_worker
 from vsacli.control.simulation.simulate import SimulationRun
 from vsacli.control.simulation.simulation_report import SimulationReport
 from vsacli.documents.fields import Kind, NamedNumbers, Number, OneOf, Pair, Record, declared
@@ -163,7 +163,9 @@ def simulate_perturbed(
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, context, leave_interrupts_to_others)
     try:
-        yield from pool.map(report, seeds[1:])
+        with starting_worker():
+            reports = pool.map(report, seeds[1:])
+        yield from reports
     finally:
         pool.shutdown(cancel_futures=True)
 

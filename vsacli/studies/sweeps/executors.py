@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from vsacli.base.errors import InputError
-from vsacli.base.interrupts import leave_interrupts_to_others
+from vsacli.base.interrupts import leave_interrupts_to_others, starting_worker
 from vsacli.base.version import __version__
 from vsacli.compute.engine import processors
 from vsacli.studies.sweeps.rows import Answer, Computer, Job, Row, answer, lost
@@ -153,7 +153,8 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs, job), daemon=True)
-        self.process.start()
+        with starting_worker():
+            self.process.start()
         theirs.close()
         self._thread = ThreadPoolExecutor(1)
         self.begun = False
