@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import subprocess
@@ -305,3 +306,20 @@ def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
         in done.err
     )
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(errno.EMFILE, os.strerror(errno.EMFILE)),
+        ImportError(f"fast.so: cannot open shared object file: {os.strerror(errno.EMFILE)}"),
+    ],
+)
+def test_too_many_open_files_are_no_bug(vsacli, monkeypatch, error):
+    def command(**_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(group, "main", command)
+    outcome = vsacli("schema")
+    advice = "too many files are open; `ulimit -n 256` allows more"
+    assert (outcome.code, outcome.err) == (4, f"the command cannot go on: {advice}\n")

@@ -5,6 +5,10 @@ from __future__ import annotations
 import errno
 import json
 import os
+import resource
+import subprocess
+import sys
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +96,7 @@ def test_whichever_bit_of_a_journal_is_wrong(tmp_path: Path, grid_study: str) ->
 
 
 @pytest.mark.parametrize(
-    "content_then", [b"notes\n1 2 3\n", b"\x89HDF\r\n\x1a\n", b"vsacli-study-journal/9\n"]
+    "content_then", [b"", b"notes\n1 2 3\n", b"\x89HDF\r\n\x1a\n", b"vsacli-study-journal/9\n"]
 )
 def test_a_file_of_somebody_else_is_no_journal(vsacli: Any, grid_study: str, content_then: bytes) -> None:
     journal = Path("study.h5.journal")
@@ -106,13 +110,61 @@ def test_a_file_of_somebody_else_is_no_journal(vsacli: Any, grid_study: str, con
     assert journal.read_bytes() == content_then
 
 
+@pytest.mark.parametrize("kind", ["link", "link to nothing", "pipe"])
+def test_a_journal_is_a_file_of_its_own(vsacli: Any, grid_study: str, kind: str) -> None:
+    """A link is not followed, and what it leads to stays as it is."""
+    journal, elsewhere = Path("study.h5.journal"), Path("elsewhere")
+    if kind == "pipe":
+        os.mkfifo(journal)
+    else:
+        journal.symlink_to(elsewhere)
+    if kind == "link":
+        elsewhere.write_bytes(journal_module.FIRST_LINE)
+    refused = vsacli("study", grid_study)
+    assert (refused.code, Path("study.h5").exists()) == (4, False)
+    assert refused.err.startswith(f"{journal}: is not the journal of a study, but has the name of the file")
+    assert elsewhere.exists() == (kind == "link")
+    assert os.path.lexists(journal)
+
+
+VALUES = '"values": "", "curves": ""'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("[]", "{}", "no JSON", "7", '"key"', "[" * 100_000, '{"key": "k"}', f'{{"key": ["k"], {VALUES}}}'),
+        f'{{"key": {{}}, "verdict": "ok", "error": "", {VALUES}}}',
+        f'{{"key": "k", "verdict": null, "error": "", {VALUES}}}',
+        '{"key": "k", "verdict": "ok", "error": "", "values": "QQ==", "curves": ""}',
+        '{"key": "k", "verdict": "ok", "error": "", "values": "%", "curves": 1}',
+    ],
+    ids=range(12),
+)
+def test_a_line_with_a_valid_checksum_and_other_content_is_damaged(own_folder: Path, text: str) -> None:
+    path, line = own_folder / "study.h5.journal", text.encode()
+    path.write_bytes(journal_module.FIRST_LINE + b"%08x %s\n" % (zlib.crc32(line), line))
+    with Journal(path) as journal:
+        assert (journal.damaged, len(journal)) == ([2], 0)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("length", [0, 7])
+def test_a_damaged_line_is_said(vsacli: Any, grid_study: str) -> None:
+    journal = Path("study.h5.journal")
+    journal.write_bytes(journal_module.FIRST_LINE + b"%08x []\n" % zlib.crc32(b"[]"))
+    done = vsacli("study", grid_study)
+    assert done.err.splitlines() == [
+        f"{journal}: line 2 is damaged; its run is computed again",
+        "wrote study.h5",
+    ]
+
+
+@pytest.mark.slow
 def test_a_journal_that_was_cut_off_in_its_first_line_is_begun_anew(
-    vsacli: Any, grid_study: str, grid_table: Path, length: int
+    vsacli: Any, grid_study: str, grid_table: Path
 ) -> None:
     journal = Path("study.h5.journal")
-    journal.write_bytes(journal_module.FIRST_LINE[:length])
+    journal.write_bytes(journal_module.FIRST_LINE[:7])
     assert vsacli("study", grid_study).err == "wrote study.h5\n"
     assert content("study.h5") == content(grid_table)
     assert not journal.exists()
@@ -281,3 +333,16 @@ def test_a_study_in_which_nothing_varies_is_questioned(vsacli: Any, own_folder: 
     done = vsacli("study", "study.yaml", "--processes", "1")
     assert (done.code, done.out.splitlines()[1]) == (0, "warning: nothing varies; add vary:")
     assert json.loads(vsacli("info", "study.h5", "--json").out)["warnings"] == ["nothing varies; add vary:"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("files", [10, 12])
+def test_few_open_files_are_allowed(grid_study: str, files: int) -> None:
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
+
+    command = [sys.executable, "-m", "vsacli", "study", grid_study, "--processes", "2"]
+    done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (4, "")
+    assert done.stderr.endswith("too many files are open; `ulimit -n 256` allows more\n")
+    assert len(done.stderr.splitlines()) == 1

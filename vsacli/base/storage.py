@@ -36,6 +36,7 @@ _REASON = {
     errno.EACCES: "no permission to write into this folder",
     errno.EROFS: "the file system is read-only",
     errno.ENAMETOOLONG: "the file name is too long",
+    errno.EMFILE: "too many files are open; `ulimit -n 256` allows more",
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import io
 import os
@@ -15,6 +16,7 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
+from vsacli.base.storage import reason
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, flush_notes, reporting_stdout_errors, tell
@@ -163,6 +165,8 @@ def run(arguments: Sequence[str]) -> int:
         import traceback
 
         lines = traceback.format_exc()
+        if os.strerror(errno.EMFILE) in lines:  # in any error of the chain, such as one of an import
+            return _fail(f"the command cannot go on: {reason(OSError(errno.EMFILE, ''))}", Exit.STORAGE)
         return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
     return int(code or Exit.OK)
 

@@ -2,7 +2,7 @@
 
 The first line identifies the file as a journal. Each further line has a checksum of the rest, the key of the
 row, and the row. An incomplete last line, after a kill or a full disk, is cut off when the journal is opened
-again; damaged lines before it are skipped.
+again; damaged lines before it are skipped. A journal appears with its first line, so an empty file is none.
 """
 
 from __future__ import annotations
@@ -12,20 +12,28 @@ import contextlib
 import json
 import os
 import re
+import stat
 import time
 import zlib
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import StorageError
-from vsacli.base.storage import reason, reporting_storage_errors
+from vsacli.base.storage import reason, remove, reporting_storage_errors, staging_name
 from vsacli.studies.sweeps.rows import Row
 
 FIRST_LINE = b"vsacli-study-journal/1\n"
 """First line of a journal; a file without it is not overwritten."""
+
+NO_JOURNAL = (
+    "is not the journal of a study, but has the name of the file in which this one keeps its finished runs; "
+    "move it, or name another table with -o"
+)
 
 SYNC_SECONDS = 1.0
 """Interval at which rows are forced to the disk, s: a power failure loses no more, a kill loses nothing."""
@@ -52,7 +60,8 @@ class Journal:
 
     def __enter__(self) -> Self:
         with reporting_storage_errors(self.path):
-            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            self._create()
+            self._file = self._open()
         try:
             self._lock()
             with reporting_storage_errors(self.path):
@@ -77,6 +86,37 @@ class Journal:
 
     def __len__(self) -> int:
         return len(self._places)
+
+    def _create(self) -> None:
+        """Create the journal with its first line, unless there is something of this name."""
+        if os.path.lexists(self.path):
+            return
+        staged = self.path.with_name(staging_name())
+        file = os.open(staged, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            os.write(file, FIRST_LINE)
+            try:
+                os.link(staged, self.path)
+            except FileExistsError:
+                pass  # another process was first
+            except OSError:
+                staged.rename(self.path)  # a file system without links
+        finally:
+            os.close(file)
+            remove(staged)
+
+    def _open(self) -> int:
+        """Open the journal.
+
+        Raises:
+            StorageError: a link or a device has this name.
+        """
+        try:
+            if not stat.S_ISREG(self.path.lstat().st_mode):
+                raise StorageError(self.path, NO_JOURNAL)
+            return os.open(self.path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+        except FileNotFoundError as error:
+            raise StorageError(self.path, "was removed by another process; run the study again") from error
 
     def _lock(self) -> None:
         """Lock the journal, if the system has locks.
@@ -116,15 +156,11 @@ class Journal:
         os.ftruncate(self._file, self._end)
 
     def _check_first_line(self, line: bytes) -> None:
-        """Check the first line; write it to a file that is empty, or has only a part of it after a kill."""
+        """Check the first line; write it to a file that has only a part of it after a power failure."""
         if line == FIRST_LINE:
             return
-        if not FIRST_LINE.startswith(line):
-            raise StorageError(
-                self.path,
-                "is not the journal of a study, but has the name of the file in which this one keeps its "
-                "finished runs; move it, or name another table with -o",
-            )
+        if not line or not FIRST_LINE.startswith(line):
+            raise StorageError(self.path, NO_JOURNAL)
         try:
             os.lseek(self._file, 0, os.SEEK_SET)
             os.write(self._file, FIRST_LINE)
@@ -164,9 +200,8 @@ class Journal:
         start, size = self._places[key]
         os.lseek(self._file, start, os.SEEK_SET)
         content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
-        values, curves = (np.frombuffer(base64.b64decode(content[name])) for name in _ARRAYS)
-        verdict, first_limit, error = (content[name] for name in _TEXTS)
-        return Row(run, key, verdict, first_limit, error, values, curves)
+        texts, arrays = itemgetter(*_TEXTS)(content), itemgetter(*_ARRAYS)(content)
+        return Row(run, key, *texts, *map(_array, arrays))
 
     def remove(self) -> None:
         """Remove the file."""
@@ -197,6 +232,22 @@ def _row_in(line: bytes) -> tuple[int, str]:
     # if the line break before a row is damaged, the row is intact but does not start its line
     for start in (0, *(found.start() for found in _BEGINNING.finditer(line, 1))):
         text = line[start + _CHECK + 1 : -1]
-        if line[start : start + _CHECK] == b"%08x" % zlib.crc32(text):
-            return start, str(json.loads(text)["key"])
+        if line[start : start + _CHECK] == b"%08x" % zlib.crc32(text) and (key := _key_of_row(text)):
+            return start, key
     return 0, ""
+
+
+def _key_of_row(text: bytes) -> str:
+    """Return the key of a row; "" for text that is none although its checksum is right."""
+    try:
+        content = json.loads(text)
+        key, *words = itemgetter("key", *_TEXTS)(content)
+        for name in _ARRAYS:
+            _array(content[name])
+    except (ValueError, LookupError, TypeError, RecursionError):
+        return ""
+    return key if all(isinstance(each, str) for each in (key, *words)) else ""
+
+
+def _array(text: str) -> FloatArray:
+    return np.frombuffer(base64.b64decode(text, validate=True))
