@@ -88,3 +88,16 @@ def test_older_results_with_such_names_are_shown_encoded(vsacli: Any, tmp_path: 
         assert clean(done.out + done.err)
     told = vsacli("info", "r.h5").out
     assert UNPRINTABLE[name].encode("unicode_escape").decode() in told
+
+
+def test_extracted_files_have_names_in_one_line(vsacli: Any, own_folder: Path) -> None:
+    """Their stored paths may have characters that move a cursor or turn the direction of writing."""
+    robot, trajectory = own_folder / "two\nlines.yaml", own_folder / "esc\x1b[2Jand\u202e.yaml"
+    robot.write_bytes(ROBOT.read_bytes())
+    trajectory.write_bytes(TRAJECTORY.read_bytes())
+    assert vsacli("invdyn", robot.name, trajectory.name, "--set", "rate=10", "-o", "r.h5").code == 0
+    done = vsacli("info", "r.h5", "--extract", "inputs")
+    assert done.code == 0
+    names = [r"two\nlines.yaml", r"esc\x1b[2Jand\u202e.yaml"]
+    assert sorted(path.name for path in Path("inputs").iterdir()) == sorted(names)
+    assert done.err.splitlines()[:2] == [f"wrote inputs/{name}" for name in names]

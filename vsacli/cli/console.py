@@ -19,7 +19,7 @@ import click
 
 from vsacli.base.errors import InputError, StorageError, VsacliError
 from vsacli.base.progress import NoBar, unseen
-from vsacli.base.texts import for_terminal, verdict_words
+from vsacli.base.texts import for_terminal, one_line, verdict_words
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -207,7 +207,7 @@ class Talk:
     def wrote(self, outputs: Outputs) -> None:
         """Print the names of the files that were written."""
         for path in outputs.paths:
-            self.note(f"wrote {path}")
+            self.note(f"wrote {one_line(str(path))}")
 
     def detail(self, message: str) -> None:
         """Print a message only with `--verbose`."""

@@ -16,6 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.storage import reading_copies, reporting_temporary_errors, temporary_folder
+from vsacli.base.texts import one_line
 from vsacli.base.variables import Block
 from vsacli.results.exports.selection import check_rate, stride_of
 from vsacli.results.store.inputs import StoredInput
@@ -176,8 +177,11 @@ def extract(path: str | Path) -> Extracted:
 
 
 def _places(paths: Sequence[str]) -> list[Path]:
-    """Return paths that preserve the relative locations of the files, none above their common folder."""
-    named = ["stdin" if path == "-" else path for path in paths]
+    """Return paths that preserve the relative locations of the files, none above their common folder.
+
+    Control characters in names are escaped.
+    """
+    named = ["stdin" if path == "-" else one_line(path) for path in paths]
     deep = "/" + "d/" * sum(path.count("..") for path in named)
     whole = [os.path.normpath(os.path.join(deep, path)) for path in named]
     common = os.path.commonpath([os.path.dirname(path) for path in whole])
