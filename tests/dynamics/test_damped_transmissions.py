@@ -297,6 +297,22 @@ def test_loads_that_begin_and_pass_zero_do_not_make_cells_small(end: float) -> N
     assert len(inside.breakpoints) < 200
 
 
+@pytest.mark.parametrize("turns", [0, slow(20)])
+def test_positions_of_many_turns_do_not_make_cells_small(turns: int) -> None:
+    """Deflections are differences of positions: nothing below their rounding is resolved by shorter cells."""
+    robot, span = pendulum("awas"), (0.0, 1.5)
+    begin = 800.0
+    position = RestToRest(
+        signal=POSITION, span=span, degree=9, start=(begin,), end=(begin + 0.5 + 6 * turns,)
+    )
+    stiffness = RestToRest(signal=STIFFNESS, span=span, degree=5, start=(600.0,), end=(800.0,))
+    damping = RestToRest(signal=DAMPING, span=span, degree=5, start=(2.0,), end=(10.0,))
+    profiles = {STIFFNESS.key: stiffness, DAMPING.key: damping}
+    inside = internal_motions(robot, Trajectory(UniformTimes(1.5, 200), position, profiles, name="turned"))
+    assert not inside.stops
+    assert len(inside.breakpoints) < 50 + 10 * turns
+
+
 def test_feedback_linearization_says_why_not() -> None:
     message = r"motors act on the third where a damper lies parallel to the springs \(joint_1\)"
     with pytest.raises(InputError, match=message):
@@ -337,6 +353,8 @@ class _Springs:
 def test_last_coefficients_count_relative_to_the_largest_deflection():
     demand = Command(*np.ones((6, 1)), commanded={})
     peaks = _Peaks(_Springs(), demand, np.ones((2, 1)))
-    found = _Solution(np.ones((2, 1)), np.zeros((2, 1)), torque=1.0, damping=0.0, constants=1.0)
+    found = _Solution(
+        np.ones((2, 1)), np.zeros((2, 1)), torque=1.0, damping=0.0, constants=1.0, rounding=0.0, slope=1.0
+    )
     phi = np.array([[1e-3, 1e-4, 1e-7, 1e-8], [1e-3, 0, 0, 0]])
     assert peaks.share(phi, np.zeros((2, 2)), found) == pytest.approx(1e-4, rel=1e-15)

@@ -61,7 +61,8 @@ class _Springs(NamedTuple):
         state: Arrays (samples, 1 joint[, motors]).
         torque: Derivatives of T over each theta, (motors, samples).
         stiffness: Derivatives of sigma over each theta, (motors, samples).
-        pivot: Determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
+        pivot: Determinant of the matrix that gives the motors' velocities, zero where these do not follow
+            from the rate of the stiffness; 1 if no stiffness is commanded.
     """
 
     state: ElasticState
@@ -102,18 +103,10 @@ class DampedSprings:
         parts = [factor * row for factor, row in zip(self._behind, phi, strict=False)]
         return reduce(operator.add, parts)
 
-    def torque(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Return T."""
-        return self._state(phi, q).tau_e[..., 0]
-
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
-        slope: FloatArray = self._springs(phi, q).slope
+        slope: FloatArray = self.springs_at(phi, q).slope
         return slope
-
-    def pivot(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the pivot; zero where the motor velocities do not follow from the rate of the stiffness."""
-        return self._springs(phi, q).pivot
 
     def within(self, phi: FloatArray) -> BoolArray:
         """Return where the springs' laws hold."""
@@ -131,7 +124,7 @@ class DampedSprings:
         stiffness = command.commanded[STIFFNESS.key]
         along = self._along(spread)
         for _ in range(NEWTON_STEPS):
-            springs = self._springs(phi, command.q)
+            springs = self.springs_at(phi, command.q)
             phi = phi + along * ((stiffness - springs.state.stiffness[..., 0]) / springs.divisor)
         left = stiffness - self._state(phi, command.q).stiffness[..., 0]
         return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
@@ -152,7 +145,7 @@ class DampedSprings:
     def driven(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
         """Return w = (tau_l - T)/d and w' = (tau_l' - d' w - T')/d at deflections."""
         damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
-        springs = self._springs(phi, command.q)
+        springs = self.springs_at(phi, command.q)
         velocity = (command.tau_e - springs.state.tau_e[..., 0]) / damping
         dtheta = self._velocities(springs, velocity, command)
         rate = springs.state.torque_rate(self._coordinates(command.dq, dtheta))[..., 0]
@@ -168,7 +161,7 @@ class DampedSprings:
         _, rate, acceleration = motion
         if rate is None or acceleration is None:
             rate, acceleration = self.driven(phi, command)
-        springs = self._springs(phi, command.q)
+        springs = self.springs_at(phi, command.q)
         lower, upper, reached = self._reach(springs, phi, command, min_margin)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
         dtheta = self._velocities(springs, velocity, command)
@@ -266,7 +259,8 @@ class DampedSprings:
         bent = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
         return state.stiffness[..., 0], state.stiffness_rate(rates)[..., 0], bent[..., 0]
 
-    def _springs(self, phi: FloatArray, q: FloatArray) -> _Springs:
+    def springs_at(self, phi: FloatArray, q: FloatArray) -> _Springs:
+        """Return the state of the springs at deflections and joint positions."""
         state = self._state(phi, q)
         units = np.eye(self._motors)[:, :, None] + 0 * q
         turned = [self._coordinates(0 * q, unit) for unit in units]

@@ -108,6 +108,9 @@ FIRST_CELLS = 8
 RESOLVED = 1e-14
 """Size of the last coefficients of a polynomial, relative to the largest deflection, that is rounding."""
 
+POSITION_ROUNDING = 2 * np.finfo(float).eps
+"""Rounding of a deflection theta - q, relative to q: that of q and that of theta, which is about as large."""
+
 LEAST_SHARE, LEAST_SPREAD = 1e-6, 1e-9
 """Smallest scale of a spread: as a share of the largest deflection, and in rad (m)."""
 
@@ -171,6 +174,8 @@ class _Solution(NamedTuple):
         torque: Largest |tau_e| in the cell.
         damping: Largest damping in the cell.
         constants: Duration of the cell in its smallest time constant.
+        rounding: Rounding of the deflections.
+        slope: Largest slope of the torque of the springs in the cell.
     """
 
     phi: FloatArray
@@ -178,6 +183,8 @@ class _Solution(NamedTuple):
     torque: float
     damping: float
     constants: float
+    rounding: float
+    slope: float
 
 
 class _Cell(NamedTuple):
@@ -264,31 +271,35 @@ class March:
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
-        before, side = springs.spread(start), np.sign(springs.pivot(start, command.q[:1]))
+        before, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
         spread, phi = before + 0 * command.q, start + 0 * command.q
-        converged = False
+        converged, rounding = False, POSITION_ROUNDING * _largest(command.q)
         for _ in range(NEWTON_STEPS):
             phi = springs.settled(spread, phi, command)
             if np.isnan(phi[0]).any() or not springs.within(phi).all():
                 return LOST
-            if (np.sign(springs.pivot(phi, command.q)) != side).any():
+            there = springs.springs_at(phi, command.q)
+            if (np.sign(there.pivot) != side).any():
                 return SINGULAR
             if converged:
-                fastest = np.max(np.abs(springs.slope(phi, command.q)) / damping)
+                fastest = np.max(np.abs(there.slope) / damping)
                 return _Solution(
                     np.hstack((start, phi)),
                     np.stack(springs.driven(phi, command)),
                     float(np.max(np.abs(command.tau_e))),
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),
+                    rounding,
+                    _largest(there.slope),
                 )
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
-            missing = command.tau_e - springs.torque(phi, command.q) - damping * rate
-            slope = springs.slope(phi, command.q)
+            missing = command.tau_e - there.state.tau_e[..., 0] - damping * rate
+            slope = there.slope
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
             step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
             spread = spread + step
-            converged = _largest(step) <= CONVERGED * max(_largest(spread), peak / _largest(slope))
+            enough = CONVERGED * max(_largest(spread), peak / _largest(slope))
+            converged = _largest(step) <= max(enough, rounding)
         return LOST
 
 
@@ -314,16 +325,23 @@ class _Peaks:
         self._phi, self._spread = 0.0, LEAST_SPREAD
 
     def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
-        """Return the last coefficients of deflections, spread and torque relative to the peaks so far."""
+        """Return the last coefficients of deflections, spread and torque, relative to the peaks so far.
+
+        Positions of many turns are rounded; no cell is short enough for coefficients below that.
+        """
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
         self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
         self.torque = max(self.torque, found.torque, self._slope * self._spread)
-        of_phi = float(np.nanmax(np.abs(phi[:, -2:]))) / max(self._phi, LEAST_SPREAD)
-        share = max(of_phi, _largest(spread[-2:]) / self._spread)
+        missing = (
+            float(np.nanmax(np.abs(phi[:, -2:]))) - found.rounding,
+            _largest(spread[-2:]) - found.rounding,
+        )
+        share = max(0.0, missing[0] / max(self._phi, LEAST_SPREAD), missing[1] / self._spread)
         if found.constants > FAST:
             return share
-        return max(share, found.damping * _largest(rates[0, -2:]) / self.torque)
+        of_torque = found.damping * _largest(rates[0, -2:]) - found.slope * found.rounding
+        return max(share, of_torque / self.torque)
 
 
 def _largest(values: FloatArray) -> float:
