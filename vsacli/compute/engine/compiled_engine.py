@@ -62,9 +62,9 @@ def _trial(kernel: Kernel) -> Trial:
     """Return a call of a kernel's code on drawn samples, of sizes that positions and stiffnesses have."""
     inputs = 10.0 ** np.random.default_rng(0).uniform(-1, 3.5, (kernel.inputs, TRIED_SAMPLES))
     with np.errstate(all="ignore"):
-        expected = NumPyEngine().run(kernel, inputs)
-    results = [(row.nbytes,) for row in expected]
-    return Trial("run", [0, TRIED_SAMPLES, [row.tobytes() for row in inputs], results], expected)
+        expected = NumPyEngine().run(kernel, list(inputs))
+    rows = [row.tobytes() for row in inputs], [(row.nbytes,) for row in expected]
+    return Trial("run", [0, TRIED_SAMPLES, *rows], expected)
 
 
 @lru_cache(maxsize=32)

@@ -10,7 +10,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -110,14 +110,14 @@ def _examined(command: tuple[str, ...], _path: str) -> Compiler:
         raise CompilerError(
             f"{_spoken(command)!r} enables -ffast-math or a similar option, under which NaN goes unnoticed"
         )
-    return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS, *command, *_files(command))))
+    programs = map(_file_identity, filter(None, map(shutil.which, command)))
+    return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS, *command, *programs)))
 
 
-def _files(command: tuple[str, ...]) -> Iterator[str]:
-    """Yield place, size and time of the programs in a command: a script has the version of what it calls."""
-    for program in filter(None, map(shutil.which, command)):
-        status = os.stat(program)
-        yield f"{os.path.realpath(program)} {status.st_size} {status.st_mtime_ns}"
+def _file_identity(program: str) -> str:
+    """Return place, size and time of a program: a script has the version of the compiler that it calls."""
+    status = os.stat(program)
+    return f"{os.path.realpath(program)} {status.st_size} {status.st_mtime_ns}"
 
 
 def _spoken(command: tuple[str, ...]) -> str:

@@ -24,7 +24,6 @@ def call(path: str, name: str, arguments: list[Any]) -> bytes:
     with suppress(OSError):
         ctypes.CDLL("libmvec.so.1", mode=ctypes.RTLD_GLOBAL)
     function = getattr(ctypes.CDLL(path), name)
-    function.restype = None
     kept: list[Any] = []
     results: list[tuple[int, int]] = []
 
@@ -32,14 +31,14 @@ def call(path: str, name: str, arguments: list[Any]) -> bytes:
         if isinstance(part, int):
             return part
         if isinstance(part, tuple):
-            (size,) = part
-            kept.append(ctypes.create_string_buffer(size + ALIGNMENT))
+            kept.append(ctypes.create_string_buffer(part[0] + ALIGNMENT))
             first = ctypes.addressof(kept[-1])
-            results.append((first - first % -ALIGNMENT, size))
+            results.append((first - first % -ALIGNMENT, *part))
             return results[-1][0]
-        listed = isinstance(part, list)
         kept.append(
-            (ctypes.c_int64 * len(part))(*map(word, part)) if listed else ctypes.create_string_buffer(part)
+            (ctypes.c_int64 * len(part))(*map(word, part))
+            if isinstance(part, list)
+            else ctypes.create_string_buffer(part)
         )
         return ctypes.addressof(kept[-1])
 

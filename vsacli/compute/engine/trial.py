@@ -65,9 +65,14 @@ def check_library(path: Path, trial: Trial) -> None:
 def _results(path: Path, trial: Trial) -> bytes:
     text = files("vsacli.compute.engine").joinpath("library_call.py").read_text(encoding="utf-8")
     call = marshal.dumps((str(path), trial.function, trial.arguments))
-    command = [sys.executable, "-I", "-S", "-c", text]
     try:
-        done = subprocess.run(command, input=call, capture_output=True, timeout=TIMEOUT, check=False)
+        done = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", text],
+            input=call,
+            capture_output=True,
+            timeout=TIMEOUT,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         raise CompilerError(f"what the C compiler made does not end within {TIMEOUT:g} s") from None
     except OSError as error:

@@ -167,13 +167,8 @@ def loop_trial(
     ]
     states = vectors.reshape(-1, recording.entries)
     expected = loop.derivative(time, states)
-    arguments = [
-        [numbers.tobytes(), len(recording.rates.tables), tables],
-        float(time),
-        len(states),
-        states.tobytes(),
-        (expected.nbytes,),
-    ]
+    of_loop = [numbers.tobytes(), len(recording.rates.tables), tables]
+    arguments = [of_loop, float(time), len(states), states.tobytes(), (expected.nbytes,)]
     return Trial("derivatives", arguments, expected.reshape(-1, 1))
 
 

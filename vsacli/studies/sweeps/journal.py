@@ -60,7 +60,8 @@ class Journal:
 
     def __enter__(self) -> Self:
         with reporting_storage_errors(self.path):
-            self._create()
+            if not os.path.lexists(self.path):
+                self._create()
             self._file = self._open()
         try:
             self._lock()
@@ -88,9 +89,7 @@ class Journal:
         return len(self._places)
 
     def _create(self) -> None:
-        """Create the journal with its first line, unless there is something of this name."""
-        if os.path.lexists(self.path):
-            return
+        """Create the journal with its first line."""
         staged = self.path.with_name(staging_name())
         file = os.open(staged, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
@@ -111,12 +110,9 @@ class Journal:
         Raises:
             StorageError: a link or a device has this name.
         """
-        try:
-            if not stat.S_ISREG(self.path.lstat().st_mode):
-                raise StorageError(self.path, NO_JOURNAL)
-            return os.open(self.path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
-        except FileNotFoundError as error:
-            raise StorageError(self.path, "was removed by another process; run the study again") from error
+        if not stat.S_ISREG(self.path.lstat().st_mode):
+            raise StorageError(self.path, NO_JOURNAL)
+        return os.open(self.path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
 
     def _lock(self) -> None:
         """Lock the journal, if the system has locks.
