@@ -35,7 +35,8 @@ class Trial(NamedTuple):
         function: Name of the function.
         arguments: Arguments in words of 8 bytes: integers and floats; `bytes` for the address of an array, a
             list for that of a row of words, `(size,)` for that of an array of results with so many bytes.
-        expected: All results in the order of the arguments, (rows, samples); not compared where not finite.
+        expected: All results, (rows, samples); not compared where not finite. The function writes one row
+            after the other, or one sample after the other if this array is in Fortran's order.
     """
 
     function: str
@@ -53,7 +54,9 @@ def check_library(path: Path, trial: Trial) -> None:
     Raises:
         CompilerError: The library cannot be loaded, crashes, or computes something else.
     """
-    found = np.frombuffer(_results(path, trial)).reshape(trial.expected.shape)
+    found = np.frombuffer(_results(path, trial)).reshape(
+        trial.expected.shape, order="C" if trial.expected.flags.c_contiguous else "F"
+    )
     valid = np.isfinite(trial.expected)
     peak = np.max(np.abs(trial.expected), axis=1, where=valid, initial=1.0, keepdims=True)
     with np.errstate(invalid="ignore"):

@@ -159,17 +159,26 @@ def open_loop(path: Path) -> dict[str, Any]:
 def loop_trial(
     loop: ClosedLoop, time: float, vectors: FloatArray, numbers: FloatArray, recording: Recording
 ) -> Trial:
-    """Return a call of the compiled equations of motion at state vectors, (..., entries)."""
+    """Return a call of the compiled equations of motion at states about some, (..., entries).
+
+    In equilibrium rates are differences of large torques; those of drawn states nearby give their scale.
+    """
     tables = [
         word
         for table in recording.rates.tables
         for word in (*table.coefficients.shape, table.ends.tobytes(), table.coefficients.tobytes())
     ]
-    states = vectors.reshape(-1, recording.entries)
-    expected = loop.derivative(time, states)
-    of_loop = [numbers.tobytes(), len(recording.rates.tables), tables]
-    arguments = [of_loop, float(time), len(states), states.tobytes(), (expected.nbytes,)]
-    return Trial("derivatives", arguments, expected.reshape(-1, 1))
+    drawn = np.random.default_rng(0).uniform(-1e-3, 1e-3, (8, recording.entries))
+    states = vectors.reshape(-1, recording.entries)[0] * (1 + drawn[::-1]) + drawn
+    expected = np.ascontiguousarray(loop.derivative(time, states))
+    arguments = [
+        [numbers.tobytes(), len(recording.rates.tables), tables],
+        float(time),
+        len(states),
+        states.tobytes(),
+        (expected.nbytes,),
+    ]
+    return Trial("derivatives", arguments, expected.T)
 
 
 class CompiledLoop:

@@ -216,7 +216,7 @@ class RecordedEquations(Equations):
         return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
 
     def _improve(self, time: float, vectors: FloatArray) -> None:
-        """Change to the next backend if it is due; compiled code is tried at this time and these states."""
+        """Change to the next backend if it is due; compiled code is tried near these states."""
         if self.budget.used >= self._due:
             self._last = time, vectors
             self._due = next(self._later, math.inf)
