@@ -184,8 +184,10 @@ class Counted:
 def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
     """A block is as much work as the chain is long, and the shorter; in blocks the check must not grow."""
     robot = random_chain(joints)
-    still = [Constant(signal=each, span=(0.0, 1.0), value=(900.0,) * joints) for each in (POSITION, STIFFNESS)]
-    hold = Trajectory(UniformTimes(1.0, 20.0), still[0], {"stiffness": still[1]}, name="hold")
+    position, stiffness = (
+        Constant(signal=each, span=(0.0, 1.0), value=(900.0,) * joints) for each in (POSITION, STIFFNESS)
+    )
+    hold = Trajectory(UniformTimes(1.0, 20.0), position, {"stiffness": stiffness}, name="hold")
     counted = Counted()
     ladder(robot, hold, counted)
     assert counted.calls == 2  # 4 and 20 if there were as many times as for short ones

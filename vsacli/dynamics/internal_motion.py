@@ -298,8 +298,9 @@ class March:
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
             step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
             spread = spread + step
-            enough = CONVERGED * max(_largest(spread), peak / _largest(slope))
-            converged = _largest(step) <= max(enough, rounding)
+            converged = _largest(step) <= max(
+                CONVERGED * _largest(spread), CONVERGED * peak / _largest(slope), rounding
+            )
         return LOST
 
 
