@@ -6,19 +6,24 @@ Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018)
 the relative entropy tr(P_0^-1 P) - ln det(P_0^-1 P) - 4, which does not depend on frames and units (T. Lee,
 P. M. Wensing, F. C. Park, IEEE Transactions on Robotics 36 (2020)). It is convex in the parameters, and
 infinite where P is singular, so that Newton's method finds the unique minimum without a semidefinite solver.
+
+A rigid joint has motor and link in one equation, which determines the sum of their inertias, say. So further
+parameters of joints and motors in such sums are sought with the links: a positive one is a 1 x 1 matrix P.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.robot.joint import Link
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.link_equations import LinkSystem
 from vsacli.studies.identification.regressor import (
@@ -63,14 +68,17 @@ class LinkEstimate(NamedTuple):
     """The identified combinations of standard parameters, with values and covariance.
 
     Attributes:
-        shares: factors of the parameters of all links in each combination, (combinations, parameters).
+        shares: factors of the parameters of all links, then of further ones, in each combination,
+            (combinations, parameters).
         values: values of the combinations, (combinations,).
         covariance: covariance of the values, (combinations, combinations).
+        parts: further parameters of the robot file, of joints and rigid drives.
     """
 
     shares: FloatArray
     values: FloatArray
     covariance: FloatArray
+    parts: tuple[Parameter, ...] = ()
 
 
 class ConsistentLinks(NamedTuple):
@@ -80,10 +88,12 @@ class ConsistentLinks(NamedTuple):
         links: links of all joints, base to tip; empty if nothing was identified, or if no consistent links
             agree with the result.
         off: deviation of the links from each identified value, in standard errors, (combinations,).
+        parts: values of further parameters of the file by path, which have the identified sums.
     """
 
     links: tuple[Link, ...]
     off: FloatArray
+    parts: Mapping[str, float] = MappingProxyType({})
 
     @property
     def within(self) -> bool:
@@ -100,15 +110,20 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     """
     if not len(estimate.values):
         return ConsistentLinks((), estimate.values)
-    start = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
+    bodies = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
+    parts = _Parts.of(estimate, len(bodies))
     errors = SHARP * np.maximum(np.abs(estimate.values), 1.0)
     root = np.asarray(np.linalg.cholesky(estimate.covariance + np.diag(errors**2)), dtype=np.float64)
-    found = _nearest(_Problem.of(estimate, root, start), start)
+    problem = _Problem.of(estimate, root, bodies, parts)
+    of_links, of_parts = _nearest(problem, np.concatenate((bodies, parts.reference)))
+    found = np.concatenate((of_links.ravel(), of_parts))
     off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
     nearest = ConsistentLinks((), off)
     if not nearest.within:
         return nearest  # its links are almost inconsistent: with hardly any mass, or flat
-    return nearest._replace(links=tuple(map(link_of, found.reshape(-1, len(SYMBOLS)))))
+    values = dict(zip(map(str, estimate.parts), map(float, of_parts), strict=True))
+    changed = estimate.shares[:, : len(bodies)].any()
+    return nearest._replace(links=tuple(map(link_of, of_links)) if changed else (), parts=values)
 
 
 def pseudo_inertia(parameters: FloatArray) -> FloatArray:
@@ -146,6 +161,47 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
     return parameters
 
 
+class _Parts(NamedTuple):
+    """Further parameters of the file, as the problem sees them.
+
+    Attributes:
+        reference: values that they should be near, (parts,).
+        positive: which of them must be positive, (parts,).
+        scale: deviation from the reference that counts like a factor e, (parts,).
+    """
+
+    reference: FloatArray
+    positive: BoolArray
+    scale: FloatArray
+
+    @classmethod
+    def of(cls, estimate: LinkEstimate, bodies: int) -> _Parts:
+        """Return the parameters of an estimate, positive ones at least a small share of their sums."""
+        of_file = np.array([each.value for each in estimate.parts])
+        positive = np.array(["positive" in each.requirement for each in estimate.parts], dtype=bool)
+        shares = np.abs(estimate.shares[:, bodies:])
+        with np.errstate(divide="ignore"):
+            sizes = np.min(np.abs(estimate.values)[:, None] / shares, axis=0, initial=1.0)
+        least = np.maximum(LEAST_MASS * sizes, SHARP)
+        reference = np.where(positive, np.maximum(of_file, least), of_file)
+        return cls(reference, positive, np.maximum(np.abs(reference), least))
+
+    def entropy(self, values: FloatArray) -> float:
+        """Return the relative entropy of positive values, and half the squared deviation of others."""
+        ratio = np.where(self.positive, values, 1.0) / np.where(self.positive, self.reference, 1.0)
+        if np.any(ratio <= 0):
+            return np.inf
+        off = (values - self.reference) / self.scale
+        return float(np.sum(np.where(self.positive, ratio - np.log(ratio), off**2 / 2)))
+
+    def slopes(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the first and second derivatives of the entropy by each value, (parts,)."""
+        inverse = 1 / np.where(self.positive, values, 1.0)
+        off = (values - self.reference) / self.scale**2
+        first = np.where(self.positive, 1 / np.where(self.positive, self.reference, 1.0) - inverse, off)
+        return first, np.where(self.positive, inverse**2, 1 / self.scale**2)
+
+
 class _Problem(NamedTuple):
     """Coordinates s of the parameters x = center + directions @ s; the first s are errors of the result.
 
@@ -155,15 +211,17 @@ class _Problem(NamedTuple):
             standard errors, the others keep them.
         errors: number of the first directions.
         inverse: inverses of the pseudo-inertias of the reference links, (links, 4, 4).
+        parts: further parameters, after those of the links.
     """
 
     center: FloatArray
     directions: FloatArray
     errors: int
     inverse: FloatArray
+    parts: _Parts
 
     @classmethod
-    def of(cls, estimate: LinkEstimate, root: FloatArray, start: FloatArray) -> _Problem:
+    def of(cls, estimate: LinkEstimate, root: FloatArray, bodies: FloatArray, parts: _Parts) -> _Problem:
         """Return the problem for an estimate; `root` is a square root of its covariance."""
         from scipy.linalg import solve_triangular
 
@@ -172,31 +230,37 @@ class _Problem(NamedTuple):
         to_estimate = q[:, :count]
         center = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
         errors = to_estimate @ solve_triangular(r[:count], root, trans="T")
-        inverse = np.asarray(np.linalg.inv(pseudo_inertia(start.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
-        return cls(center, np.hstack((errors, q[:, count:])), count, inverse)
+        inverse = np.asarray(np.linalg.inv(pseudo_inertia(bodies.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
+        return cls(center, np.hstack((errors, q[:, count:])), count, inverse, parts)
 
-    def parameters(self, s: FloatArray) -> FloatArray:
-        """Return the standard parameters at s, (links, 10)."""
-        x: FloatArray = (self.center + self.directions @ s).reshape(-1, len(SYMBOLS))
-        return x
+    def parameters(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the standard parameters at s, (links, 10), and the further ones, (parts,)."""
+        x: FloatArray = self.center + self.directions @ s
+        of_links, of_parts = np.split(x, [len(x) - len(self.parts.reference)])
+        return of_links.reshape(-1, len(SYMBOLS)), of_parts
 
     def value(self, s: FloatArray, weight: float) -> float:
         """Return relative entropy plus half the squared errors over the weight; infinite if inconsistent."""
-        matrices = pseudo_inertia(self.parameters(s))
+        of_links, of_parts = self.parameters(s)
+        matrices = pseudo_inertia(of_links)
         try:
             np.linalg.cholesky(matrices)
         except np.linalg.LinAlgError:
             return np.inf
         entropy = np.einsum("lij,lji->", self.inverse, matrices) - np.linalg.slogdet(matrices)[1].sum()
-        return float(entropy + s[: self.errors] @ s[: self.errors] / (2 * weight))
+        errors = s[: self.errors] @ s[: self.errors] / (2 * weight)
+        return float(entropy + errors) + self.parts.entropy(of_parts)
 
     def slopes(self, s: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
         """Return the gradient and the Hessian of the value."""
-        inverse = np.linalg.inv(pseudo_inertia(self.parameters(s)))
-        gradient = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
+        of_links, of_parts = self.parameters(s)
+        inverse = np.linalg.inv(pseudo_inertia(of_links))
+        first, second = self.parts.slopes(of_parts)
+        of_bodies = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
+        gradient = np.concatenate((of_bodies, first))
         moved = np.einsum("lij,pjk->lpik", inverse, _BASIS)
         blocks = np.einsum("lpik,lqki->lpq", moved, moved)
-        hessian = np.zeros((len(self.center),) * 2)
+        hessian = np.diag(np.concatenate((0 * of_bodies, second)))
         for link, block in enumerate(blocks):
             place = slice(link * len(SYMBOLS), (link + 1) * len(SYMBOLS))
             hessian[place, place] = block
@@ -207,14 +271,14 @@ class _Problem(NamedTuple):
         )
 
 
-def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
-    """Return the parameters of all links with the least value, (parameters,), from a consistent start."""
+def _nearest(problem: _Problem, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the parameters of links and the further ones with the least value, from a consistent start."""
     s = np.asarray(np.linalg.solve(problem.directions, start - problem.center), dtype=np.float64)
     off = float(s[: problem.errors] @ s[: problem.errors])
     lighter = int(np.ceil(np.log10(max(off, 1.0) / WEIGHT) / np.log10(LIGHTER)))
     for power in range(lighter, -1, -1):
         s = _minimum(problem, s, WEIGHT * LIGHTER**power)
-    return problem.parameters(s).ravel()
+    return problem.parameters(s)
 
 
 def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
@@ -237,27 +301,46 @@ def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
 
 
 def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
-    """Return the physically consistent links for the solution of a system of links."""
-    assert isinstance(found.system, LinkSystem), "of links"
-    return consistent_links(robot, _estimate(found.system, found))
+    """Return the physically consistent links for the solution of a system of links.
+
+    A sum of dampings or of friction that is held at zero has no parts.
+    """
+    system = found.system
+    assert isinstance(system, LinkSystem), "of links"
+    nearest = consistent_links(robot, _estimate(system, found))
+    held = {
+        str(part): 0.0
+        for number, each in found.bound.items()
+        if system.sums[number] and each.value != system.before[number]
+        for part, share in zip(system.parts, system.base.shares[number, -len(system.parts) :], strict=True)
+        if share
+    }
+    return nearest._replace(parts={**nearest.parts, **held})
 
 
 def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
-    """Return the identifiable base parameters, alone or in combinations, with values and covariance."""
-    fit, base = found.fit, system.base
+    """Return the identifiable sums and base parameters of links, with values and covariance.
+
+    A parameter of the file that was identified alone is none of them.
+    """
+    fit, base, free = found.fit, system.base, list(found.free)
     combined = {each.terms[0][0]: each.terms for each in fit.inseparable}
-    first = [at for at in range(len(fit.values)) if at in combined or np.isfinite(fit.standard_errors[at])]
-    rows = np.zeros((len(first), len(fit.values)))
+    first = [at for at in range(len(free)) if at in combined or np.isfinite(fit.standard_errors[at])]
+    rows = np.zeros((len(first), len(base.kept)))
     for row, at in zip(rows, first, strict=True):
         for place, factor in combined.get(at, ((at, 1.0),)):
-            row[place] = factor
-    of_base = rows[:, : len(base.kept)]
-    there = np.flatnonzero(of_base.any(axis=1))
-    among = np.array(first)[there]
+            row[free[place]] = factor
+    shares = rows @ base.shares
+    bodies = base.shares.shape[1] - len(system.parts)
+    sums = [row[:bodies].any() or np.count_nonzero(row) > 1 for row in shares]
+    there = np.flatnonzero(sums)
+    among = np.array(first, dtype=int)[there]
+    inside = np.flatnonzero(shares[there, bodies:].any(axis=0))
     return LinkEstimate(
-        shares=of_base[there] @ base.shares,
-        values=of_base[there] @ fit.solution[: len(base.kept)],
+        shares=np.hstack((shares[there, :bodies], shares[there, bodies:][:, inside])),
+        values=(rows @ found.predicting)[there],
         covariance=fit.covariance[np.ix_(among, among)],
+        parts=tuple(system.parts[at] for at in inside),
     )
 
 

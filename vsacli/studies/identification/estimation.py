@@ -45,6 +45,18 @@ class Equations(NamedTuple):
     errors: FloatArray | None = None
     noise: Callable[[], tuple[FloatArray, FloatArray]] | None = None
 
+    def restricted(self, free: Sequence[int]) -> Equations:
+        """Return the equations with slopes by some of the unknowns, by index."""
+        noise, columns = self.noise, list(free)
+        if noise is None:
+            return self._replace(slopes=self.slopes[:, columns])
+
+        def of_free() -> tuple[FloatArray, FloatArray]:
+            of_residual, of_slopes = noise()
+            return of_residual, of_slopes[:, columns]
+
+        return self._replace(slopes=self.slopes[:, columns], noise=of_free)
+
 
 class System(NamedTuple):
     """The stacked equations of all recordings; see `Equations`.

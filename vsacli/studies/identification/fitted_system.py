@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cache, partial
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,10 +45,6 @@ class SystemOfEquations(ABC):
     @abstractmethod
     def admissible(self, number: int, value: float) -> float | None:
         """Return the nearest admissible value of a parameter, by index; None if it must keep its value."""
-
-    @abstractmethod
-    def without(self, fixed: dict[int, float]) -> Self:
-        """Return the system with some parameters, by index, fixed at given values."""
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:
         """Return the equations of a recording, with the effect of its noise if that is known."""
@@ -110,8 +106,9 @@ def solution(system: SystemOfEquations, records: Sequence[Signals]) -> Solution:
     bound: dict[int, Bound] = {}
     while True:
         free = tuple(number for number in range(len(system.names)) if number not in bound)
-        reduced = system.without({number: each.value for number, each in bound.items()}) if bound else system
-        fit = gauss_newton(partial(_equations, reduced, records), reduced.before)
+        values = system.before.copy()
+        values[list(bound)] = [each.value for each in bound.values()]
+        fit = gauss_newton(partial(_equations, system, records, free, values), values[list(free)])
         further = {
             number: found
             for at, number in enumerate(free)
@@ -122,8 +119,25 @@ def solution(system: SystemOfEquations, records: Sequence[Signals]) -> Solution:
         bound |= further
 
 
-def _equations(system: SystemOfEquations, records: Sequence[Signals], values: FloatArray) -> list[Equations]:
-    return [system.equations(values, each) for each in records]
+def _equations(
+    system: SystemOfEquations,
+    records: Sequence[Signals],
+    free: Sequence[int],
+    held: FloatArray,
+    values: FloatArray,
+) -> list[Equations]:
+    """Return the equations of all recordings with slopes by the free parameters.
+
+    Args:
+        system: system of equations.
+        records: conditioned recordings.
+        free: indices of the free parameters.
+        held: values of all parameters, of which those of free ones do not count, (parameters,).
+        values: values of the free parameters, (free,).
+    """
+    together = held.copy()
+    together[list(free)] = values
+    return [system.equations(together, each).restricted(free) for each in records]
 
 
 def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:

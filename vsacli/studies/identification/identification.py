@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,13 +44,16 @@ from vsacli.studies.identification.identified_values import (
     SystemReport,
     far_from_file,
 )
-from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
+from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import (
     FRICTION,
     GROUPS,
+    LINKS,
     SPRINGS,
     check_fit,
+    describe_lack,
     motor_systems,
+    values_of_sums,
     with_friction,
 )
 from vsacli.studies.identification.recording_checks import (
@@ -112,7 +115,7 @@ def identify(
     first = solutions(sought, joints, fit, signals)
     notes = [*_notes(robot, joints, fit, signals, records), *(f"{path}: {PUSHED}" for path in pushed)]
     if not first:
-        nothing = "the recorded joints have none of the parameters to identify"
+        nothing = describe_lack(robot, joints, fit)
         raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
     delays = [delay(first, each) for each in signals]
     signals, moved = _without_delays(signals, delays)
@@ -126,7 +129,10 @@ def identify(
             of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
             explained = list(_counted(systems, _explanations(robot, found, reports, signals, of_gains)))
         systems.finish()
-    links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
+    links = next((found_links(sought, each) for each in found if each.system.title == LINKS), None)
+    of_sums = {} if links is None else dict(links.parts)
+    for each in found:
+        of_sums |= values_of_sums(each) if each.system.title != LINKS else {}
     used = tuple(map(_used, records, signals, delays, doubts))
     far = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
@@ -141,7 +147,7 @@ def identify(
             *(sentence for each in explained for sentence in each.sentences),
             *(each.sentence for each in of_gains),
         ),
-        fitted=_fitted(robot, sought, reports, links),
+        fitted=_fitted(robot, sought, reports, links, of_sums),
         torques=tuple(torques(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
@@ -209,9 +215,10 @@ def solutions(
         signals: conditioned recordings.
     """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
-    if LINKS not in fit or without_links(robot, joints, fit, signals):
+    links = link_system(robot, fit, motors, links=LINKS in fit)
+    if not links.names or without_links(robot, joints, links, signals):
         return motors
-    return [*motors, solution(link_system(robot, fit, motors), signals)]
+    return [*motors, solution(links, signals)]
 
 
 def _verdict(
@@ -270,9 +277,15 @@ def _notes(
             f"the parameters of {names} are not identified: the torque of the damper parallel to the springs "
             "is unknown"
         )
-    if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
+    system = link_system(robot, fit, links=LINKS in fit)
+    if not system.names:
+        return
+    if reason := without_links(robot, joints, system, signals):
         yield reason
-    elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):
+        return
+    if not system.bodies:
+        yield "parameters of joints are identified with the links of the file, which are assumed to be exact"
+    if SPRINGS not in fit and any(robot.joints[index].actuator.sprung for index in system.joints):
         yield "links are identified with the springs of the file, which are assumed to be exact"
 
 
@@ -307,9 +320,13 @@ def _explanations(
 
 
 def _fitted(
-    robot: Robot, sought: Robot, systems: Sequence[SystemReport], links: ConsistentLinks | None
+    robot: Robot,
+    sought: Robot,
+    systems: Sequence[SystemReport],
+    links: ConsistentLinks | None,
+    of_sums: Mapping[str, float],
 ) -> Robot:
-    fitted = sought.replace({each.path: each.value for each in to_write(robot, systems)})
+    fitted = sought.replace({each.path: each.value for each in to_write(robot, systems)} | dict(of_sums))
     if links is None or not links.links:
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
@@ -347,8 +364,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     values: dict[str, Any] = {}
     errors: dict[str, str] = {}
     for number in to_write(robot, found.systems):
-        _, joint, *rest = number.path.split(".")
-        path = ".".join((JOINTS, str(robot.joint_names.index(joint)), *rest))  # as the text has it
+        path = _in_text(robot, number.path)
         value = float(significant(number.value, number.standard_error, math.inf))
         errors[path] = f"{number.standard_error:.2g}"
         if number.value == number.before:
@@ -358,10 +374,27 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
         else:
             parent, _, key = path.rpartition(".")
             values.setdefault(parent, {"coulomb": 0.0})[key] = value
+    values |= dict(_changed_parts(robot, found.fitted, {*values, *errors}))
     values |= _changed_links(robot, found.fitted, own)
     files = dict(moved_files(own, home, Path(folder)))
     text = edited(unaliased(own, values), {**values, **files})
     return with_errors(text, errors)
+
+
+def _in_text(robot: Robot, path: str) -> str:
+    """Return the path of a parameter of a joint as the text of the robot has it, with the joint's index."""
+    _, joint, *rest = path.split(".")
+    return ".".join((JOINTS, str(robot.joint_names.index(joint)), *rest))
+
+
+def _changed_parts(robot: Robot, fitted: Robot, identified: set[str]) -> Iterator[tuple[str, float]]:
+    """Yield path in the text and value of parameters that changed with a sum, but are not links'."""
+    values = {str(each): each.value for each in parameters(fitted)}
+    for each in parameters(robot):
+        path = str(each)
+        if each.part != "link" and values.get(path, each.value) != each.value:
+            if (place := _in_text(robot, path)) not in identified:
+                yield place, _rounded(values[path])
 
 
 def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:

@@ -1,7 +1,9 @@
 """Equations of links: the torque of springs, or of the motor of a rigid joint, is Y pi + damping + friction.
 
 The torque of springs follows from recorded positions and the spring parameters, which the equations of motors
-gave before; their uncertainty adds to that of the links. A rigid joint has motor and link in one equation.
+gave before; their uncertainty adds to that of the links. A rigid joint has motor and link in one equation,
+where torques determine only the sum of both dampings, say. So parameters of joints and rigid drives are
+columns of the regressor like those of links, and are regrouped with them into base parameters.
 """
 
 from __future__ import annotations
@@ -13,17 +15,19 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.duals import tangent_of, value_of
+from vsacli.compute.duals import Dual, tangent_of, value_of
 from vsacli.dynamics.drive import motor_torques
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, apart, parameters, seeded
+from vsacli.robot.parameters import Parameter, apart, seeded
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, SystemOfEquations
 from vsacli.studies.identification.motor_equations import (
+    LINKS,
     SPRINGS,
     WIDTH,
+    MotorSystem,
     admissible,
     group_of,
     joint_motion,
@@ -34,62 +38,76 @@ from vsacli.studies.identification.regressor import (
     UNITS,
     BaseParameters,
     all_parameters,
-    base_parameters,
     names,
+    preferred_order,
+    random_motion,
     regressor,
 )
 
-LINKS = "links"
-"""Title of the system of all links, and its word in `fit`."""
-
-RESISTANCES = ("damping", "friction")
-"""Parts of a joint that resist the motion of its link."""
-
 
 class LinkSystem(SystemOfEquations):
-    """Equations of all links whose torque is known, from springs or from a rigid drive.
+    """Equations of joints whose torque is known, from springs or from a rigid drive.
 
     Args:
         robot: robot as in its file.
-        base: base parameters of its links, the first unknowns.
-        sought: further unknowns, parameters of the robot file.
+        base: combinations of the standard parameters of all links and of `parts` that are unknown; without
+            any link parameter among the first ones, links are those of the file.
+        parts: further parameters of the robot file, of joints and rigid drives.
         springs: spring parameters identified before.
         errors: effect of independent errors, of one standard error each, on `springs`, (springs, errors).
+
+    Attributes:
+        base: see above.
+        parts: see above.
+        bodies: number of combinations named after a link parameter, the first unknowns.
     """
 
     def __init__(
         self,
         robot: Robot,
         base: BaseParameters,
-        sought: Sequence[Parameter],
+        parts: Sequence[Parameter],
         springs: Sequence[Parameter] = (),
         errors: FloatArray | None = None,
     ) -> None:
-        self.title, self.base, self.sought = LINKS, base, tuple(sought)
+        self.title, self.base, self.parts = LINKS, base, tuple(parts)
         self._robot, self._springs = robot, tuple(springs)
         self._errors = np.zeros((0, 0)) if errors is None else errors
-        self.names = (*base.names(names(robot)), *map(str, sought))
-        self.before = np.concatenate((base.of(all_parameters(robot)), [each.value for each in sought]))
-        of_base = [UNITS[at % len(SYMBOLS)] for at in base.kept]
-        self.units = (*of_base, *(each.unit for each in sought))
-        words = (base.words(place, names(robot)) for place in range(len(of_base)))
-        self.sums = (*words, *[""] * len(self.sought))
+        of_links = names(robot)
+        self._first = len(of_links)
+        self.bodies = int(np.searchsorted(base.kept, self._first))
+        every = [*of_links, *map(str, parts)]
+        self.names = tuple(base.names(every))
+        self.before = base.of(np.concatenate((all_parameters(robot), [each.value for each in parts])))
+        units = [*UNITS * len(robot.joints), *(each.unit for each in parts)]
+        self.units = tuple(units[at] for at in base.kept)
+        alone = np.count_nonzero(base.shares, axis=1) == 1
+        self.sums = tuple(
+            "" if place >= self.bodies and one else base.words(place, every)
+            for place, one in enumerate(alone)
+        )
 
     def of_record(self, values: FloatArray, signals: Signals) -> Equations:
         """See `SystemOfEquations.of_record`."""
-        count, robot = len(self.base.kept), self._robot
+        robot, bodies = self._robot, self.bodies
+        own = self.base.kept[bodies:] - self._first
+        of_parts = np.zeros(len(self.parts))
+        of_parts[own] = values[bodies:]
         numbers = [
-            each._replace(value=float(value)) for each, value in zip(self.sought, values[count:], strict=True)
+            each._replace(value=float(value)) for each, value in zip(self.parts, of_parts, strict=True)
         ]
-        columns = regressor(robot, signals.q, signals.dq, signals.ddq)[:, self.base.kept]
+        columns = regressor(robot, signals.q, signals.dq, signals.ddq)
+        of_links = columns[:, self.base.kept[:bodies]]
+        weight = np.einsum("jbs,b->js", of_links, values[:bodies])
+        if not bodies:
+            weight = np.einsum("jps,p->js", columns, all_parameters(robot))
         found = []
-        for index, joint in enumerate(robot.joints):
+        for index in self.joints:
             torque, of_springs = _carried(robot, index, signals, self._springs)
-            resistance, slopes = _resistance(robot, index, signals, numbers)
+            resistance, slopes = _resistance(robot, index, joint_motion(signals, index), numbers)
             if np.isfinite(torque).all():
-                taken = values[:count] @ columns[index] + resistance
-                of_joint = np.stack((torque, taken, *columns[index], *slopes, *of_springs))
-                found.append((f"link of {joint.name}", signals.filter.applied(of_joint.T)))
+                together = (torque, weight[index] + resistance, *of_links[index], *slopes[own], *of_springs)
+                found.append((f"link of {robot.joint_names[index]}", signals.filter.applied(np.stack(together).T)))
         together, last = np.concatenate([rows for _, rows in found]), 2 + len(values)
         return Equations(
             measured=together[:, 0],
@@ -100,47 +118,76 @@ class LinkSystem(SystemOfEquations):
             errors=together[:, last:] @ self._errors,
         )
 
+    @property
+    def joints(self) -> Sequence[int]:
+        """Indices of the joints whose equations contain unknowns."""
+        if self.bodies:
+            return range(len(self._robot.joints))
+        return sorted({each.joint for each in self.parts if each.joint is not None})
+
     def admissible(self, number: int, value: float) -> float | None:
-        """See `SystemOfEquations.admissible`; base parameters may have any value."""
-        if number < len(self.base.kept):
+        """See `SystemOfEquations.admissible`; combinations with link parameters may have any value."""
+        if number < self.bodies:
             return value
-        return admissible(self._robot, self.names[number], value)
-
-    def without(self, fixed: dict[int, float]) -> LinkSystem:
-        """See `SystemOfEquations.without`; only parameters of the file can be fixed."""
-        robot = self._robot.replace({self.names[number]: value for number, value in fixed.items()})
-        first = len(self.base.kept)
-        sought = [each for at, each in enumerate(self.sought, first) if at not in fixed]
-        return LinkSystem(robot, self.base, sought, self._springs, self._errors)
+        return admissible(self._robot, str(self.parts[self.base.kept[number] - self._first]), value)
 
 
-def link_system(robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = ()) -> LinkSystem:
+def link_system(
+    robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = (), *, links: bool = True
+) -> LinkSystem:
     """Return the system of a robot's links, with damping and friction of its joints.
 
     Args:
         robot: robot as in its file.
         fit: words and patterns; those for motors count for rigid joints.
         motors: solutions of motors and springs, which give the torque of springs and its errors.
+        links: whether the links are identified, rather than those of the file.
     """
-    sought = [each for each in parameters(robot) if each.part in RESISTANCES]
-    for index, joint in enumerate(robot.joints):
-        sought += () if joint.actuator.sprung else unknowns(robot, index, fit)
-    sought = [each for each in sought if each.path[-1] != WIDTH]
-    return LinkSystem(robot, base_parameters(robot), sought, *_springs(robot, motors))
+    words = [*fit, LINKS] if links else fit
+    parts = [
+        each
+        for index, joint in enumerate(robot.joints)
+        for each in unknowns(robot, index, words)
+        if each.path[-1] != WIDTH and not (joint.actuator.sprung and group_of(each) != LINKS)
+    ]
+    return LinkSystem(robot, _combinations(robot, parts, links=links), parts, *_springs(motors))
 
 
-def _springs(robot: Robot, motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
+SLOWEST = 1e-4
+"""Smallest factor of random velocities, at which friction of one width differs from that of another."""
+
+
+def _combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool) -> BaseParameters:
+    """Return the combinations of link parameters and further ones that torques of any motion determine."""
+    joints, first = len(robot.joints), len(SYMBOLS) * len(robot.joints)
+    fast = random_motion(joints)
+    slow = fast * np.array([1, 0, 1])[:, None, None]
+    slow[1] = fast[1] * np.geomspace(1, SLOWEST, fast.shape[1])[:, None]
+    q, dq, ddq = np.concatenate((fast, slow), axis=1)
+    columns = np.zeros((joints, first + len(parts), len(q)))
+    if links:
+        columns[:, :first] = regressor(robot, q, dq, ddq)
+    for index in range(joints):
+        motion = {"dq": Dual(dq[:, index], {}), "ddq": Dual(ddq[:, index], {})}
+        columns[index, first:] = _resistance(robot, index, motion, parts)[1]
+    order = np.concatenate((preferred_order(joints), np.arange(first, first + len(parts))))
+    return BaseParameters.of_columns(np.moveaxis(columns, 1, -1).reshape(-1, columns.shape[1]), order)
+
+
+def _springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
     """Return spring parameters that predict best, and their errors as sums of independent errors."""
     from scipy.linalg import block_diag
 
-    known, springs, roots = {str(each): each for each in parameters(robot)}, [], []
+    springs, roots = [], []
     for each in motors:
-        numbers = [known[name] for name in each.system.names]
+        assert isinstance(each.system, MotorSystem), "of motors"
+        numbers = each.system.sought
         places = [place for place, number in enumerate(numbers) if group_of(number) == SPRINGS]
         covariance = np.zeros((len(numbers),) * 2)
         covariance[np.ix_(each.free, each.free)] = each.fit.covariance
         powers, axes = np.linalg.eigh(covariance[np.ix_(places, places)])
-        springs += [numbers[at]._replace(value=float(each.predicting[at])) for at in places]
+        values = each.system.of_file(each.predicting)
+        springs += [numbers[at]._replace(value=float(values[at])) for at in places]
         roots.append(axes * np.sqrt(np.maximum(powers, 0.0)))
     return springs, block_diag(*roots) if roots else None
 
@@ -162,37 +209,36 @@ def _carried(
 
 
 def _resistance(
-    robot: Robot, index: int, signals: Signals, numbers: Sequence[Parameter]
+    robot: Robot, index: int, motion: dict[str, Any], numbers: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the resisting torque of a joint and its rigid drive, (samples,), and its slopes."""
     joint = apart(seeded(robot, numbers).joints[index])
-    motion = joint_motion(signals, index)
     dq = motion["dq"]
     torque: Any = joint.damping * dq + joint_friction(joint.friction, (dq, 0, 0, 0)).tau
     if not joint.actuator.sprung:
         dtheta, ddtheta = (np.stack([motion[name]] * SIDES) for name in ("dq", "ddq"))
         torque = torque + motor_torques(joint.actuator, dtheta, ddtheta, np.zeros_like(dtheta))[0]
-    return value_of(torque), tangent_of(torque, len(numbers), signals.time.shape)
+    return value_of(torque), tangent_of(torque, len(numbers), np.shape(dq.value))
 
 
-def without_links(robot: Robot, joints: Sequence[int], fit: Sequence[str], records: Sequence[Signals]) -> str:
-    """Return the reason why links cannot be identified, as a sentence; "" if they can.
+def without_links(robot: Robot, joints: Sequence[int], system: LinkSystem, records: Sequence[Signals]) -> str:
+    """Return the reason why a system of links cannot be identified, as a sentence; "" if it can.
 
     Args:
         robot: robot as in its file.
         joints: indices of the recorded joints.
-        fit: see `link_system`.
+        system: system of the links.
         records: conditioned recordings.
     """
+    denied = f"{'links' if system.bodies else 'rigid joints'} are not identified"
     positions = np.concatenate([each.q for each in records])
     unknown = [name for name, q in zip(robot.joint_names, positions.T, strict=True) if np.isnan(q).any()]
     if unknown:
-        return f"links are not identified, since the positions of {', '.join(unknown)} were not recorded"
+        return f"{denied}, since the positions of {', '.join(unknown)} were not recorded"
     if any(joint.damper for joint in robot.joints):
-        return "links are not identified, since the damping of the dampers was not recorded"
+        return f"{denied}, since the damping of the dampers was not recorded"
     rows = len(joints) * sum(len(each.time) // each.filter.stride for each in records)
-    count = len(link_system(robot, fit).names)
+    count = len(system.names)
     if rows <= count:
-        few = f"{rows} equations are too few for {count} parameters"
-        return f"links are not identified: {few}; record for longer"
+        return f"{denied}: {rows} equations are too few for {count} parameters; record for longer"
     return ""

@@ -23,11 +23,12 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, apart, parameters, seeded
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import Equations
-from vsacli.studies.identification.fitted_system import SystemOfEquations
+from vsacli.studies.identification.fitted_system import CERTAIN, Solution, SystemOfEquations
+from vsacli.studies.identification.regressor import BaseParameters
 
-SPRINGS, MOTORS, FRICTION = "springs", "motors", "friction"
+SPRINGS, MOTORS, FRICTION, LINKS = "springs", "motors", "friction", "links"
 GROUPS = (SPRINGS, MOTORS, FRICTION)
-"""Names of the groups of parameters."""
+"""Names of the groups of parameters of actuators."""
 
 FIXED = ("gear_ratio", "torque_constant", "resistance")
 """Motor parameters that are known from the design, and that no torque on the joint side determines."""
@@ -37,22 +38,25 @@ WIDTH = "width"
 OF_MOTORS = ("motor", "coupled_inertia")
 """Keys in the paths of motor parameters."""
 
+RESISTANCES = ("damping", FRICTION)
+"""Parts of a joint that resist the motion of its link."""
+
 
 def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return the parameters of one joint's motors and springs to be identified.
+    """Return the parameters of one joint's springs, motors, damping and friction to be identified.
 
-    Zero terms of a spring, and a zero width of friction, are identified only if a pattern matches them.
+    Terms that are zero in the file are identified only if a pattern matches them, except the Coulomb friction
+    and the offset of a motor.
 
     Args:
         robot: robot as in its file.
         index: index of the joint.
-        fit: words of `GROUPS`, and patterns of paths such as `joints.elbow.actuator.spring.*`.
+        fit: words of `GROUPS`, `LINKS` for damping and friction of the joint, and patterns of paths such as
+            `joints.elbow.actuator.spring.*`.
     """
-    return tuple(
-        each
-        for each in parameters(robot)
-        if each.joint == index and (group := group_of(each)) and _asked_for(each, group, fit)
-    )
+    rigid = not robot.joints[index].actuator.sprung
+    of_joint = [each for each in parameters(robot) if each.joint == index]
+    return tuple(each for each in of_joint if _asked_for(each, _words_of(each, rigid=rigid), fit))
 
 
 def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
@@ -62,7 +66,8 @@ def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
         robot: robot as in its file.
         joints: indices of the joints to change.
     """
-    paths = [str(each) for each in parameters(robot) if each.joint in joints and group_of(each)]
+    of_joints = [each for each in parameters(robot) if each.joint in joints]
+    paths = [str(each) for each in of_joints if group_of(each) in GROUPS]
     sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
     inertias = [path for path in paths if path.endswith(".inertia") and path.split(".")[1] in sprung]
     frictions = [path.replace(".inertia", f".{FRICTION}") for path in inertias]
@@ -82,8 +87,10 @@ def admissible(robot: Robot, path: str, value: float) -> float | None:
 
 
 def group_of(parameter: Parameter) -> str | None:
-    """Return the group of a parameter of a joint, a word of `GROUPS`; None if it is not identified."""
+    """Return the group of a parameter of a joint: a word of `GROUPS`, `LINKS`, or None if not identified."""
     place = parameter.path[2:]
+    if place[0] in RESISTANCES:
+        return LINKS if place[-1] != WIDTH else None
     if place[0] != "actuator" or place[-1] in FIXED:
         return None
     if FRICTION in place:
@@ -91,11 +98,19 @@ def group_of(parameter: Parameter) -> str | None:
     return MOTORS if place[1] in OF_MOTORS else SPRINGS
 
 
-def _asked_for(parameter: Parameter, group: str, fit: Sequence[str]) -> bool:
-    if any(fnmatchcase(str(parameter), pattern) for pattern in fit):
+def _words_of(parameter: Parameter, *, rigid: bool) -> set[str]:
+    """Return the words that select a parameter; friction of a rigid joint is that of its motor as well."""
+    group = group_of(parameter)
+    if group is None:
+        return set()
+    return {group, FRICTION} if rigid and parameter.part == FRICTION else {group}
+
+
+def _asked_for(parameter: Parameter, words: set[str], fit: Sequence[str]) -> bool:
+    if words and any(fnmatchcase(str(parameter), pattern) for pattern in fit):
         return True
-    absent = parameter.value == 0 and (group == SPRINGS or parameter.path[-1] == WIDTH)
-    return group in fit and not absent
+    absent = parameter.value == 0 and (words != {FRICTION} or parameter.path[-1] == WIDTH)
+    return not absent and not words.isdisjoint(fit)
 
 
 def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
@@ -112,10 +127,23 @@ def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
             known = word in {str(each) for each in parameters(robot)}
             what = "cannot be identified" if known else "is unknown"
             hint = f"; did you mean {near!r}?" if near else ""
-            expected = f"{', '.join(words)}, or the path of a parameter of motors or springs"
+            expected = f"{', '.join(words)}, or the path of a parameter of motors, springs or friction"
             problems.append(Problem("", 0, f"{word!r} {what}; expected {expected}{hint}"))
     if problems:
         raise InputError(problems)
+
+
+def describe_lack(robot: Robot, joints: Sequence[int], fit: Sequence[str]) -> str:
+    """Return a sentence on recorded joints without any of the requested parameters, and those they have."""
+    kinds: dict[str, dict[str, None]] = {}
+    for each in parameters(robot):
+        if each.joint in joints and (group := group_of(each)) and each.value:
+            kinds.setdefault(group, {})[".".join(each.of_every_joint.split(".")[2:])] = None
+    listed = "; ".join(f"{group}: {', '.join(names)}" for group, names in kinds.items())
+    return (
+        f"the recorded joints have none of the parameters to identify ({', '.join(fit)}); they have {listed}; "
+        "zero terms are identified if their paths are given"
+    )
 
 
 def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
@@ -162,22 +190,43 @@ class MotorSystem(SystemOfEquations):
     Args:
         robot: robot as in its file.
         index: index of the joint.
-        sought: unknown parameters of the actuator; the others keep their values.
+        parts: unknown parameters of the actuator; the others keep their values.
+        base: combinations of the parts that any motion determines; by default each part is one.
+
+    Attributes:
+        sought: first part of each combination, in the order of the unknowns; other parts keep their values.
     """
 
-    def __init__(self, robot: Robot, index: int, sought: Sequence[Parameter] = ()) -> None:
-        self._robot, self._index, self._sought = robot, index, tuple(sought)
-        self.title = robot.joints[index].name
-        self.names = tuple(map(str, sought))
-        self.units = tuple(each.unit for each in sought)
-        self.sums = ("",) * len(self.names)
-        self.before = np.array([each.value for each in sought])
+    def __init__(
+        self,
+        robot: Robot,
+        index: int,
+        parts: Sequence[Parameter] = (),
+        base: BaseParameters | None = None,
+    ) -> None:
+        base = base or BaseParameters(np.arange(len(parts)), np.eye(len(parts)))
+        self._robot, self._index = robot, index
+        self.title, words = robot.joints[index].name, list(map(str, parts))
+        self.sought = tuple(parts[at] for at in base.kept)
+        self.names = tuple(base.names(words))
+        self.units = tuple(each.unit for each in self.sought)
+        self.sums = tuple(
+            base.words(place, words) if self.names[place] != words[at] else ""
+            for place, at in enumerate(base.kept)
+        )
+        self.before = base.of(np.array([each.value for each in parts]))
+        self._of_others = self.before - np.array([each.value for each in self.sought])
+
+    def of_file(self, values: FloatArray) -> FloatArray:
+        """Return the values of `sought` in a file that keeps the other parts, (unknowns,)."""
+        return values - self._of_others
 
     def of_record(self, values: FloatArray, signals: Signals) -> Equations:
         """See `SystemOfEquations.of_record`; only motors with a recorded torque have equations."""
-        index, count = self._index, len(self._sought)
+        index, count = self._index, len(self.sought)
         present = [
-            each._replace(value=float(value)) for each, value in zip(self._sought, values, strict=True)
+            each._replace(value=float(value))
+            for each, value in zip(self.sought, self.of_file(values), strict=True)
         ]
         carrying = apart(seeded(self._robot, present).joints[index]).actuator
         with np.errstate(all="ignore"):  # a step of the search may go too far and is then shortened
@@ -201,13 +250,34 @@ class MotorSystem(SystemOfEquations):
         )
 
     def admissible(self, number: int, value: float) -> float | None:
-        """Return the value if the robot file admits it, else zero; None if it admits neither."""
-        return admissible(self._robot, self.names[number], value)
+        """Return the value if the robot file admits it, else that of zero; None if it admits neither."""
+        of_others = float(self._of_others[number])
+        nearest = admissible(self._robot, str(self.sought[number]), value - of_others)
+        return value if nearest == value - of_others else None if nearest is None else of_others
 
-    def without(self, fixed: dict[int, float]) -> MotorSystem:
-        """See `SystemOfEquations.without`."""
-        robot = self._robot.replace({self.names[number]: value for number, value in fixed.items()})
-        return MotorSystem(robot, self._index, [e for n, e in enumerate(self._sought) if n not in fixed])
+
+def values_of_sums(found: Solution) -> dict[str, float]:
+    """Return values of parameters of the file, by path, with the sums found for a joint's motors.
+
+    The first parameter of a sum changes, the others keep their values. Of parameters that the recordings do
+    not distinguish, all keep them if their sum agrees with the file, or if no admissible values have it.
+    """
+    system, best = found.system, found.predicting
+    assert isinstance(system, MotorSystem), "of motors"
+    errors = dict(zip(found.free, found.fit.standard_errors, strict=True))
+    sums = [[number] for number, words in enumerate(system.sums) if words and np.isfinite(errors.get(number, 0.0))]
+    for each in found.fit.inseparable:
+        numbers = [found.free[at] for at, _ in each.terms]
+        of_file = sum(factor * system.before[found.free[at]] for at, factor in each.terms)
+        if abs(each.value - of_file) > CERTAIN * each.standard_error:
+            sums.append(numbers)
+    values = system.of_file(best)
+    return {
+        str(system.sought[number]): float(values[number])
+        for numbers in sums
+        if all(system.admissible(each, float(best[each])) == best[each] for each in numbers)
+        for number in numbers
+    }
 
 
 def motor_systems(
@@ -228,6 +298,7 @@ def motor_systems(
     """
     for index in joints:
         sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()
+        sought = tuple(each for each in sought if group_of(each) != LINKS)
         if not sought:
             continue
         system = MotorSystem(robot, index, sought)
@@ -235,4 +306,39 @@ def motor_systems(
         acts = np.any(np.concatenate(slopes) != 0, axis=0)
         left = [each for each, does in zip(sought, acts, strict=True) if does or group_of(each) != SPRINGS]
         if left:
-            yield MotorSystem(robot, index, left)
+            yield MotorSystem(robot, index, left, _combinations(robot, index, left, records))
+
+
+NEARBY = 0.1
+"""Random change of recorded deflections, relative to each, at which parameters that no motion distinguishes
+are found: deflections at constant stiffness would hide that others distinguish them."""
+
+SAMPLES = 100
+"""Number of random motions of a joint at which they are found, more than an actuator has parameters."""
+
+
+def _combinations(
+    robot: Robot, index: int, parts: Sequence[Parameter], records: Sequence[Signals]
+) -> BaseParameters | None:
+    """Return the combinations of parameters that motor torques of any motion determine; None if unknown."""
+    random = np.random.default_rng(0)
+    recorded = [_arrays(each, index) for each in records]
+    q, phi = (np.concatenate([each[name] for each in recorded], axis=-1) for name in ("q", "phi"))
+    chosen = random.integers(len(q), size=SAMPLES)
+    q, phi = q[chosen], phi[:, chosen] * (1 + NEARBY * random.uniform(-1, 1, (SIDES, SAMPLES)))
+    speeds = random.uniform(-1, 1, (SIDES, SAMPLES)) * np.geomspace(1, 1e-4, SAMPLES)  # of all sizes
+    motion = {
+        "q": q,
+        "phi": phi,
+        "theta": q + phi,
+        "dtheta": speeds,
+        "ddtheta": random.uniform(-1, 1, (SIDES, SAMPLES)),
+    }
+    carrying = apart(seeded(robot, parts).joints[index]).actuator
+    with np.errstate(all="ignore"):  # a deflection nearby may be out of reach
+        torques = predicted_torques(carrying, {name: Dual(each, {}) for name, each in motion.items()})
+    columns = tangent_of(torques, len(parts), np.shape(value_of(torques))).reshape(len(parts), -1).T
+    columns = columns[np.isfinite(columns).all(axis=1)]
+    if len(columns) < len(parts) or not columns.any(axis=0).all():
+        return None
+    return BaseParameters.of_columns(columns, np.arange(len(parts)))

@@ -24,13 +24,12 @@ from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import parameters
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import SEPARABLE, Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.identification_text import significant
 from vsacli.studies.identification.independence import independence
-from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
+from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP
 from vsacli.studies.identification.motor_equations import MotorSystem, group_of, motor_names
 from vsacli.studies.identification.recorded_columns import MOTOR, POSITION, TORQUE
@@ -311,7 +310,7 @@ def gains(
     by_links = _by_links(robot, joints, motors, signals)
     found = {each.system.title: each for each in motors}
     return [
-        _said(found[name], factor, by_links.get(name), rotor=_rotor_differs(robot, found[name]))
+        _said(found[name], factor, by_links.get(name), rotor=_rotor_differs(found[name]))
         for name, factor in factors.items()
     ]
 
@@ -353,10 +352,10 @@ def _by_links(
     robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
 ) -> dict[str, Factor]:
     """Return the ratio of identified spring torque to that required by the links of the file, by joint."""
-    if without_links(robot, joints, (LINKS,), signals):
-        return {}
     system = link_system(robot, (), motors)
-    count = len(system.base.kept)
+    if without_links(robot, joints, system, signals):
+        return {}
+    count = system.bodies
     equations = [system.equations(system.before, each) for each in signals]
     found = {}
     for each in motors:
@@ -385,14 +384,14 @@ def _of_link(equations: Equations, group: str, base: FloatArray, own: Sequence[i
     )
 
 
-def _rotor_differs(robot: Robot, found: Solution) -> bool:
+def _rotor_differs(found: Solution) -> bool:
     """Return whether any motor parameter differs significantly from the file."""
-    known = {str(each): each for each in parameters(robot)}
+    assert isinstance(found.system, MotorSystem), "of motors"
     return any(
         abs(found.fit.values[at] - found.system.before[number])
         > CERTAIN_FACTOR * found.fit.standard_errors[at]
         for at, number in enumerate(found.free)
-        if found.system.names[number] in known and group_of(known[found.system.names[number]]) == MOTORS_GROUP
+        if group_of(found.system.sought[number]) == MOTORS_GROUP
     )
 
 

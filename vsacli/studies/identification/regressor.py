@@ -41,9 +41,21 @@ TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 def parameters_of(link: Link) -> FloatArray:
     """Return the standard inertial parameters of a link, (10,)."""
-    com = np.array(link.com)
-    about_origin = link.inertia.tensor + link.mass * steiner(com)
-    return np.concatenate(([link.mass], link.mass * com, _entries(about_origin)))
+    return _about_origin(np.array([link.mass, *link.com, *_entries(link.inertia.tensor)]))
+
+
+def _about_origin(of_file: FloatArray) -> FloatArray:
+    """Return the standard parameters, (10,), from mass, center of mass and inertia about it, (10,)."""
+    mass, com = of_file[0], of_file[1:4]
+    return np.concatenate(([mass], mass * com, of_file[4:] + _entries(mass * steiner(com))))
+
+
+def derivatives_by_file(link: Link) -> FloatArray:
+    """Return derivatives of the standard parameters by mass, center of mass and inertia, (10, 10)."""
+    of_file = np.array([link.mass, *link.com, *_entries(link.inertia.tensor)])
+    changes = np.eye(len(SYMBOLS))  # central differences of polynomials of second degree are exact
+    columns = [(_about_origin(of_file + each) - _about_origin(of_file - each)) / 2 for each in changes]
+    return np.stack(columns, axis=1)
 
 
 def link_of(parameters: FloatArray) -> Link:
@@ -192,18 +204,29 @@ regrouped into the previous link."""
 
 
 class BaseParameters(NamedTuple):
-    """Combinations of the standard parameters of all links.
+    """Combinations of parameters that torques distinguish.
 
     Attributes:
-        kept: index of the first standard parameter of each combination, (base,), ascending.
-        shares: factors of all standard parameters in each combination, (base, parameters).
+        kept: index of the first parameter of each combination, (base,), ascending.
+        shares: factors of all parameters in each combination, (base, parameters).
     """
 
     kept: IndexArray
     shares: FloatArray
 
+    @classmethod
+    def of_columns(cls, columns: FloatArray, order: IndexArray) -> BaseParameters:
+        """Return the combinations that the columns of a regressor at random motions distinguish.
+
+        Args:
+            columns: derivatives of the torques by the parameters, (rows, parameters).
+            order: indices of the parameters in the order in which they are kept.
+        """
+        kept: IndexArray = np.sort(order[first_independent(columns[:, order], STRUCTURAL)])
+        return cls(kept, shares_of(columns[:, kept], columns, STRUCTURAL))
+
     def of(self, parameters: FloatArray) -> FloatArray:
-        """Return base parameters, (..., base), from standard parameters, (..., parameters)."""
+        """Return the combinations, (..., base), of the parameters, (..., parameters)."""
         values: FloatArray = parameters @ self.shares.T
         return values
 
@@ -219,12 +242,19 @@ class BaseParameters(NamedTuple):
         return in_words([(first, 1.0), *others], names)
 
 
+def random_motion(joints: int) -> FloatArray:
+    """Return random samples of q, q' and q'', (3, samples, joints)."""
+    return np.random.default_rng(SEED).uniform(-np.pi, np.pi, (3, SAMPLES_A_LINK * joints, joints))
+
+
+def preferred_order(joints: int) -> IndexArray:
+    """Return the indices of the parameters of all links in the order in which they are kept."""
+    links = len(SYMBOLS) * np.arange(joints)[:, None]
+    return np.asarray((links + [SYMBOLS.index(symbol) for symbol in PREFERRED]).ravel())
+
+
 def base_parameters(robot: Robot) -> BaseParameters:
     """Return the base parameters of a robot's links."""
     joints = len(robot.joints)
-    q, dq, ddq = np.random.default_rng(SEED).uniform(-np.pi, np.pi, (3, SAMPLES_A_LINK * joints, joints))
-    columns = np.moveaxis(regressor(robot, q, dq, ddq), 1, -1).reshape(-1, len(SYMBOLS) * joints)
-    links = len(SYMBOLS) * np.arange(joints)[:, None]
-    order = (links + [SYMBOLS.index(symbol) for symbol in PREFERRED]).ravel()
-    kept: IndexArray = np.sort(order[first_independent(columns[:, order], STRUCTURAL)])
-    return BaseParameters(kept, shares_of(columns[:, kept], columns, STRUCTURAL))
+    columns = np.moveaxis(regressor(robot, *random_motion(joints)), 1, -1)
+    return BaseParameters.of_columns(columns.reshape(-1, len(SYMBOLS) * joints), preferred_order(joints))

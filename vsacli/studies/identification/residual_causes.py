@@ -18,8 +18,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.link_equations import LINKS
-from vsacli.studies.identification.motor_equations import motor_names
+from vsacli.studies.identification.motor_equations import LINKS, motor_names
 from vsacli.studies.identification.recorded_columns import MOTOR, TORQUE
 
 STEP = 1e-4
