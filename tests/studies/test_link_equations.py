@@ -32,8 +32,8 @@ def test_equations_of_links_hold_and_their_slopes_are_derivatives(robot: str) ->
     found = system.of_record(system.before, signals)
     assert set(found.group) == {f"link of {joint.name}" for joint in loaded.joints}
     assert found.predicted == pytest.approx(found.measured, abs=1e-12 * np.abs(found.measured).max())
-    for place, number in enumerate(system.sought, len(system.base.kept)):
-        step = 0.1 * number.value or 1.0  # they are linear, so that it may be large
+    for place in range(system.bodies, len(system.names)):
+        step = 0.1 * system.before[place] or 1.0  # they are linear, so that it may be large
         other = system.of_record(system.before + step * np.eye(len(system.before))[place], signals)
         slope = (other.predicted - found.predicted) / step
         size = np.abs(found.predicted).max() / step

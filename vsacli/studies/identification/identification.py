@@ -65,6 +65,7 @@ from vsacli.studies.identification.recording_checks import (
     without_delay,
 )
 from vsacli.studies.identification.recordings import Record, check_distinct, complete_joints, read_record
+from vsacli.studies.identification.torque_deviations import torque_deviations
 
 WORDS = (*GROUPS, LINKS)
 """Names of the groups of parameters."""
@@ -133,6 +134,7 @@ def identify(
     of_sums = {} if links is None else dict(links.parts)
     for each in found:
         of_sums |= values_of_sums(each) if each.system.title != LINKS else {}
+    fitted = _fitted(robot, sought, reports, links, of_sums)
     used = tuple(map(_used, records, signals, delays, doubts))
     far = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
@@ -147,7 +149,8 @@ def identify(
             *(sentence for each in explained for sentence in each.sentences),
             *(each.sentence for each in of_gains),
         ),
-        fitted=_fitted(robot, sought, reports, links, of_sums),
+        fitted=fitted,
+        deviations=torque_deviations(fitted, found, signals),
         torques=tuple(torques(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )

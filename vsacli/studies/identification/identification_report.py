@@ -27,13 +27,20 @@ from vsacli.studies.identification.identification_text import (
     NOT_PHYSICAL,
     counts,
     definitions,
+    deviation_rows,
     findings,
     parameter_rows,
     residual_rows,
     significant,
     use_line,
 )
-from vsacli.studies.identification.identified_values import Number, RecordReport, Residual, SystemReport
+from vsacli.studies.identification.identified_values import (
+    Number,
+    RecordReport,
+    Residual,
+    SystemReport,
+    TorqueDeviation,
+)
 from vsacli.studies.identification.motor_equations import motor_names
 from vsacli.studies.identification.recorded_columns import TORQUE
 from vsacli.studies.identification.recordings import Record
@@ -78,6 +85,7 @@ class Identification(Published):
         systems: results, joint by joint, then those of the links.
         notes: further findings, as sentences.
         fitted: robot with the identified parameters.
+        deviations: uncertainty of the torques of the fitted robot, motor by motor; empty if unknown.
         torques: measured and predicted torques for figures; not in JSON.
         sources: files of the robot and the recordings, as read; not in JSON.
     """
@@ -88,11 +96,12 @@ class Identification(Published):
     systems: tuple[SystemReport, ...]
     notes: tuple[str, ...]
     fitted: Robot = field(repr=False)
+    deviations: tuple[TorqueDeviation, ...] = ()
     torques: tuple[Torques, ...] = field(repr=False, default=())
     sources: tuple[Source, ...] = field(repr=False, default=())
 
     format: ClassVar[str] = "vsacli-identification/2"
-    shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "notes")}
+    shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "deviations", "notes")}
 
     @property
     def numbers(self) -> tuple[Number, ...]:
@@ -117,7 +126,11 @@ class Identification(Published):
         return ReportText(
             headline(self.verdict, self.title),
             list(findings(self.systems, self.records, self.notes)),
-            [parameter_rows(self.numbers, self.fitted.joint_names), residual_rows(self.systems)],
+            [
+                parameter_rows(self.numbers, self.fitted.joint_names),
+                residual_rows(self.systems),
+                *([deviation_rows(self.deviations)] if self.deviations else []),
+            ],
             lines,
         )
 

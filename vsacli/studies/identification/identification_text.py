@@ -15,6 +15,7 @@ from vsacli.studies.identification.identified_values import (
     Number,
     RecordReport,
     SystemReport,
+    TorqueDeviation,
 )
 
 T = TypeVar("T", bound="Named")
@@ -162,6 +163,14 @@ def residual_rows(systems: Sequence[SystemReport]) -> list[tuple[str, ...]]:
     return rows
 
 
+def deviation_rows(deviations: Sequence[TorqueDeviation]) -> list[tuple[str, ...]]:
+    """Return a table of the torques of the fitted robot, the header first."""
+    units = in_header(each.unit for each in deviations)
+    header = ("fitted robot", *(f"{words}\n{units}" for words in ("torque", "+-", "+- elsewhere")))
+    rows = ((each.motor, cell(each.torque), each.deviation, each.elsewhere) for each in deviations)
+    return [header, *((name, torque, *(f"{error:.2g}" for error in errors)) for name, torque, *errors in rows)]
+
+
 def findings(
     systems: Sequence[SystemReport], recordings: Sequence[RecordReport], notes: Sequence[str]
 ) -> Iterator[str]:
@@ -177,8 +186,8 @@ def findings(
             yield f"{note}: {', '.join(paths)}"
     if not all(each.identifiable for each in numbers):
         yield (
-            "unidentifiable parameters keep the values of the file; to plan a motion that identifies more: "
-            "vsacli identify --plan"
+            "unidentifiable parameters keep the values of the file, unless these contradict their sum; to plan "
+            "a motion that identifies more: vsacli identify --plan"
         )
 
 
@@ -188,7 +197,7 @@ def definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
     if verbose:
         yield from sums
     elif sums:
-        yield "* sum of several parameters; with -v its terms are listed"
+        yield "* sum of several parameters: -o writes the nearest ones to the file with it, -v lists its terms"
 
 
 def use_line(record: RecordReport) -> str:

@@ -102,6 +102,28 @@ class Residual(Published):
 
 
 @dataclass(frozen=True)
+class TorqueDeviation(Published):
+    """The uncertainty of a motor's torque that is computed with the fitted robot.
+
+    Standard deviations follow from the covariance of the parameters found.
+
+    Attributes:
+        motor: name of the motor.
+        unit: unit of all values.
+        torque: largest torque along the recordings.
+        deviation: largest standard deviation along the recordings.
+        elsewhere: largest standard deviation with positions, velocities, accelerations and stiffness that
+            were recorded at different times.
+    """
+
+    motor: str
+    unit: str
+    torque: float
+    deviation: float
+    elsewhere: float
+
+
+@dataclass(frozen=True)
 class SystemReport(Published):
     """The results for the parameters of a joint's motors and springs, or of the links.
 

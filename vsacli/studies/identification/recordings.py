@@ -42,7 +42,7 @@ class Record(NamedTuple):
         time: times, (samples,) in s since the first row of the file.
         q: joint positions, (samples, joints); columns without data are NaN.
         theta: motor positions, (samples, joints, 2), NaN without data; the joint position for a motor of a
-            joint without springs, unless its own was recorded.
+            joint without springs.
         tau_motor: motor torques, (samples, joints, 2).
         columns: names in the file, by variable, joint and motor.
         unused: names of columns that were not required.
@@ -72,7 +72,10 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
             prevent a fit.
     """
-    columns, unused, stranger, source = recorded_columns(robot, path, mapping)
+    recorded, unused, stranger, source = recorded_columns(robot, path, mapping)
+    needed = {place for index in range(len(robot.joints)) for place in _needed(robot, index)}
+    columns = [column for column in recorded if column.place in needed] or recorded
+    unused = (*(column.name for column in recorded if column.place not in needed), *unused)
     faults = list(stopping_faults(columns, robot))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)
@@ -85,7 +88,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         variable, joint, motor = column.place
         arrays[variable][:, joint, (motor or 1) - 1] = _on_grid(column, time)
     for index, joint_ in enumerate(robot.joints):
-        if not joint_.actuator.sprung and np.isnan(arrays[MOTOR][:, index, 0]).all():
+        if not joint_.actuator.sprung:
             arrays[MOTOR][:, index, 0] = arrays[POSITION][:, index, 0]
     return Record(
         path=str(path),

@@ -243,27 +243,35 @@ class SensitivityRun:
         most = BLOCK_SLOPES // (len(self.parameters) * len(self.robot.joints))
         steps = max(1, min(BLOCK_SAMPLES, most))
         for start in range(0, self.trajectory.samples, steps):
-            yield self._derivatives(self.trajectory.block(start, start + steps))
+            motion = self.trajectory.block(start, start + steps)
+            yield derivatives_of(self.robot, motion, self.parameters)
 
-    def _derivatives(self, motion: Motion) -> Derivatives:
-        block, joints = compute_block(self.robot, motion), range(len(self.robot.joints))
-        groups, by_torques = [], []
-        for index in joints:
-            own = [place for place, each in enumerate(self.parameters) if _drives(each, index)]
-            command = command_of(index, block.arrays())
-            derived = drive_derivatives(self.robot, index, command, [self.parameters[at] for at in own])
-            by_torques.append(derived.by_torques)
-            known = Known(derived.by_numbers)
-            groups.append(Group(own, [known if joint == index else None for joint in joints]))
-        of_links = [place for place, each in enumerate(self.parameters) if each.part != ACTUATOR]
-        chosen = [self.parameters[at] for at in of_links]
-        for places, of_torques in torque_slopes(self.robot, motion, chosen):
-            of_joints = [
-                None if each is None else Chained(each, slopes)
-                for each, slopes in zip(of_torques, by_torques, strict=True)
-            ]
-            groups.append(Group([of_links[at] for at in places], of_joints))
-        return Derivatives(block, len(self.parameters), groups)
+
+def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> Derivatives:
+    """Differentiate a block of samples by parameters of the robot.
+
+    Args:
+        robot: robot that executes the motion.
+        motion: samples of the motion, which fits the robot.
+        chosen: parameters in the order of the derivatives.
+    """
+    block, joints = compute_block(robot, motion), range(len(robot.joints))
+    groups, by_torques = [], []
+    for index in joints:
+        own = [place for place, each in enumerate(chosen) if _drives(each, index)]
+        command = command_of(index, block.arrays())
+        derived = drive_derivatives(robot, index, command, [chosen[at] for at in own])
+        by_torques.append(derived.by_torques)
+        known = Known(derived.by_numbers)
+        groups.append(Group(own, [known if joint == index else None for joint in joints]))
+    of_links = [place for place, each in enumerate(chosen) if each.part != ACTUATOR]
+    for places, of_torques in torque_slopes(robot, motion, [chosen[at] for at in of_links]):
+        of_joints = [
+            None if each is None else Chained(each, slopes)
+            for each, slopes in zip(of_torques, by_torques, strict=True)
+        ]
+        groups.append(Group([of_links[at] for at in places], of_joints))
+    return Derivatives(block, len(chosen), groups)
 
 
 def _drives(parameter: Parameter, joint: int) -> bool:
