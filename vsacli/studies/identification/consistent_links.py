@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.robot.joint import Link
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
@@ -80,6 +80,12 @@ class LinkEstimate(NamedTuple):
     covariance: FloatArray
     parts: tuple[Parameter, ...] = ()
 
+    @property
+    def spread(self) -> FloatArray:
+        """Covariance that is not singular for recordings without noise."""
+        errors = SHARP * np.maximum(np.abs(self.values), 1.0)
+        return np.asarray(self.covariance + np.diag(errors**2))
+
 
 class ConsistentLinks(NamedTuple):
     """Physically consistent links.
@@ -112,8 +118,7 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
         return ConsistentLinks((), estimate.values)
     bodies = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
     parts = _Parts.of(estimate, len(bodies))
-    errors = SHARP * np.maximum(np.abs(estimate.values), 1.0)
-    root = np.asarray(np.linalg.cholesky(estimate.covariance + np.diag(errors**2)), dtype=np.float64)
+    root = np.asarray(np.linalg.cholesky(estimate.spread), dtype=np.float64)
     problem = _Problem.of(estimate, root, bodies, parts)
     of_links, of_parts = _nearest(problem, np.concatenate((bodies, parts.reference)))
     found = np.concatenate((of_links.ravel(), of_parts))
@@ -307,19 +312,39 @@ def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
     """
     system = found.system
     assert isinstance(system, LinkSystem), "of links"
-    nearest = consistent_links(robot, _estimate(system, found))
+    estimate, among = _estimate(system, found)
+    nearest = consistent_links(robot, estimate)
+    own = system.base.shares[:, -len(system.parts) :] if system.parts else np.zeros((len(system.names), 0))
     held = {
         str(part): 0.0
         for number, each in found.bound.items()
         if system.sums[number] and each.value != system.before[number]
-        for part, share in zip(system.parts, system.base.shares[number, -len(system.parts) :], strict=True)
+        for part, share in zip(system.parts, own[number], strict=True)
         if share
     }
-    return nearest._replace(parts={**nearest.parts, **held})
+    alone = dict(_alone(system, found, estimate, among, nearest)) if nearest.within and len(among) else {}
+    return nearest._replace(parts={**nearest.parts, **held, **alone})
 
 
-def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
-    """Return the identifiable sums and base parameters of links, with values and covariance.
+def _alone(
+    system: LinkSystem, found: Solution, estimate: LinkEstimate, among: IndexArray, nearest: ConsistentLinks
+) -> Iterator[tuple[str, float]]:
+    """Yield the likeliest values of parameters found alone, by path, where sums are those of the links.
+
+    An offset, say, is hardly distinguished from gravity: with the links of the file, its likeliest value is
+    another one, and the torques remain those found.
+    """
+    change = nearest.off * np.sqrt(np.diagonal(estimate.spread))
+    weights = np.linalg.solve(estimate.spread, change)
+    for at, number in enumerate(found.free):
+        if number >= system.bodies and at not in among and np.isfinite(found.fit.standard_errors[at]):
+            value = float(found.fit.values[at] + found.fit.covariance[at, among] @ weights)
+            if system.admissible(number, value) == value:
+                yield str(system.part(number)), value
+
+
+def _estimate(system: LinkSystem, found: Solution) -> tuple[LinkEstimate, IndexArray]:
+    """Return the identifiable sums and base parameters of links, and their indices among the free ones.
 
     A parameter of the file that was identified alone is none of them.
     """
@@ -332,16 +357,16 @@ def _estimate(system: LinkSystem, found: Solution) -> LinkEstimate:
             row[free[place]] = factor
     shares = rows @ base.shares
     bodies = base.shares.shape[1] - len(system.parts)
-    sums = [row[:bodies].any() or np.count_nonzero(row) > 1 for row in shares]
-    there = np.flatnonzero(sums)
+    there = np.flatnonzero([row[:bodies].any() or np.count_nonzero(row) > 1 for row in shares])
     among = np.array(first, dtype=int)[there]
     inside = np.flatnonzero(shares[there, bodies:].any(axis=0))
-    return LinkEstimate(
+    estimate = LinkEstimate(
         shares=np.hstack((shares[there, :bodies], shares[there, bodies:][:, inside])),
         values=(rows @ found.predicting)[there],
         covariance=fit.covariance[np.ix_(among, among)],
         parts=tuple(system.parts[at] for at in inside),
     )
+    return estimate, among
 
 
 def doubts_of(links: ConsistentLinks) -> Iterator[str]:

@@ -348,6 +348,11 @@ def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
             yield number
 
 
+FINER = 100.0
+"""Ratio of two digits of a standard error to the digits written: errors of parameters go together, and torques
+are determined better than each parameter alone."""
+
+
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     """Return the text of the robot's file with the identified parameters and their standard errors.
 
@@ -364,13 +369,15 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     """
     own, home = text_to_change(robot)
     known = set(map(str, parameters(robot)))
+    written = {str(each): each.value for each in parameters(found.fitted)}
     values: dict[str, Any] = {}
     errors: dict[str, str] = {}
     for number in to_write(robot, found.systems):
         path = _in_text(robot, number.path)
-        value = float(significant(number.value, number.standard_error, math.inf))
+        value = written.get(number.path, number.value)
+        value = float(significant(value, number.standard_error / FINER, math.inf))
         errors[path] = f"{number.standard_error:.2g}"
-        if number.value == number.before:
+        if written.get(number.path, number.value) == number.before:
             continue
         if number.path in known:
             values[path] = value

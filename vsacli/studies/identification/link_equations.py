@@ -129,7 +129,11 @@ class LinkSystem(SystemOfEquations):
         """See `SystemOfEquations.admissible`; combinations with link parameters may have any value."""
         if number < self.bodies:
             return value
-        return admissible(self._robot, str(self.parts[self.base.kept[number] - self._first]), value)
+        return admissible(self._robot, str(self.part(number)), value)
+
+    def part(self, number: int) -> Parameter:
+        """Return the parameter of the file after which an unknown beyond the first `bodies` is named."""
+        return self.parts[self.base.kept[number] - self._first]
 
 
 def link_system(

@@ -152,7 +152,7 @@ def _slopes(
         if isinstance(system, MotorSystem):
             yield slopes[place[str(system.sought[number])]]
         elif isinstance(system, LinkSystem) and number >= system.bodies:
-            yield slopes[place[str(system.parts[system.base.kept[number] - len(SYMBOLS) * len(robot.joints)])]]
+            yield slopes[place[str(system.part(number))]]
         elif isinstance(system, LinkSystem):
             index, symbol = divmod(int(system.base.kept[number]), len(SYMBOLS))
             of_file = slopes[[place[path] for path in _of_link(robot.joint_names[index])]]
