@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from samples.robots import inertia_from_tensor
 
+from samples.robots import inertia_from_tensor
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
@@ -37,7 +37,9 @@ def _joint(kind: str, name: str, rng: np.random.Generator) -> Joint:
         name=name,
         type="revolute",
         dh=DenavitHartenberg(
-            a=rng.uniform(0.1, 0.4), alpha=float(rng.choice([0, np.pi / 2, -np.pi / 2])), d=rng.uniform(0, 0.2)
+            a=rng.uniform(0.1, 0.4),
+            alpha=float(rng.choice([0, np.pi / 2, -np.pi / 2])),
+            d=rng.uniform(0, 0.2),
         ),
         link=_link(rng),
         damping=rng.uniform(0.2, 1),
@@ -68,7 +70,9 @@ def _actuator(kind: str, rng: np.random.Generator) -> Actuator:
         spring = Cubic(k=rng.uniform(300, 500), k_c=rng.uniform(1500, 2500))
         return Antagonistic(motor=(motor, motor), spring=(spring, spring))
     hardening = Cubic(k=rng.uniform(300, 600), k_c=rng.uniform(1500, 3000))
-    return Elastic(motor=motor, spring=hardening if rng.random() < 0.5 else Polynomial(c1=rng.uniform(300, 900)))
+    return Elastic(
+        motor=motor, spring=hardening if rng.random() < 0.5 else Polynomial(c1=rng.uniform(300, 900))
+    )
 
 
 WORDS = {"damping": 0.5, "inertia": 0.5, "coulomb": 0.5, "k": 0.3, "k_c": 0.3, "c1": 0.3}

@@ -39,7 +39,7 @@ def largest_errors(robot: Robot, fitted: Robot, motion: Excitation, seed: int) -
 
 
 def identification_of(seed: int, folder: Path) -> tuple[Identification, FloatArray, FloatArray]:
-    """An arm identified from a noisy recording: errors in stated deviations, along it and in another motion."""
+    """Errors of torques in stated deviations: along the recording of a random arm, and in another motion."""
     rng = np.random.default_rng(seed)
     robot = random_arm(KINDS[seed % 3], 1 + seed // 3 % 3, rng)
     file, motion = misjudged(robot, rng), motion_of(robot, rng)

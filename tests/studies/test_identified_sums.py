@@ -68,7 +68,7 @@ def _record(arm: Robot, moved: Recorded, tmp_path: Path) -> Path:
 
 
 def test_dampings_of_a_rigid_joint_are_found_as_their_sum(
-    vsacli: Command, record: Path, arm: Robot, moved: Recorded
+    vsacli: Command, record: Path, moved: Recorded
 ) -> None:
     text = ARM.replace("damping: 0.5", "damping: 0.3").replace("damping: 1,", "damping: 1.6,")
     Path("file.yaml").write_text(text.replace("inertia: 0.8", "inertia: 1.3").replace("mass: 4", "mass: 3"))
@@ -109,7 +109,9 @@ def test_groups_are_those_of_rigid_joints_as_well(
     assert found.verdict == "ok"
     of_lower = [number for number in found.numbers if number.path.startswith("joints.lower")]
     assert [number.path for number in of_lower] == [f"joints.{path}" for path in paths]
-    truth = dict.fromkeys(paths, 0.0) | dict(zip(paths, (1, 0) if word == "friction" else (0.8, 1), strict=True))
+    truth = dict.fromkeys(paths, 0.0) | dict(
+        zip(paths, (1, 0) if word == "friction" else (0.8, 1), strict=True)
+    )
     for number in of_lower:
         assert abs(number.value - truth[number.path.removeprefix("joints.")]) < 4 * number.standard_error
     assert "links of the file, which are assumed to be exact" in " ".join(found.notes)
@@ -120,7 +122,9 @@ def test_joints_without_the_parameters_are_said_to_have_others(record: Path, tmp
     path.write_text(ARM.replace(", friction: {coulomb: 1, width: 0.05}", ""))
     smooth = load_robot(path)
     had = "links: damping; motors: actuator.motor.inertia, actuator.motor.damping"
-    with pytest.raises(InputError, match=rf"none of the parameters to identify \(friction\); they have {had}"):
+    with pytest.raises(
+        InputError, match=rf"none of the parameters to identify \(friction\); they have {had}"
+    ):
         identify(smooth, record, fit=["friction"])
 
 
@@ -155,7 +159,9 @@ def test_friction_of_two_directions_and_its_offset_are_sums(tmp_path: Path) -> N
     assert friction.coulomb == pytest.approx((2, 3), abs=4 * max(each.standard_error for each in sums))
 
 
-def test_columns_that_the_fit_does_not_use_are_not_judged(arm: Robot, moved: Recorded, tmp_path: Path) -> None:
+def test_columns_that_the_fit_does_not_use_are_not_judged(
+    arm: Robot, moved: Recorded, tmp_path: Path
+) -> None:
     """Motor positions of a rigid joint, here cut off as a commanded one may be."""
     noisy = moved.noisy(seed=1, torque=0.05)
     clipped = noisy.theta.copy()

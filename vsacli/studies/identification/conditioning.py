@@ -158,18 +158,18 @@ def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: flo
     """Return filtered positions and their first two derivatives, without the ends where filters ring."""
     smooth = Filter.low_pass(WIDER * low_pass.bandwidth, rate).smoothed(positions, ends="odd")
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
-    return tuple(each[inside] for each in (smooth, *_derivatives(time, smooth)))
+    return tuple(each[inside] for each in (smooth, *derivatives(time, smooth)))
 
 
-def _derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the first two derivatives of columns, (samples, ...), each of which is all finite or all NaN."""
+def derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the first two derivatives of columns, (samples, ...); those of a column with NaN are all NaN."""
     from scipy.interpolate import make_interp_spline
 
     there = np.isfinite(positions).all(axis=0)
     found = np.full((2, *positions.shape), np.nan)
-    spline = make_interp_spline(time, positions[:, there], k=SMOOTHNESS)
-    for order, derivative in enumerate(found, 1):
-        derivative[:, there] = spline(time, order)
+    if there.any():
+        spline = make_interp_spline(time, positions[:, there], k=SMOOTHNESS)
+        found[:, :, there] = spline(time, 1), spline(time, 2)
     return found[0], found[1]
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.robot.joint import Link
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
@@ -47,6 +47,9 @@ LEAST_MASS = 1e-3
 
 LEAST_RADIUS = 5e-3
 """Radius of gyration of the reference body for a link without inertia, m."""
+
+SIGNED = 10.0
+"""Shift of a parameter of any sign, such as an offset, relative to its size, that makes it a positive one."""
 
 SHARP = 1e-6
 """Lower bound of standard errors, relative to the value or 1, so that exact recordings have a covariance."""
@@ -117,10 +120,10 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     if not len(estimate.values):
         return ConsistentLinks((), estimate.values)
     bodies = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
-    parts = _Parts.of(estimate, len(bodies))
+    parts, shift = _parts_near(estimate, len(bodies))
     root = np.asarray(np.linalg.cholesky(estimate.spread), dtype=np.float64)
-    problem = _Problem.of(estimate, root, bodies, parts)
-    of_links, of_parts = _nearest(problem, np.concatenate((bodies, parts.reference)))
+    problem = _Problem.of(estimate, root, bodies, parts, shift)
+    of_links, of_parts = _nearest(problem, np.concatenate((bodies, parts)))
     found = np.concatenate((of_links.ravel(), of_parts))
     off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
     nearest = ConsistentLinks((), off)
@@ -166,45 +169,19 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
     return parameters
 
 
-class _Parts(NamedTuple):
-    """Further parameters of the file, as the problem sees them.
+def _parts_near(estimate: LinkEstimate, bodies: int) -> tuple[FloatArray, FloatArray]:
+    """Return values near those of the further parameters, and what is added to make them positive, (parts,).
 
-    Attributes:
-        reference: values that they should be near, (parts,).
-        positive: which of them must be positive, (parts,).
-        scale: deviation from the reference that counts like a factor e, (parts,).
+    Positive ones are at least a small share of their sums.
     """
-
-    reference: FloatArray
-    positive: BoolArray
-    scale: FloatArray
-
-    @classmethod
-    def of(cls, estimate: LinkEstimate, bodies: int) -> _Parts:
-        """Return the parameters of an estimate, positive ones at least a small share of their sums."""
-        of_file = np.array([each.value for each in estimate.parts])
-        positive = np.array(["positive" in each.requirement for each in estimate.parts], dtype=bool)
-        shares = np.abs(estimate.shares[:, bodies:])
-        with np.errstate(divide="ignore"):
-            sizes = np.min(np.abs(estimate.values)[:, None] / shares, axis=0, initial=1.0)
-        least = np.maximum(LEAST_MASS * sizes, SHARP)
-        reference = np.where(positive, np.maximum(of_file, least), of_file)
-        return cls(reference, positive, np.maximum(np.abs(reference), least))
-
-    def entropy(self, values: FloatArray) -> float:
-        """Return the relative entropy of positive values, and half the squared deviation of others."""
-        ratio = np.where(self.positive, values, 1.0) / np.where(self.positive, self.reference, 1.0)
-        if np.any(ratio <= 0):
-            return np.inf
-        off = (values - self.reference) / self.scale
-        return float(np.sum(np.where(self.positive, ratio - np.log(ratio), off**2 / 2)))
-
-    def slopes(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the first and second derivatives of the entropy by each value, (parts,)."""
-        inverse = 1 / np.where(self.positive, values, 1.0)
-        off = (values - self.reference) / self.scale**2
-        first = np.where(self.positive, 1 / np.where(self.positive, self.reference, 1.0) - inverse, off)
-        return first, np.where(self.positive, inverse**2, 1 / self.scale**2)
+    of_file = np.array([each.value for each in estimate.parts])
+    with np.errstate(divide="ignore"):
+        sizes = np.abs(estimate.values)[:, None] / np.abs(estimate.shares[:, bodies:])
+    least = np.maximum(LEAST_MASS * np.min(sizes, axis=0, initial=1.0), SHARP)
+    positive = ["positive" in each.requirement for each in estimate.parts]
+    return np.where(positive, np.maximum(of_file, least), of_file), np.where(
+        positive, 0.0, SIGNED * np.maximum(np.abs(of_file), least)
+    )
 
 
 class _Problem(NamedTuple):
@@ -216,17 +193,26 @@ class _Problem(NamedTuple):
             standard errors, the others keep them.
         errors: number of the first directions.
         inverse: inverses of the pseudo-inertias of the reference links, (links, 4, 4).
-        parts: further parameters, after those of the links.
+        shift: values added to the further parameters, which make them positive, (parts,).
+        reference: values that these sums should be near, (parts,).
     """
 
     center: FloatArray
     directions: FloatArray
     errors: int
     inverse: FloatArray
-    parts: _Parts
+    shift: FloatArray
+    reference: FloatArray
 
     @classmethod
-    def of(cls, estimate: LinkEstimate, root: FloatArray, bodies: FloatArray, parts: _Parts) -> _Problem:
+    def of(
+        cls,
+        estimate: LinkEstimate,
+        root: FloatArray,
+        bodies: FloatArray,
+        parts: FloatArray,
+        shift: FloatArray,
+    ) -> _Problem:
         """Return the problem for an estimate; `root` is a square root of its covariance."""
         from scipy.linalg import solve_triangular
 
@@ -235,37 +221,40 @@ class _Problem(NamedTuple):
         to_estimate = q[:, :count]
         center = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
         errors = to_estimate @ solve_triangular(r[:count], root, trans="T")
-        inverse = np.asarray(np.linalg.inv(pseudo_inertia(bodies.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
-        return cls(center, np.hstack((errors, q[:, count:])), count, inverse, parts)
+        inverse = np.asarray(
+            np.linalg.inv(pseudo_inertia(bodies.reshape(-1, len(SYMBOLS)))), dtype=np.float64
+        )
+        return cls(center, np.hstack((errors, q[:, count:])), count, inverse, shift, parts + shift)
 
     def parameters(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the standard parameters at s, (links, 10), and the further ones, (parts,)."""
         x: FloatArray = self.center + self.directions @ s
-        of_links, of_parts = np.split(x, [len(x) - len(self.parts.reference)])
+        of_links, of_parts = np.split(x, [len(x) - len(self.shift)])
         return of_links.reshape(-1, len(SYMBOLS)), of_parts
 
     def value(self, s: FloatArray, weight: float) -> float:
         """Return relative entropy plus half the squared errors over the weight; infinite if inconsistent."""
         of_links, of_parts = self.parameters(s)
-        matrices = pseudo_inertia(of_links)
+        matrices, ratio = pseudo_inertia(of_links), (of_parts + self.shift) / self.reference
         try:
             np.linalg.cholesky(matrices)
         except np.linalg.LinAlgError:
             return np.inf
+        if np.any(ratio <= 0):
+            return np.inf
         entropy = np.einsum("lij,lji->", self.inverse, matrices) - np.linalg.slogdet(matrices)[1].sum()
         errors = s[: self.errors] @ s[: self.errors] / (2 * weight)
-        return float(entropy + errors) + self.parts.entropy(of_parts)
+        return float(entropy + errors + np.sum(ratio - np.log(ratio)))
 
     def slopes(self, s: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
         """Return the gradient and the Hessian of the value."""
         of_links, of_parts = self.parameters(s)
-        inverse = np.linalg.inv(pseudo_inertia(of_links))
-        first, second = self.parts.slopes(of_parts)
+        inverse, of_part = np.linalg.inv(pseudo_inertia(of_links)), 1 / (of_parts + self.shift)
         of_bodies = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
-        gradient = np.concatenate((of_bodies, first))
+        gradient = np.concatenate((of_bodies, 1 / self.reference - of_part))
         moved = np.einsum("lij,pjk->lpik", inverse, _BASIS)
         blocks = np.einsum("lpik,lqki->lpq", moved, moved)
-        hessian = np.diag(np.concatenate((0 * of_bodies, second)))
+        hessian = np.diag(np.concatenate((0 * of_bodies, of_part**2)))
         for link, block in enumerate(blocks):
             place = slice(link * len(SYMBOLS), (link + 1) * len(SYMBOLS))
             hessian[place, place] = block

@@ -48,13 +48,7 @@ class Equations(NamedTuple):
     def restricted(self, free: Sequence[int]) -> Equations:
         """Return the equations with slopes by some of the unknowns, by index."""
         noise, columns = self.noise, list(free)
-        if noise is None:
-            return self._replace(slopes=self.slopes[:, columns])
-
-        def of_free() -> tuple[FloatArray, FloatArray]:
-            of_residual, of_slopes = noise()
-            return of_residual, of_slopes[:, columns]
-
+        of_free = noise and (lambda: (noise()[0], noise()[1][:, columns]))
         return self._replace(slopes=self.slopes[:, columns], noise=of_free)
 
 

@@ -131,9 +131,8 @@ def identify(
             explained = list(_counted(systems, _explanations(robot, found, reports, signals, of_gains)))
         systems.finish()
     links = next((found_links(sought, each) for each in found if each.system.title == LINKS), None)
-    of_sums = {} if links is None else dict(links.parts)
-    for each in found:
-        of_sums |= values_of_sums(each) if each.system.title != LINKS else {}
+    of_motors = (each for each in found if each.system.title != LINKS)
+    of_sums = {path: value for each in of_motors for path, value in values_of_sums(each).items()}
     fitted = _fitted(robot, sought, reports, links, of_sums)
     used = tuple(map(_used, records, signals, delays, doubts))
     far = far_from_file(number for report in reports for number in report.numbers)
@@ -329,7 +328,8 @@ def _fitted(
     links: ConsistentLinks | None,
     of_sums: Mapping[str, float],
 ) -> Robot:
-    fitted = sought.replace({each.path: each.value for each in to_write(robot, systems)} | dict(of_sums))
+    values = {each.path: each.value for each in to_write(robot, systems)} | dict(of_sums)
+    fitted = sought.replace(values | ({} if links is None else dict(links.parts)))
     if links is None or not links.links:
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
@@ -349,8 +349,8 @@ def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
 
 
 FINER = 100.0
-"""Ratio of two digits of a standard error to the digits written: errors of parameters go together, and torques
-are determined better than each parameter alone."""
+"""Ratio of standard errors to those of which two digits are written: errors of parameters go together, and
+torques are determined better than each parameter alone."""
 
 
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
@@ -402,9 +402,9 @@ def _changed_parts(robot: Robot, fitted: Robot, identified: set[str]) -> Iterato
     values = {str(each): each.value for each in parameters(fitted)}
     for each in parameters(robot):
         path = str(each)
-        if each.part != "link" and values.get(path, each.value) != each.value:
-            if (place := _in_text(robot, path)) not in identified:
-                yield place, _rounded(values[path])
+        changed = each.part != "link" and values.get(path, each.value) != each.value
+        if changed and (place := _in_text(robot, path)) not in identified:
+            yield place, _rounded(values[path])
 
 
 def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:

@@ -101,7 +101,10 @@ class Identification(Published):
     sources: tuple[Source, ...] = field(repr=False, default=())
 
     format: ClassVar[str] = "vsacli-identification/2"
-    shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "deviations", "notes")}
+    shape: ClassVar = {
+        "format": "format",
+        **named("robot", "verdict", "records", "systems", "deviations", "notes"),
+    }
 
     @property
     def numbers(self) -> tuple[Number, ...]:

@@ -168,7 +168,10 @@ def deviation_rows(deviations: Sequence[TorqueDeviation]) -> list[tuple[str, ...
     units = in_header(each.unit for each in deviations)
     header = ("fitted robot", *(f"{words}\n{units}" for words in ("torque", "+-", "+- elsewhere")))
     rows = ((each.motor, cell(each.torque), each.deviation, each.elsewhere) for each in deviations)
-    return [header, *((name, torque, *(f"{error:.2g}" for error in errors)) for name, torque, *errors in rows)]
+    return [
+        header,
+        *((name, torque, *(f"{error:.2g}" for error in errors)) for name, torque, *errors in rows),
+    ]
 
 
 def findings(
@@ -186,8 +189,8 @@ def findings(
             yield f"{note}: {', '.join(paths)}"
     if not all(each.identifiable for each in numbers):
         yield (
-            "unidentifiable parameters keep the values of the file, unless these contradict their sum; to plan "
-            "a motion that identifies more: vsacli identify --plan"
+            "unidentifiable parameters keep the values of the file, unless their sum differs; to plan a "
+            "motion that identifies more: vsacli identify --plan"
         )
 
 
@@ -197,7 +200,7 @@ def definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
     if verbose:
         yield from sums
     elif sums:
-        yield "* sum of several parameters: -o writes the nearest ones to the file with it, -v lists its terms"
+        yield "* sum of several parameters; with -v its terms are listed; -o writes terms near the file's"
 
 
 def use_line(record: RecordReport) -> str:

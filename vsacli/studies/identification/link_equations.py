@@ -107,7 +107,9 @@ class LinkSystem(SystemOfEquations):
             resistance, slopes = _resistance(robot, index, joint_motion(signals, index), numbers)
             if np.isfinite(torque).all():
                 together = (torque, weight[index] + resistance, *of_links[index], *slopes[own], *of_springs)
-                found.append((f"link of {robot.joint_names[index]}", signals.filter.applied(np.stack(together).T)))
+                found.append(
+                    (f"link of {robot.joint_names[index]}", signals.filter.applied(np.stack(together).T))
+                )
         together, last = np.concatenate([rows for _, rows in found]), 2 + len(values)
         return Equations(
             measured=together[:, 0],

@@ -140,10 +140,8 @@ def describe_lack(robot: Robot, joints: Sequence[int], fit: Sequence[str]) -> st
         if each.joint in joints and (group := group_of(each)) and each.value:
             kinds.setdefault(group, {})[".".join(each.of_every_joint.split(".")[2:])] = None
     listed = "; ".join(f"{group}: {', '.join(names)}" for group, names in kinds.items())
-    return (
-        f"the recorded joints have none of the parameters to identify ({', '.join(fit)}); they have {listed}; "
-        "zero terms are identified if their paths are given"
-    )
+    lacking = f"the recorded joints have none of the parameters to identify ({', '.join(fit)})"
+    return f"{lacking}; they have {listed}; zero terms are identified if their paths are given"
 
 
 def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
@@ -265,7 +263,9 @@ def values_of_sums(found: Solution) -> dict[str, float]:
     system, best = found.system, found.predicting
     assert isinstance(system, MotorSystem), "of motors"
     errors = dict(zip(found.free, found.fit.standard_errors, strict=True))
-    sums = [[number] for number, words in enumerate(system.sums) if words and np.isfinite(errors.get(number, 0.0))]
+    sums = [
+        [number] for number, words in enumerate(system.sums) if words and np.isfinite(errors.get(number, 0.0))
+    ]
     for each in found.fit.inseparable:
         numbers = [found.free[at] for at, _ in each.terms]
         of_file = sum(factor * system.before[found.free[at]] for at, factor in each.terms)
@@ -297,9 +297,8 @@ def motor_systems(
         records: conditioned recordings.
     """
     for index in joints:
-        sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()
-        sought = tuple(each for each in sought if group_of(each) != LINKS)
-        if not sought:
+        sought = [each for each in unknowns(robot, index, fit) if group_of(each) != LINKS]
+        if not (sought and robot.joints[index].actuator.sprung):
             continue
         system = MotorSystem(robot, index, sought)
         slopes = [system.of_record(system.before, each).slopes for each in records]
@@ -325,20 +324,13 @@ def _combinations(
     recorded = [_arrays(each, index) for each in records]
     q, phi = (np.concatenate([each[name] for each in recorded], axis=-1) for name in ("q", "phi"))
     chosen = random.integers(len(q), size=SAMPLES)
-    q, phi = q[chosen], phi[:, chosen] * (1 + NEARBY * random.uniform(-1, 1, (SIDES, SAMPLES)))
-    speeds = random.uniform(-1, 1, (SIDES, SAMPLES)) * np.geomspace(1, 1e-4, SAMPLES)  # of all sizes
-    motion = {
-        "q": q,
-        "phi": phi,
-        "theta": q + phi,
-        "dtheta": speeds,
-        "ddtheta": random.uniform(-1, 1, (SIDES, SAMPLES)),
-    }
+    phi = phi[:, chosen] * (1 + NEARBY * random.uniform(-1, 1, (SIDES, SAMPLES)))
+    dtheta, ddtheta = random.uniform(-1, 1, (2, SIDES, SAMPLES))
+    dtheta *= np.geomspace(1, 1e-4, SAMPLES)  # of all sizes, as widths of friction are
+    arrays = {"q": q[chosen], "phi": phi, "theta": q[chosen] + phi, "dtheta": dtheta, "ddtheta": ddtheta}
     carrying = apart(seeded(robot, parts).joints[index]).actuator
     with np.errstate(all="ignore"):  # a deflection nearby may be out of reach
-        torques = predicted_torques(carrying, {name: Dual(each, {}) for name, each in motion.items()})
+        torques = predicted_torques(carrying, {name: Dual(each, {}) for name, each in arrays.items()})
     columns = tangent_of(torques, len(parts), np.shape(value_of(torques))).reshape(len(parts), -1).T
     columns = columns[np.isfinite(columns).all(axis=1)]
-    if len(columns) < len(parts) or not columns.any(axis=0).all():
-        return None
-    return BaseParameters.of_columns(columns, np.arange(len(parts)))
+    return BaseParameters.of_columns(columns, np.arange(len(parts))) if columns.any(axis=0).all() else None

@@ -223,7 +223,9 @@ class BaseParameters(NamedTuple):
             order: indices of the parameters in the order in which they are kept.
         """
         kept: IndexArray = np.sort(order[first_independent(columns[:, order], STRUCTURAL)])
-        return cls(kept, shares_of(columns[:, kept], columns, STRUCTURAL))
+        shares = shares_of(columns[:, kept], columns, STRUCTURAL)
+        shares[:, kept] = np.eye(len(kept))  # without rounding
+        return cls(kept, shares)
 
     def of(self, parameters: FloatArray) -> FloatArray:
         """Return the combinations, (..., base), of the parameters, (..., parameters)."""
