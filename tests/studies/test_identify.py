@@ -191,13 +191,15 @@ def test_a_record_counts_once_whatever_its_files_are_called(tmp_path: Path) -> N
 
 @pytest.mark.slow
 def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Path) -> None:
-    """A motor that sets springs may turn far; a rigid joint has no equations but those of links."""
+    """A motor that sets springs may turn far; a rigid joint has its motor in the equations of links."""
     mixed, trajectory = shipped_run("mixed_3r", "mixed_3r")
     run = inverse_dynamics(mixed, trajectory)
     exact = Recorded(run.time, run.q, run.theta, run.tau_motor)
     told = identify(mixed, exact.noisy(seed=7).write(tmp_path / "mixed.csv", mixed), fit=["motors"])
     sprung = [joint.name for joint in mixed.joints if joint.actuator.sprung]
-    assert [system.title for system in told.systems] == sprung
+    assert [system.title for system in told.systems] == [*sprung, "links"]
+    rigid = [joint.name for joint in mixed.joints if not joint.actuator.sprung]
+    assert {number.path.split(".")[1] for number in told.systems[-1].numbers} == set(rigid)
     assert told.verdict in ("ok", "unidentifiable")
     serial, motion = ROBOTS["AwAS"]
     record = excited(serial, motion).noisy(seed=8, torque=0.05).write(tmp_path / "awas.csv", serial)
