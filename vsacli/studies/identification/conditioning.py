@@ -158,10 +158,10 @@ def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: flo
     """Return filtered positions and their first two derivatives, without the ends where filters ring."""
     smooth = Filter.low_pass(WIDER * low_pass.bandwidth, rate).smoothed(positions, ends="odd")
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
-    return tuple(each[inside] for each in (smooth, *derivatives(time, smooth)))
+    return tuple(each[inside] for each in (smooth, *spline_derivatives(time, smooth)))
 
 
-def derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+def spline_derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the first two derivatives of columns, (samples, ...); those of a column with NaN are all NaN."""
     from scipy.interpolate import make_interp_spline
 

@@ -110,17 +110,18 @@ def identify(
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
     signals = [_conditioned(record, bandwidth) for record in records]
-    pushed = [each.path for each in records if LINKS in fit and not set(each.unused).isdisjoint(FORCES)]
-    fit = [word for word in fit if word != LINKS or not pushed]
+    pushed = [each.path for each in records if not set(each.unused).isdisjoint(FORCES)]
+    if LINKS not in fit and all(robot.joints[index].actuator.sprung for index in joints):
+        pushed = []
     sought = with_friction(robot, joints) if FRICTION in fit else robot
-    first = solutions(sought, joints, fit, signals)
-    notes = [*_notes(robot, joints, fit, signals, records), *(f"{path}: {PUSHED}" for path in pushed)]
+    first = solutions(sought, joints, fit, signals, pushed=bool(pushed))
+    notes = list(_notes(robot, joints, fit, signals, records, pushed))
     if not first:
         nothing = describe_lack(robot, joints, fit)
         raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
     delays = [delay(first, each) for each in signals]
     signals, moved = _without_delays(signals, delays)
-    found = solutions(sought, joints, fit, signals) if moved else first
+    found = solutions(sought, joints, fit, signals, pushed=bool(pushed)) if moved else first
     with progress(2 * len(found)) as bar:
         systems = Countdown(bar.update, 2 * len(found))
         reports = tuple(_counted(systems, (system_report(robot, each, signals) for each in found)))
@@ -206,7 +207,12 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
 
 
 def solutions(
-    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
+    robot: Robot,
+    joints: Sequence[int],
+    fit: Sequence[str],
+    signals: Sequence[Signals],
+    *,
+    pushed: bool = False,
 ) -> list[Solution]:
     """Solve for motors joint by joint, then for all links with the torques of their springs.
 
@@ -215,10 +221,11 @@ def solutions(
         joints: indices of the recorded joints.
         fit: see `identify`.
         signals: conditioned recordings.
+        pushed: whether a wrench acts on the end effector, so that links have no equations.
     """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
-    links = link_system(robot, fit, motors, links=LINKS in fit)
-    if not links.names or without_links(robot, joints, links, signals):
+    links = link_system(robot, fit, motors, links=LINKS in fit, joints=joints)
+    if pushed or not links.names or without_links(robot, joints, links, signals):
         return motors
     return [*motors, solution(links, signals)]
 
@@ -266,6 +273,7 @@ def _notes(
     fit: Sequence[str],
     signals: Sequence[Signals],
     records: Sequence[Record],
+    pushed: Sequence[str],
 ) -> Iterator[str]:
     left = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
     damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
@@ -279,15 +287,15 @@ def _notes(
             f"the parameters of {names} are not identified: the torque of the damper parallel to the springs "
             "is unknown"
         )
-    system = link_system(robot, fit, links=LINKS in fit)
-    if not system.names:
+    yield from (f"{path}: {PUSHED}" for path in pushed)
+    system = link_system(robot, fit, links=LINKS in fit, joints=joints)
+    if pushed or not system.names:
         return
     if reason := without_links(robot, joints, system, signals):
         yield reason
-        return
-    if not system.bodies:
+    elif not system.bodies:
         yield "parameters of joints are identified with the links of the file, which are assumed to be exact"
-    if SPRINGS not in fit and any(robot.joints[index].actuator.sprung for index in system.joints):
+    elif SPRINGS not in fit and any(each.sprung for each in robot.actuators):
         yield "links are identified with the springs of the file, which are assumed to be exact"
 
 

@@ -139,7 +139,12 @@ class LinkSystem(SystemOfEquations):
 
 
 def link_system(
-    robot: Robot, fit: Sequence[str], motors: Sequence[Solution] = (), *, links: bool = True
+    robot: Robot,
+    fit: Sequence[str],
+    motors: Sequence[Solution] = (),
+    *,
+    links: bool = True,
+    joints: Sequence[int] | None = None,
 ) -> LinkSystem:
     """Return the system of a robot's links, with damping and friction of its joints.
 
@@ -148,22 +153,23 @@ def link_system(
         fit: words and patterns; those for motors count for rigid joints.
         motors: solutions of motors and springs, which give the torque of springs and its errors.
         links: whether the links are identified, rather than those of the file.
+        joints: indices of the joints with recorded torque; all if None.
     """
     words = [*fit, LINKS] if links else fit
     parts = [
         each
-        for index, joint in enumerate(robot.joints)
+        for index in (range(len(robot.joints)) if joints is None else joints)
         for each in unknowns(robot, index, words)
-        if each.path[-1] != WIDTH and not (joint.actuator.sprung and group_of(each) != LINKS)
+        if each.path[-1] != WIDTH and (group_of(each) == LINKS or not robot.joints[index].actuator.sprung)
     ]
-    return LinkSystem(robot, _combinations(robot, parts, links=links), parts, *_springs(motors))
+    return LinkSystem(robot, _link_combinations(robot, parts, links=links), parts, *_springs(motors))
 
 
 SLOWEST = 1e-4
 """Smallest factor of random velocities, at which friction of one width differs from that of another."""
 
 
-def _combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool) -> BaseParameters:
+def _link_combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool) -> BaseParameters:
     """Return the combinations of link parameters and further ones that torques of any motion determine."""
     joints, first = len(robot.joints), len(SYMBOLS) * len(robot.joints)
     fast = random_motion(joints)

@@ -55,8 +55,11 @@ def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, .
             `joints.elbow.actuator.spring.*`.
     """
     rigid = not robot.joints[index].actuator.sprung
-    of_joint = [each for each in parameters(robot) if each.joint == index]
-    return tuple(each for each in of_joint if _asked_for(each, _words_of(each, rigid=rigid), fit))
+    return tuple(
+        each
+        for each in parameters(robot)
+        if each.joint == index and (group := group_of(each)) and _asked_for(each, group, fit, rigid=rigid)
+    )
 
 
 def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
@@ -98,19 +101,12 @@ def group_of(parameter: Parameter) -> str | None:
     return MOTORS if place[1] in OF_MOTORS else SPRINGS
 
 
-def _words_of(parameter: Parameter, *, rigid: bool) -> set[str]:
-    """Return the words that select a parameter; friction of a rigid joint is that of its motor as well."""
-    group = group_of(parameter)
-    if group is None:
-        return set()
-    return {group, FRICTION} if rigid and parameter.part == FRICTION else {group}
-
-
-def _asked_for(parameter: Parameter, words: set[str], fit: Sequence[str]) -> bool:
-    if words and any(fnmatchcase(str(parameter), pattern) for pattern in fit):
+def _asked_for(parameter: Parameter, group: str, fit: Sequence[str], *, rigid: bool) -> bool:
+    if any(fnmatchcase(str(parameter), pattern) for pattern in fit):
         return True
-    absent = parameter.value == 0 and (words != {FRICTION} or parameter.path[-1] == WIDTH)
-    return not absent and not words.isdisjoint(fit)
+    absent = parameter.value == 0 and (group != FRICTION or parameter.path[-1] == WIDTH)
+    # friction of a rigid joint is that of its motor as well
+    return not absent and (group in fit or (rigid and parameter.part == FRICTION and FRICTION in fit))
 
 
 def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
@@ -305,7 +301,7 @@ def motor_systems(
         acts = np.any(np.concatenate(slopes) != 0, axis=0)
         left = [each for each, does in zip(sought, acts, strict=True) if does or group_of(each) != SPRINGS]
         if left:
-            yield MotorSystem(robot, index, left, _combinations(robot, index, left, records))
+            yield MotorSystem(robot, index, left, _motor_combinations(robot, index, left, records))
 
 
 NEARBY = 0.1
@@ -316,7 +312,7 @@ SAMPLES = 100
 """Number of random motions of a joint at which they are found, more than an actuator has parameters."""
 
 
-def _combinations(
+def _motor_combinations(
     robot: Robot, index: int, parts: Sequence[Parameter], records: Sequence[Signals]
 ) -> BaseParameters | None:
     """Return the combinations of parameters that motor torques of any motion determine; None if unknown."""

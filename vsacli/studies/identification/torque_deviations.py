@@ -17,7 +17,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import value_of
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import JOINTS, parameters
-from vsacli.studies.identification.conditioning import Signals, derivatives
+from vsacli.studies.identification.conditioning import Signals, spline_derivatives
 from vsacli.studies.identification.fitted_system import Solution, SystemOfEquations
 from vsacli.studies.identification.identified_values import TorqueDeviation
 from vsacli.studies.identification.link_equations import LinkSystem
@@ -52,8 +52,8 @@ def torque_deviations(
     if massless or any(joint.damper for joint in robot.joints) or any(np.isnan(e).any() for e in positions):
         return ()
     motions = [_recorded_motion(robot, each) for each in records]
-    torque, deviation = _largest(robot, found, motions)
-    _, elsewhere = _largest(robot, found, map(_recombined, motions))
+    torque, deviation = _largest_deviations(robot, found, motions)
+    _, elsewhere = _largest_deviations(robot, found, map(_recombined, motions))
     return tuple(
         TorqueDeviation(name, VARIABLES[TORQUE].quantity.unit(joint.type), *map(float, of_motor))
         for joint, *of_joint in zip(robot.joints, torque, deviation, elsewhere, strict=True)
@@ -68,8 +68,8 @@ def _recorded_motion(robot: Robot, signals: Signals) -> Motion:
         if STIFFNESS.key in actuator.commanded:
             stiffness[:, index] = value_of(actuator.carried(joint_motion(signals, index)).stiffness)
     of_time = (
-        *(signals.time, signals.q, signals.dq, signals.ddq, *derivatives(signals.time, signals.ddq)),
-        *(stiffness, *derivatives(signals.time, stiffness)),
+        *(signals.time, signals.q, signals.dq, signals.ddq, *spline_derivatives(signals.time, signals.ddq)),
+        *(stiffness, *spline_derivatives(signals.time, stiffness)),
     )
     every = max(1, len(signals.time) // SAMPLES)
     time, q, dq, ddq, d3q, d4q, *of_stiffness = (each[::every] for each in of_time)
@@ -83,7 +83,7 @@ def _recombined(motion: Motion) -> Motion:
     return Motion.of(motion.time, shuffled)
 
 
-def _largest(
+def _largest_deviations(
     robot: Robot, found: Sequence[Solution], motions: Iterable[Motion]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest motor torques and their largest standard deviations, (joints, 2)."""
