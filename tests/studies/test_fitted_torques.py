@@ -74,7 +74,7 @@ def test_torques_of_a_hundred_fitted_arms_are_within_their_deviations(tmp_path: 
     """
     runs = [identification_of(seed, tmp_path) for seed in range(100)]
     determined = [run for run in runs if run[0].verdict == "ok"]
-    assert len(determined) > 85
+    assert len(determined) > 80
     along, elsewhere = (np.concatenate([run[place] for run in determined]) for place in (1, 2))
     for errors in (along, elsewhere):
         assert np.mean(errors < 3) > 0.95

@@ -170,3 +170,18 @@ def test_columns_that_the_fit_does_not_use_are_not_judged(
     found = identify(arm, path, fit=["friction"])
     assert found.verdict == "ok"
     assert set(found.records[0].unused) == {"lower.theta_1", "upper.theta_1"}
+
+
+@pytest.mark.slow
+def test_springs_at_one_stiffness_have_the_combination_found(tmp_path: Path) -> None:
+    """`k` and `k_c` are not distinguished, but the file that contradicts their combination does not stay."""
+    arm = shipped_robot("vsa_3r")
+    joint = dataclasses.replace(arm, joints=arm.joints[:1])
+    motion = Excitation(position=[0], reach=[0.4], stiffness=[1400], swing=[0], duration=12, rate=100)
+    path = excited(joint, motion).noisy(seed=3).write(tmp_path / "record.csv", joint)
+    found = identify(joint.replace("joints.base.actuator.spring.k", 350), path, fit=["springs", "motors"])
+    assert found.verdict == "unidentifiable"
+    spring, truth = (each.joints[0].actuator.spring[0] for each in (found.fitted, joint))
+    deflection = 0.2236  # at 1400 N m/rad of both springs
+    torques = [each.k * deflection + each.k_c * deflection**3 for each in (spring, truth)]
+    assert torques[0] == pytest.approx(torques[1], rel=0.01)  # of the file, 10 % less

@@ -106,10 +106,10 @@ class LinkSystem(SystemOfEquations):
             torque, of_springs = _carried(robot, index, signals, self._springs)
             resistance, slopes = _resistance(robot, index, joint_motion(signals, index), numbers)
             if np.isfinite(torque).all():
-                together = (torque, weight[index] + resistance, *of_links[index], *slopes[own], *of_springs)
-                found.append(
-                    (f"link of {robot.joint_names[index]}", signals.filter.applied(np.stack(together).T))
+                rows = np.stack(
+                    (torque, weight[index] + resistance, *of_links[index], *slopes[own], *of_springs)
                 )
+                found.append((f"link of {robot.joint_names[index]}", signals.filter.applied(rows.T)))
         together, last = np.concatenate([rows for _, rows in found]), 2 + len(values)
         return Equations(
             measured=together[:, 0],
@@ -135,7 +135,7 @@ class LinkSystem(SystemOfEquations):
 
     def part(self, number: int) -> Parameter:
         """Return the parameter of the file after which an unknown beyond the first `bodies` is named."""
-        return self.parts[self.base.kept[number] - self._first]
+        return self.parts[int(self.base.kept[number]) - self._first]
 
 
 def link_system(

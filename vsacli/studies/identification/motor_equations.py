@@ -213,7 +213,7 @@ class MotorSystem(SystemOfEquations):
 
     def of_file(self, values: FloatArray) -> FloatArray:
         """Return the values of `sought` in a file that keeps the other parts, (unknowns,)."""
-        return values - self._of_others
+        return np.asarray(values - self._of_others)
 
     def of_record(self, values: FloatArray, signals: Signals) -> Equations:
         """See `SystemOfEquations.of_record`; only motors with a recorded torque have equations."""
