@@ -128,6 +128,21 @@ def test_joints_without_the_parameters_are_said_to_have_others(record: Path, tmp
         identify(smooth, record, fit=["friction"])
 
 
+def test_missing_positions_are_the_reason_why_rigid_joints_are_not_identified(
+    arm: Robot, record: Path, tmp_path: Path
+) -> None:
+    header, *_ = record.read_text().splitlines()
+    columns = header.split(",")
+    chosen = [columns.index(name) for name in ("time", "lower.q", "lower.tau_motor_1")]
+    path, rows = tmp_path / "part.csv", np.loadtxt(record, delimiter=",", skiprows=1)
+    np.savetxt(path, rows[:, chosen], delimiter=",", header="time,lower.q,lower.tau_motor_1", comments="")
+    reason = (
+        r"nothing can be identified .*rigid joints are not identified, since the positions of upper were not"
+    )
+    with pytest.raises(InputError, match=reason):
+        identify(arm, path, fit=["motors"])
+
+
 def test_damping_that_is_zero_stays_zero_unless_its_path_is_given(arm: Robot, record: Path) -> None:
     start = arm.replace("joints.upper.actuator.motor.damping", 0)
     paths = {number.path for number in identify(arm, record).numbers}

@@ -53,6 +53,7 @@ from vsacli.studies.identification.motor_equations import (
     check_fit,
     describe_lack,
     motor_systems,
+    unknowns,
     values_of_sums,
     with_friction,
 )
@@ -117,7 +118,8 @@ def identify(
     first = solutions(sought, joints, fit, signals, pushed=bool(pushed))
     notes = list(_notes(robot, joints, fit, signals, records, pushed))
     if not first:
-        nothing = describe_lack(robot, joints, fit)
+        wanted = any(unknowns(sought, index, fit) for index in joints)
+        nothing = "nothing can be identified" if wanted else describe_lack(robot, joints, fit)
         raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
     delays = [delay(first, each) for each in signals]
     signals, moved = _without_delays(signals, delays)
