@@ -195,12 +195,12 @@ def findings(
 
 
 def definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
-    """Yield the definitions of base parameters that are sums; unless verbose, only how to see them."""
+    """Yield the definitions of sums if verbose, otherwise how to see them, and which terms are written."""
     sums = [f"{each.path} is {each.sum}" for each in numbers if each.sum not in ("", each.path)]
-    if verbose:
-        yield from sums
-    elif sums:
-        yield "* sum of several parameters; with -v its terms are listed; -o writes terms near the file's"
+    yield from sums if verbose else ()
+    if sums:
+        listed = "" if verbose else "; with -v its terms are listed"
+        yield f"* sum of several parameters{listed}; -o writes terms near the file's"
 
 
 def use_line(record: RecordReport) -> str:
