@@ -33,7 +33,8 @@ def test_minima_between_three_samples(shape: str) -> None:
         return function(times - PLACES[which][:, None])
 
     time = np.array([-1.0, 0.0, 1.0])
-    found = narrowed(brackets(Known(0, time, function(time - PLACES[:, None]))), evaluate)
+    given = brackets(Known(0, time, function(time - PLACES[:, None])))
+    found = narrowed(given, evaluate, np.zeros(len(PLACES)))
     beside = 3 * (shape == "jump")  # whose lower side may show at the next sample
     assert len(found.function) == len(PLACES) - beside
     np.testing.assert_allclose(found.value[:, 1], least, rtol=0, atol=KNOWN * abs(least) + ROUNDING)
@@ -46,7 +47,7 @@ def test_what_is_known_is_not_computed() -> None:
         raise AssertionError
 
     given = Brackets(np.array([0]), np.array([[0.0, 1.0, 2.0]]), np.array([[1.0005, 1.0, 1.0009]]))
-    assert np.array_equal(narrowed(given, evaluate).time, given.time)
+    assert np.array_equal(narrowed(given, evaluate, np.zeros(1)).time, given.time)
 
 
 def test_local_minima_of_rows() -> None:
@@ -55,4 +56,4 @@ def test_local_minima_of_rows() -> None:
     assert list(zip(found.function.tolist(), found.time[:, 1].tolist(), strict=True)) == [
         (0, 2.0), (0, 4.0), (2, 1.0), (2, 3.0),
     ]  # fmt: skip
-    assert not found.unknown[2], "nothing is known of its neighbors"
+    assert not found.unknown(np.zeros(3))[2], "nothing is known of its neighbors"

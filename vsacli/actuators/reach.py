@@ -73,8 +73,7 @@ class LimitCheck(NamedTuple):
 
     def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        allowed = LIMIT_ROUNDING * self._largest + allowance
-        return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
+        return marked(self.flag, self._outside(self.values(of_joint)) > self.tolerance + allowance)
 
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
@@ -94,18 +93,18 @@ class LimitCheck(NamedTuple):
         if self.flag not in LIMITS:
             return 0.0
         width = self.range[1] - self.range[0]
-        return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
+        return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self.largest)
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
         """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
-        clearance: FloatArray = self._outside(self.values(of_joint)) / -(self._largest or 1.0)
+        clearance: FloatArray = self._outside(self.values(of_joint)) / -(self.largest or 1.0)
         return clearance
 
     def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
         """Return the worst excess among samples whose flags, (samples,), have the bit; None without any."""
         values = self.values(of_joint)
         outside = np.nan_to_num(self._outside(values), nan=-np.inf)
-        hit = has(flags, self.flag) & (outside > 0)
+        hit = has(flags, self.flag) & (outside > self.tolerance)
         if not hit.any():
             return None
         step = int(np.where(hit, outside, -np.inf).argmax())
@@ -113,7 +112,12 @@ class LimitCheck(NamedTuple):
         return Excess(int(hit.argmax()), step, value, lower if value < lower else upper, float(outside[step]))
 
     @property
-    def _largest(self) -> float:
+    def tolerance(self) -> float:
+        """Excess that is ignored as rounding, at samples and between them."""
+        return LIMIT_ROUNDING * self.largest
+
+    @property
+    def largest(self) -> float:
         """Largest absolute value of the finite bounds; 0 if there is none."""
         return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
 

@@ -19,12 +19,12 @@ from vsacli.analysis.minima import (
     ROUNDING,
     Brackets,
     Known,
+    Sides,
     bounded_quantities,
     brackets,
-    clearances,
     narrowed,
 )
-from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FloatArray, IndexArray
+from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
@@ -53,7 +53,6 @@ class Minima(NamedTuple):
         joint: Joint of the quantity, by index.
         clearance: Clearance at the minimum.
         step: Nearest sample, by index in the block.
-        crossed: Whether the minimum has more flags than the samples around it.
     """
 
     block: Block
@@ -61,7 +60,6 @@ class Minima(NamedTuple):
     joint: IndexArray
     clearance: FloatArray
     step: IndexArray
-    crossed: BoolArray
 
     def where(self, chosen: BoolArray) -> Minima:
         """Return a selection of the minima."""
@@ -71,8 +69,11 @@ class Minima(NamedTuple):
             self.joint[chosen],
             self.clearance[chosen],
             self.step[chosen],
-            self.crossed[chosen],
         )
+
+    def mark(self, flags: FlagArray) -> None:
+        """Set the flags of the minima in those of the samples, (samples, joints), at the nearest sample."""
+        np.bitwise_or.at(flags, (self.step, self.joint), self.block.flags[:, 0])
 
     def of_joint(self, index: int) -> Block:
         """Return a joint's variables at its minima, in its column; the columns before are views of it."""
@@ -114,9 +115,9 @@ class Between:
         self._joints = len(robot.joints)
         self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
-        self._flagged = np.array([0.0 if quantity.limit else min_margin for quantity in self.quantities])
-        self._lowest = [np.empty(0)] * len(self.quantities)
-        self._least_at_steps = np.full(len(self.quantities), np.inf)
+        self._sides = Sides(self.quantities, min_margin)
+        self._lowest = [np.empty(0)] * len(self._sides.quantity)
+        self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
         self._least_between: dict[int, tuple[float, Worst]] = {}
         self._found: list[Minima] = []
         self._passed = 0
@@ -132,7 +133,7 @@ class Between:
             self._scan()
             self._scans = False
         elif self._looks:
-            steps = block.time, clearances(self.quantities, block)
+            steps = block.time, self._sides.values(block)
             before = self._known
             self._known = Known(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
             ended = self._known.stop == self._trajectory.samples
@@ -147,8 +148,8 @@ class Between:
         """
         return self._passed + samples < self._seen
 
-    def mark(self, block: Block) -> list[Minima]:
-        """Set flags of minima between samples in the next block; return the minima nearest to its samples."""
+    def nearest(self, block: Block) -> list[Minima]:
+        """Return the minima between samples that are nearest to those of the next block."""
         stop, own, later = self._passed + len(block.time), [], []
         for found in self._found:
             inside = found.step < stop
@@ -156,9 +157,6 @@ class Between:
                 own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
             if not inside.all():
                 later.append(found.where(~inside))
-        for found in own:
-            bits = np.where(found.crossed, found.block.flags[:, 0], 0)
-            np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
         self._found, self._passed = later, stop
         return own
 
@@ -174,9 +172,12 @@ class Between:
     def reports(self) -> list[dict[str, Worst]]:
         """Return for each joint the clearances that are lower between the samples than at any of them."""
         reports: list[dict[str, Worst]] = [{} for _ in range(self._joints)]
+        at_steps, sides = np.full(len(self.quantities), np.inf), self._sides
+        every = np.arange(len(sides.quantity))
+        np.minimum.at(at_steps, sides.quantity, sides.clearance(every, self._least_at_steps))
         nearest_last = sorted(self._least_between.items(), reverse=True, key=lambda entry: entry[1][0])
         for number, (clearance, worst) in nearest_last:  # both motors have one kind: the lower one overwrites
-            if clearance < self._least_at_steps[number]:
+            if clearance < at_steps[number]:
                 reports[self._joint[number]][worst.kind] = worst
         return reports
 
@@ -189,69 +190,70 @@ class Between:
         self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
 
     def _search(self, known: Known, steps: Known) -> None:
-        """Find the minima where clearances are known, and keep those lower than the samples around them."""
+        """Find the minima where values are known, and keep those lower than the samples around them.
+
+        Of those that differ from the samples by rounding only, minima with a further flag are kept.
+        """
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
-        given = brackets(known)
-        found = narrowed(self._chosen(given, steps.time), self._evaluated)
-        time, clearance = found.time[:, 1], found.value[:, 1]
+        sides = self._sides
+        found = narrowed(self._chosen(brackets(known), steps.time), self._evaluated, sides.critical)
+        side, time, value = found.function, found.time[:, 1], found.value[:, 1]
         after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
-        at_steps = np.minimum(*(steps.value[found.function, place] for place in (after - 1, after)))
-        noise = np.where(np.isfinite(clearance), KNOWN * np.abs(clearance) + ROUNDING, 0.0)
-        lower = (clearance < at_steps - noise) & (clearance <= NEAR)
-        if lower.any():
+        at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
+        noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
+        lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
+        kept = lower & (sides.clearance(side, value) <= NEAR)
+        kept |= sides.flags_at(side, value) > sides.flags_at(side, at_steps)
+        if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
-            crossed = clearance < self._flagged_below(found.function, at_steps)
-            self._keep(found.where(lower), steps.first + nearest[lower], crossed[lower])
+            self._keep(found.where(kept), steps.first + nearest[kept])
 
     def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
-        """Return the brackets with the lowest minima of each quantity so far that lie between samples.
+        """Return the brackets that may have the lowest minima of each side so far, between samples.
 
         A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
-        middle = given.time[:, 1]
+        middle, side, sides = given.time[:, 1], given.function, self._sides
         at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
-        flagged = self._flagged_below(given.function, given.value[:, 1])
-        counts = np.minimum(NEAR, np.maximum(flagged, self._least_at_steps[given.function]))
+        ahead = np.maximum(sides.next_flag(side, given.value[:, 1]), self._least_at_steps[side])
         with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
-            expected = given.value[:, 1] - given.fall
-        given = given.where((given.unknown | ~at_step) & ~(expected > counts))
+            fall = given.fall
+            expected = given.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
+        near = ~(expected > ahead) & ~(sides.clearance(side, expected) > NEAR)
+        wanted = (given.unknown(sides.critical) | ~at_step) & near
+        given, expected = given.where(wanted), expected[wanted]
         chosen = np.zeros(len(given.function), dtype=bool)
         for number in set(given.function.tolist()):
             own = given.function == number
-            lowest = given.value[own, 1]
-            self._lowest[number] = np.sort(np.append(self._lowest[number], lowest))[:MOST]
-            chosen[own] = lowest <= self._lowest[number][-1]
+            self._lowest[number] = np.sort(np.append(self._lowest[number], expected[own]))[:MOST]
+            chosen[own] = expected[own] <= self._lowest[number][-1]
         return given.where(chosen)
 
-    def _flagged_below(self, quantity: IndexArray, clearance: FloatArray) -> FloatArray:
-        """Return the clearance below which each quantity gets another flag; -inf if it has all."""
-        first = self._flagged[quantity]
-        return np.where(clearance >= first, first, np.where(clearance >= 0, 0.0, -np.inf))
-
-    def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
+    def _keep(self, found: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
+        clearance = self._sides.clearance(found.function, found.value[:, 1])
         for part in self._parts(len(steps)):
-            quantity, time = found.function[part], found.time[part, 1]
+            quantity, time = self._sides.quantity[found.function[part]], found.time[part, 1]
             block, joint = self._judged(self._compute(self._trajectory.at(time))), self._joint[quantity]
             each = np.arange(len(time)), joint, np.newaxis
             own = {name: array[each] for name, array in _of_joints(block).items()}
             own["flags"] &= self._bits[quantity, None]
-            rows = quantity, joint, found.value[part, 1], steps[part], crossed[part]
+            rows = quantity, joint, clearance[part], steps[part]
             self._found.append(Minima(block.replaced(**own), *rows))
 
-    def _evaluated(self, quantity: IndexArray, times: FloatArray) -> FloatArray:
-        """Return the clearances of quantities (n,) at times of their own, (n, times)."""
-        wanted = np.repeat(quantity, times.shape[1])
+    def _evaluated(self, side: IndexArray, times: FloatArray) -> FloatArray:
+        """Return the values of sides (n,) at times of their own, (n, times)."""
+        wanted = np.repeat(side, times.shape[1])
         parts = [
             values[wanted[part], np.arange(values.shape[1])] for part, values in self._computed(times.ravel())
         ]
         return np.concatenate(parts).reshape(times.shape)
 
     def _computed(self, time: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """Yield the clearances of all quantities at any times, in blocks."""
+        """Yield the values of all sides at any times, in blocks."""
         for part in self._parts(len(time)):
             block = self._compute(self._trajectory.at(time[part]))
-            yield part, clearances(self.quantities, block)
+            yield part, self._sides.values(block)
 
     def _parts(self, times: int) -> Iterator[slice]:
         """Yield times in blocks of the usual size."""

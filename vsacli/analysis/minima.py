@@ -1,12 +1,14 @@
-"""Clearances, that is margins and distances to limits, and a search for their minima between samples.
+"""Clearances, that is margins and distances to limits, and a search for minima between samples.
 
-`brackets` finds three consecutive times around each local minimum; `narrowed` evaluates further times between
-them until the minimum is known. `between_samples` applies both to the blocks of a run.
+`Sides` has the functions whose minima count. `brackets` finds three consecutive times around each local
+minimum; `narrowed` evaluates further times between them until the minimum is known. `between_samples` applies
+them to the blocks of a run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +17,7 @@ from vsacli.actuators.reach import LimitCheck, OfJoint, margin, nearer_end
 from vsacli.analysis.joint_report import Worst
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import SINGULAR_MARGIN, Flag
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.variables import Block
 from vsacli.dynamics.limits import limit_checks
@@ -58,6 +60,16 @@ class Bounded(NamedTuple):
         gap = margin(of_joint["stiffness"], of_joint["stiffness_min"], of_joint["stiffness_max"])
         return np.fmax(gap, -np.inf)
 
+    def sides(self, min_margin: float) -> Iterator[Side]:
+        """Yield the sides of the quantity that have a bound; margins below `min_margin` are flagged."""
+        if self.limit is None:
+            yield Side(self, 1.0, 0.0, (SINGULAR_MARGIN, -SINGULAR_MARGIN, -min_margin), 1.0)
+            return
+        for sign, bound in zip((1.0, -1.0), self.limit.range, strict=True):
+            if math.isfinite(bound):
+                tolerances = self.limit.tolerance, math.inf, math.inf
+                yield Side(self, sign, sign * bound, tolerances, self.limit.largest or 1.0)
+
     def at(self, block: Block, step: int) -> Worst:
         """Return a sample of a block for a report: the value, and the nearer bound."""
         of_joint, limit = block.of_joint(self.number), self.limit
@@ -70,6 +82,88 @@ class Bounded(NamedTuple):
             values, ends = limit.values(of_joint), limit.range
         value = float(values[step])
         return Worst(kind, float(block.time[step]), value, nearer_end(value, *map(float, ends)), unit, motor)
+
+
+class Side(NamedTuple):
+    """One side of a bounded quantity: values that should not fall below a bound.
+
+    Attributes:
+        bounded: Quantity.
+        sign: -1 for an upper bound: values are those of the quantity with the other sign.
+        bound: Bound of these values.
+        tolerances: Distances below the bound beyond which each flag is set; infinite without a flag.
+        size: Distance from the bound that is a clearance of 1.
+    """
+
+    bounded: Bounded
+    sign: float
+    bound: float
+    tolerances: tuple[float, float, float]
+    size: float
+
+    def values(self, of_joint: OfJoint) -> FloatArray:
+        """Return the values, (samples,), with missing ones replaced as in `Bounded.clearance`."""
+        limit = self.bounded.limit
+        if limit is None:
+            return self.bounded.clearance(of_joint)
+        return np.fmin(self.sign * limit.values(of_joint), np.inf)
+
+
+class Sides:
+    """The sides of quantities, as functions of time that do not depend on the bounds, except for margins.
+
+    So a peak has the same place and value whatever its limit is, and a tighter limit never finds a lower one.
+
+    Args:
+        quantities: Quantities with bounds.
+        min_margin: Margin that is flagged.
+
+    Attributes:
+        quantity: Index of the quantity of each side, (sides,).
+        critical: Value at which the gravest flag of each side is set, (sides,).
+        size: Distance from the bound that is a clearance of 1, (sides,).
+    """
+
+    def __init__(self, quantities: list[Bounded], min_margin: float) -> None:
+        numbered = [
+            (number, side)
+            for number, quantity in enumerate(quantities)
+            for side in quantity.sides(min_margin)
+        ]
+        self._sides = [side for _, side in numbered]
+        self.quantity = np.array([number for number, _ in numbered], dtype=np.intp)
+        self._bound, self.size = (
+            np.array([getattr(side, name) for side in self._sides]) for name in ("bound", "size")
+        )
+        self._tolerances = np.array([side.tolerances for side in self._sides]).reshape(-1, 3)
+        self.critical = self._bound - self._tolerances[:, 0]
+
+    def values(self, block: Block) -> FloatArray:
+        """Return the values of all sides, (sides, samples)."""
+        of_joints = {
+            number: block.of_joint(number) for number in {side.bounded.number for side in self._sides}
+        }
+        rows = [side.values(of_joints[side.bounded.number]) for side in self._sides]
+        return np.array(rows).reshape(-1, len(block.time))
+
+    def clearance(self, side: IndexArray, value: FloatArray) -> FloatArray:
+        """Return the relative distances of values from the bounds of sides, (n,)."""
+        clearance: FloatArray = (value - self._bound[side]) / self.size[side]
+        return clearance
+
+    def flags_at(self, side: IndexArray, value: FloatArray) -> IndexArray:
+        """Return the number of flags of values, (n,), by the rule of `LimitCheck.flags`."""
+        return np.count_nonzero(self._outside(side, value), axis=1)
+
+    def next_flag(self, side: IndexArray, value: FloatArray) -> FloatArray:
+        """Return the values, (n,), below which sides get another flag; -inf if they have all."""
+        ahead = np.where(self._outside(side, value), np.inf, self._tolerances[side])
+        following: FloatArray = self._bound[side] - ahead.min(axis=1)
+        return following
+
+    def _outside(self, side: IndexArray, value: FloatArray) -> BoolArray:
+        outside: BoolArray = (self._bound[side] - value)[:, None] > self._tolerances[side]
+        return outside
 
 
 def bounded_quantities(robot: Robot) -> list[Bounded]:
@@ -89,10 +183,14 @@ def clearances(quantities: list[Bounded], block: Block) -> FloatArray:
 
 
 KNOWN = 1e-3
-"""Relative accuracy to which a minimum is determined."""
+"""Accuracy to which a minimum is determined, relative to its distance from the value that sets a flag."""
+
+PRECISION = 1e-13
+"""Accuracy to which a minimum is determined at that value, relative to itself: a tenth of what may decide on
+a flag, and more than rounding."""
 
 ROUNDING = 1e-10
-"""Difference that is ignored: a tenth of the singular margin, or of the ignored excess over a limit."""
+"""Clearance by which a minimum without a further flag is below the samples, lest rounding be reported."""
 
 SHARES = np.array([1, 2]) / 3
 """New times in both halves of a bracket, for functions that no parabola describes."""
@@ -176,11 +274,18 @@ class Brackets(NamedTuple):
             )
         return fall
 
-    @property
-    def unknown(self) -> BoolArray:
-        """Whether the minimum may be below the middle by more than `KNOWN`, (n,); not at missing values."""
+    def unknown(self, critical: FloatArray) -> BoolArray:
+        """Return whether each minimum may be below the middle by more than is ignored; not at missing values.
+
+        The answer for a minimum above its critical value holds for lower critical values as well: a looser
+        limit never finds a lower minimum.
+
+        Args:
+            critical: Value of each function at which a flag is set, (functions,).
+        """
         with np.errstate(invalid="ignore"):
-            unknown: BoolArray = self.fall > KNOWN * np.abs(self.value[:, 1]) + ROUNDING
+            ignored = KNOWN * np.abs(self.value[:, 1] - critical[self.function])
+            unknown: BoolArray = self.fall > ignored + PRECISION * np.abs(self.value).max(axis=1)
         return unknown & np.isfinite(self.value).all(axis=1)
 
     @property
@@ -211,15 +316,18 @@ def brackets(known: Known) -> Brackets:
     return Brackets(function, time[around], values[function[:, None], around])
 
 
-def narrowed(given: Brackets, evaluate: Evaluate) -> Brackets:
-    """Return the brackets narrowed until each minimum is known; each round evaluates all of them together."""
+def narrowed(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
+    """Return the brackets narrowed until each minimum is known; each round evaluates all of them together.
+
+    The critical values decide on the number of rounds alone, see `Brackets.unknown`.
+    """
     function, time, value = given.function, given.time.copy(), given.value.copy()
-    open_ = np.flatnonzero(given.unknown)
+    open_ = np.flatnonzero(given.unknown(critical))
     for _ in range(ROUNDS):
         if not open_.size:
             break
         _, time[open_], value[open_] = _round(given._replace(time=time, value=value).where(open_), evaluate)
-        open_ = open_[Brackets(function, time, value).where(open_).unknown]
+        open_ = open_[Brackets(function, time, value).where(open_).unknown(critical)]
     return Brackets(function, time, value)
 
 

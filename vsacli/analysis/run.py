@@ -152,7 +152,9 @@ class Run:
         Returns:
             The block with flags of minima between its samples, standard deviations and motor energy.
         """
-        between = self._between.mark(block)
+        between = self._between.nearest(block)
+        for minima in between:
+            minima.mark(block.flags)
         if self._stop_on_infeasible:
             infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
             self._stopped = bool(infeasible.any())
@@ -161,6 +163,10 @@ class Run:
             block, between = block.taken(slice(last + 1)), [each.where(each.step <= last) for each in between]
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
+            for (
+                minima
+            ) in between:  # again: limits that the samples keep within their uncertainty were cleared
+                minima.mark(block.flags)
         self._samples += len(block.time)
         for minima in between:
             self._between.add(minima)
