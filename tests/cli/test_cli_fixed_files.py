@@ -202,23 +202,21 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
 
 
 @pytest.mark.slow
-def test_what_helps_at_rest_is_said(tmp_path, vsacli):
+def test_the_stiffness_that_helps_is_said(tmp_path, vsacli):
     """A motor too weak for its springs is so at any speed, unless they are softer."""
     robot = robot_with(tmp_path, base=20)
     task = tmp_path / "slow.yaml"
-    task.write_text(FAST.replace("0.45", "4") + "rate: 100\n")
+    slow = FAST.replace("0.45", "4") + "rate: 100\n"
+    task.write_text(slow)
     done = vsacli("check-feasibility", robot, task, "--fixes", "--json")
     (cause,) = json.loads(done.out)["fixes"]["causes"]
     what, helps = cause["text"].rsplit(": ", 1)
     assert what.endswith("at t = 0.000 s, even at rest, above its limit of 20")
     assert helps.startswith("no slower motion helps, a stiffness of at most ")
     value = float(helps.split()[-4])
-    still = FAST.replace("0.45", "1").replace("[90 deg, 45 deg, -60 deg]", "0")
-    for softer, kept in ((0.0, True), (-0.1, False)):  # four digits
-        task.write_text(still.replace("- 850                         # base", f"- {value - softer}"))
-        arm = load_robot(robot)
-        block = compute_block(arm, load_trajectory(task, arm).block(0, 1))
-        assert (block.flags[0, 0] & int(LIMITS) == 0) == kept
+    for stiffness, code in ((value, 0), (value + 0.05, 3)):
+        task.write_text(slow.replace("- 850                         # base", f"- {stiffness}"))
+        assert vsacli("check-feasibility", robot, task).code == code
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Trouble, apart
 from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible, rounded
+from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.studies.search.scans import (
@@ -263,14 +263,13 @@ def causes(task: Task) -> Iterator[tuple[int, Cause]]:
             text = f"{_what(beyond[index])}; {advice}"
             yield index, Cause(joint.name, text, fixable=False)
         else:
-            text, hopeful = _text(acceptance, joint, moving[index], resting[index])
+            text, hopeful = _text(task, index, moving[index], resting[index])
             yield index, Cause(joint.name, text, fixable=hopeful or is_fixable(task, index))
 
 
 def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
-    others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
-    alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
+    alone = _alone(task, index)
     if CombinedSearch(alone, branches=True).possible():
         return True
     with suppress(ImpossibleError):
@@ -281,8 +280,15 @@ def is_fixable(task: Task, index: int) -> bool:
     return False
 
 
-def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> tuple[str, bool]:
+def _alone(task: Task, index: int) -> Task:
+    """Return the task with all other joints ignored."""
+    others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
+    return Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
+
+
+def _text(task: Task, index: int, moving: Load, resting: Load) -> tuple[str, bool]:
     """Return the cause as a clause, and whether it implies that some change helps."""
+    acceptance, joint = task.acceptance, task.acceptance.robot.joints[index]
     at_rest = acceptance.trouble(joint, resting)
     if at_rest is None:
         worst = acceptance.trouble(joint, moving)
@@ -291,14 +297,32 @@ def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> 
         why = "no slower motion helps, and it has no stiffness to choose"
         return f"{_what(at_rest, resting=True)}: {why}", False
     try:
-        offset = smallest_offset(acceptance, joint, resting)
+        smallest_offset(acceptance, joint, resting)
     except ImpossibleError:
         why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
         return f"{_what(at_rest, resting=True)}: {why}", False
-    return (
-        f"{_what(at_rest, resting=True)}: no slower motion helps, {_stiffness(joint, resting, offset)}",
-        True,
-    )
+    return f"{_what(at_rest, resting=True)}: {_constant(task, index, moving)}", True
+
+
+def _constant(task: Task, index: int, moving: Load) -> str:
+    """Return the constant stiffness that fixes a joint, as a run confirms, or the constant addition to it."""
+    alone = _alone(task, index)
+
+    def attempt(rule: Acceptance) -> tuple[float, FloatArray | None]:
+        found = replace(alone, acceptance=rule).constants()
+        return found.constants[index], alone.falls_short(alone.with_constants(found))
+
+    confirmed = False
+    with suppress(ImpossibleError):
+        offset, confirmed = alone.acceptance.confirmed(attempt)
+    if not confirmed:
+        return "neither a slower motion nor another constant stiffness helps alone"
+    joint, asked = task.acceptance.robot.joints[index], moving.command.commanded["stiffness"]
+    if asked.min() == asked.max():
+        does = f"a stiffness of {'at least' if offset > 0 else 'at most'} {asked[0] + offset:.10g}"
+    else:
+        does = f"{'an increase' if offset > 0 else 'a decrease'} of {abs(offset):.10g}"
+    return f"no slower motion helps, {does} {STIFFNESS.unit(joint.type)} does"
 
 
 def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
@@ -331,12 +355,3 @@ def _needed(trouble: Trouble, shown: str) -> str:
     """Return the stiffness that the margin requires, and the end of the attainable range, as a clause."""
     end = "minimum" if trouble.value < trouble.bound else "maximum"
     return f"the {shown} needed for a margin of {100 * trouble.margin:.4g} % ({end} {trouble.attainable:.4g})"
-
-
-def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
-    asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
-    if asked.min() == asked.max():
-        relation = "at least" if offset > 0 else "at most"
-        return f"a stiffness of {relation} {rounded(asked[0] + offset, up=offset > 0)} {unit} does"
-    relation = "an increase" if offset > 0 else "a decrease"
-    return f"{relation} of {rounded(abs(offset), up=True)} {unit} does"

@@ -1,0 +1,111 @@
+"""The constant stiffness that the cause of a joint advises: doing what the sentence says fixes the motion."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from samples.command_line import ROBOT
+from samples.shipped import shipped_robot
+
+from vsacli import load_robot, load_trajectory
+from vsacli.analysis.run import Run
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.fix_search import causes
+from vsacli.studies.search.task import Task
+from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+MIN_MARGIN = 0.01
+ADVICE = re.compile(r"a stiffness of at (least|most) (\S+)")
+
+Motion = Callable[[FloatArray], Trajectory]
+"""A motion with a constant stiffness of each joint, (joints,)."""
+
+
+def random_motion(seed: int) -> tuple[Robot, Motion, FloatArray]:
+    """A robot on a random motion, and a stiffness too low at rest, or too high for its motors (odd seeds)."""
+    rng = np.random.default_rng(seed)
+    robot = shipped_robot(("vsa_3r", "vsa_3r", "rp_2", "vsa_3r")[seed % 4])
+    reach = [0.3 if joint.type == "prismatic" else 1.0 for joint in robot.joints]
+    start, end = (tuple((rng.uniform(-1, 1, len(reach)) * reach).tolist()) for _ in range(2))
+    duration, rate = float(rng.uniform(0.8, 3)), int(rng.integers(50, 400))
+    position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=start, end=end)
+
+    def motion(stiffness: FloatArray) -> Trajectory:
+        level = Constant(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
+        return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
+
+    rest = compute_block(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
+    lowest = rest.stiffness_min[0]
+    if seed % 2 == 0:
+        return robot, motion, np.round(lowest * rng.uniform(0.85, 1.01, len(reach)), 2)
+    stiffness = np.round(1.5 * lowest, 2)
+    torque = np.abs(compute_block(robot, motion(stiffness).at(np.array([0.0]))).tau_motor[0]).max(axis=-1)
+    joints = tuple(map(_weakened, robot.joints, (0.85 * torque).tolist()))
+    return dataclasses.replace(robot, joints=joints), motion, stiffness
+
+
+def _weakened(joint: Joint, max_torque: float) -> Joint:
+    motors = tuple(dataclasses.replace(motor, max_torque=max_torque) for motor in joint.actuator.motor)
+    return dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, motor=motors))
+
+
+def advised(robot: Robot, trajectory: Trajectory) -> Iterator[tuple[int, str]]:
+    """The index of each joint whose cause advises a constant, and the constant as it is printed."""
+    for index, cause in causes(Task(Acceptance(robot, MIN_MARGIN), trajectory)):
+        if match := ADVICE.search(str(cause)):
+            yield index, match[2]
+
+
+def fixed(robot: Robot, trajectory: Trajectory, index: int) -> bool:
+    """Whether a joint has its margin and keeps its limits, at samples and between them."""
+    run = Run(robot, trajectory, min_margin=MIN_MARGIN)
+    for _ in run:
+        pass
+    joint = run.report().joints[index]
+    return joint.margin >= MIN_MARGIN and not any(map(joint.shows, ("infeasible", "singular", "over_limit")))
+
+
+def check(seed: int) -> int:
+    """Follow each advice of a random task; return how many there were."""
+    robot, motion, stiffness = random_motion(seed)
+    followed = list(advised(robot, motion(stiffness)))
+    for index, value in followed:
+        assert not fixed(robot, motion(stiffness), index)
+        changed = stiffness.copy()
+        changed[index] = float(value)
+        assert fixed(robot, motion(changed), index)
+    return len(followed)
+
+
+def test_the_advised_constant_fixes_the_motion(vsacli, own_folder) -> None:
+    """The minimum at rest does not: the motion needs more."""
+    text = """\
+format: vsacli-trajectory/1
+name: quick
+duration: 2
+rate: 200
+position: {type: polynomial, degree: 9, start: 0, end: [0.8, 0.6, 0.5]}
+stiffness: {type: constant, value: [1500, 790, 1500]}
+"""
+    (own_folder / "quick.yaml").write_text(text)
+    robot = load_robot(ROBOT)
+    ((_, value),) = advised(robot, load_trajectory("quick.yaml", robot))
+    for stiffness, verdict in ((value, "nothing to change"), (float(value) - 0.02, "shoulder: stiffness is")):
+        (own_folder / "quick.yaml").write_text(text.replace("790", str(stiffness)))
+        assert verdict in vsacli("check-feasibility", ROBOT, "quick.yaml", "--fixes").out
+
+
+@pytest.mark.slow
+def test_every_advised_constant_of_random_tasks_fixes_the_motion() -> None:
+    assert sum(map(check, range(20))) >= 20
