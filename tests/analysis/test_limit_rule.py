@@ -239,7 +239,9 @@ def test_a_sample_over_its_limit_by_rounding_does_not_hide_a_peak(
     (own_folder / "swinging.yaml").write_text(SWINGING)
     limits = f"joints.elbow.limits={{position: [-3, {bound}]}}"
     outcome = vsacli("check-feasibility", REPOSITORY / "robots/vsa_3r.yaml", "swinging.yaml", "--set", limits)
-    stated = "elbow: position is 0.4243 rad at t = 4.500 s, above its limit of" in outcome.out
+    stated = (
+        "elbow: position is 0.4243 rad at t = 4.500 s, between two samples, above its limit of" in outcome.out
+    )
     assert (outcome.code, stated) == ((3, True) if bound < 0.43 else (0, False))
 
 

@@ -10,11 +10,12 @@ from dataclasses import replace
 import pytest
 
 from vsacli.analysis.derivative_check import SelfCheck
-from vsacli.analysis.joint_report import COUNTED, JointReport, Worst
+from vsacli.analysis.joint_report import COUNTED, JointReport
 from vsacli.analysis.report import Report
 from vsacli.analysis.trouble_text import counts, findings
 from vsacli.base.fitted_text import fitted
 from vsacli.dynamics.energy import JointEnergy
+from vsacli.dynamics.limits import Finding
 
 NAN = math.nan
 
@@ -64,7 +65,7 @@ def report(*joints: JointReport, **changes: object) -> Report:
     return replace(whole, **changes)
 
 
-def troubled(worst: Worst, samples: int = 412, first: float = 3.588, **changes: object) -> JointReport:
+def troubled(worst: Finding, samples: int = 412, first: float = 3.588, **changes: object) -> JointReport:
     """The elbow with one kind of trouble."""
     counted = worst.kind if worst.kind in COUNTED else "over_limit"
     return replace(
@@ -77,7 +78,7 @@ def troubled(worst: Worst, samples: int = 412, first: float = 3.588, **changes: 
 
 
 def too_soft(value: float, bound: float, **changes: object) -> JointReport:
-    return troubled(Worst("infeasible", 4.0, value, bound, "N m/rad"), **changes)
+    return troubled(Finding("infeasible", 4.0, value, bound, "N m/rad"), **changes)
 
 
 def sentence(joint: JointReport) -> str:
@@ -146,7 +147,7 @@ def test_energies_are_summed_only_if_every_joint_has_them():
 
 
 def test_the_first_line_counts_the_joints_that_fail():
-    limit = troubled(Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s"))
+    limit = troubled(Finding("velocity_limit", 1.0, 4.0, 3.0, "rad/s"))
     text = render(report(too_soft(790, 803.1), QUIET, limit))
     expected = "INFEASIBLE  vsa-3r, rest-to-rest: 4001 samples, 4 s; 1 of 3 joints infeasible, 1 over a limit"
     assert text.splitlines()[0] == expected
@@ -161,11 +162,11 @@ def test_nothing_is_counted_without_failures_or_of_one_joint():
 @pytest.mark.parametrize(
     ("worst", "verdict"),
     [
-        (Worst("singular", 1.0, 800.0, 800.0, "N m/rad"), "SINGULAR"),
-        (Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s"), "OVER LIMIT"),
-        (Worst("near_singular", 1.0, 801.0, 800.0, "N m/rad"), "OK"),
+        (Finding("singular", 1.0, 800.0, 800.0, "N m/rad"), "SINGULAR"),
+        (Finding("velocity_limit", 1.0, 4.0, 3.0, "rad/s"), "OVER LIMIT"),
+        (Finding("near_singular", 1.0, 801.0, 800.0, "N m/rad"), "OK"),
     ],
-    ids=lambda value: value.kind if isinstance(value, Worst) else "",
+    ids=lambda value: value.kind if isinstance(value, Finding) else "",
 )
 def test_the_first_line_begins_with_the_verdict(worst, verdict):
     first = render(report(troubled(worst))).splitlines()[0]
@@ -174,10 +175,10 @@ def test_the_first_line_begins_with_the_verdict(worst, verdict):
 
 def test_the_most_critical_finding_comes_first():
     joints = [
-        troubled(Worst("near_singular", 1.0, 801.0, 800.0, "N m/rad")),
-        troubled(Worst("motor_torque_limit", 1.0, 95.0, 90.0, "N m", 1)),
-        troubled(Worst("velocity_limit", 1.0, 4.0, 3.0, "rad/s")),
-        troubled(Worst("singular", 1.0, 800.0, 800.0, "N m/rad")),
+        troubled(Finding("near_singular", 1.0, 801.0, 800.0, "N m/rad")),
+        troubled(Finding("motor_torque_limit", 1.0, 95.0, 90.0, "N m", 1)),
+        troubled(Finding("velocity_limit", 1.0, 4.0, 3.0, "rad/s")),
+        troubled(Finding("singular", 1.0, 800.0, 800.0, "N m/rad")),
         too_soft(790, 803.1),
         too_soft(700, 803.1),
         replace(QUIET, worst={}),
@@ -249,7 +250,7 @@ def test_what_else_would_help_is_said():
 
 
 def test_singular_step_says_what_is_undefined():
-    text = sentence(troubled(Worst("singular", 1.25, 800.0, 800.0, "N m/rad"), samples=1))
+    text = sentence(troubled(Finding("singular", 1.25, 800.0, 800.0, "N m/rad"), samples=1))
     assert text == (
         "elbow: stiffness 800 N m/rad at t = 1.250 s is singular: "
         "motor torques are undefined at the end of the attainable range; increase it (1 sample)"
@@ -257,7 +258,7 @@ def test_singular_step_says_what_is_undefined():
 
 
 def test_near_singular_step_is_a_warning():
-    text = sentence(troubled(Worst("near_singular", 1.25, 800.5, 800.1, "N m/rad")))
+    text = sentence(troubled(Finding("near_singular", 1.25, 800.5, 800.1, "N m/rad")))
     assert text == (
         "elbow: warning: stiffness 800.5 N m/rad at t = 1.250 s is 0.05 % from the singularity, "
         "where motor torques grow without bound (412 samples, from 3.588 s)"
@@ -267,14 +268,14 @@ def test_near_singular_step_is_a_warning():
 @pytest.mark.parametrize(
     ("worst", "said"),
     [
-        (Worst("position_limit", 2.0, 1.7, 1.6, "rad"), "position is 1.7 rad at t = 2.000 s, above its"),
-        (Worst("velocity_limit", 2.0, -4.0, -3.0, "m/s"), "velocity is -4 m/s at t = 2.000 s, below its"),
-        (Worst("stiffness_limit", 2.0, 9.0, 8.0, "N/m"), "stiffness is 9 N/m at t = 2.000 s, above its"),
-        (Worst("deflection_limit", 2.0, 0.3, 0.2, "rad", 1), "deflection of spring 1 is 0.3 rad at"),
-        (Worst("motor_velocity_limit", 2.0, 9.0, 8.0, "rad/s", 2), "joint-side velocity of motor 2 is 9"),
-        (Worst("motor_torque_limit", 2.0, -95.0, -90.0, "N m", 2), "joint-side torque of motor 2 is -95 N m"),
+        (Finding("position_limit", 2.0, 1.7, 1.6, "rad"), "position is 1.7 rad at t = 2.000 s, above its"),
+        (Finding("velocity_limit", 2.0, -4.0, -3.0, "m/s"), "velocity is -4 m/s at t = 2.000 s, below its"),
+        (Finding("stiffness_limit", 2.0, 9.0, 8.0, "N/m"), "stiffness is 9 N/m at t = 2.000 s, above its"),
+        (Finding("deflection_limit", 2.0, 0.3, 0.2, "rad", 1), "deflection of spring 1 is 0.3 rad at"),
+        (Finding("motor_velocity_limit", 2.0, 9.0, 8.0, "rad/s", 2), "joint-side velocity of motor 2 is 9"),
+        (Finding("motor_torque_limit", 2.0, -95.0, -90.0, "N m", 2), "joint-side torque of motor 2 is -95"),
     ],
-    ids=lambda value: value.kind if isinstance(value, Worst) else "",
+    ids=lambda value: value.kind if isinstance(value, Finding) else "",
 )  # fmt: skip
 def test_limit_names_what_leaves_it_and_when(worst, said):
     text = sentence(troubled(worst))
@@ -283,7 +284,7 @@ def test_limit_names_what_leaves_it_and_when(worst, said):
 
 
 def test_times_between_milliseconds_are_told_apart():
-    fast = Worst("infeasible", 1.0000076, 790.0, 803.1, "N m/rad")
+    fast = Finding("infeasible", 1.0000076, 790.0, 803.1, "N m/rad")
     assert "at t = 1.000008 s" in sentence(troubled(fast))
 
 
@@ -381,7 +382,7 @@ def test_a_question_about_an_input_comes_before_what_may_follow_from_it():
 
 
 def test_a_problem_of_the_motors_is_listed_with_its_samples():
-    worst = Worst("not_finite", 1.0, NAN, NAN, "N m")
+    worst = Finding("not_finite", 1.0, NAN, NAN, "N m")
     joints = [troubled(worst, samples=7) for _ in range(5)]
     counted = [replace(each, samples={**each.samples, "infeasible": 7}) for each in joints]
     dated = [replace(each, name=f"j{at}", first_time={"infeasible": 1.0}) for at, each in enumerate(counted)]
@@ -412,17 +413,17 @@ def test_what_lacks_what_every_report_has_is_none(key):
         Report.from_json(content)
 
 
-def many(worst: Worst, samples: list[int]) -> list[JointReport]:
+def many(worst: Finding, samples: list[int]) -> list[JointReport]:
     return [replace(troubled(worst, each), name=f"j{number}") for number, each in enumerate(samples)]
 
 
 def test_four_joints_with_a_problem_have_a_sentence_each():
-    found = list(findings(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [4, 3, 2, 1]), 4001))
+    found = list(findings(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [4, 3, 2, 1]), 4001))
     assert [sentence.partition(":")[0] for sentence in found] == ["j0", "j1", "j2", "j3"]
 
 
 def test_of_many_joints_those_with_most_samples_come_first_and_none_is_left_out():
-    worst = Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad")
+    worst = Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad")
     *full, rest = findings(many(worst, [1, 7, 2, 9, 8, 6, 3]), 4001)
     assert [sentence.partition(":")[0] for sentence in full] == ["j3", "j4", "j1"]
     assert rest == (
@@ -433,7 +434,7 @@ def test_of_many_joints_those_with_most_samples_come_first_and_none_is_left_out(
 
 def test_of_many_limits_those_farthest_exceeded_come_first():
     joints = [
-        replace(troubled(Worst("velocity_limit", 1.0, 3.0 + k, 3.0, "rad/s")), name=f"j{k}")
+        replace(troubled(Finding("velocity_limit", 1.0, 3.0 + k, 3.0, "rad/s")), name=f"j{k}")
         for k in range(1, 6)
     ]
     *full, rest = findings(joints, 4001)
@@ -443,7 +444,7 @@ def test_of_many_limits_those_farthest_exceeded_come_first():
 
 def test_of_many_joints_equal_ones_are_named_together():
     samples = [2, 2, 2, 9, 8, 7, 1, 2, 2]
-    *_, rest = findings(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), samples), 4001)
+    *_, rest = findings(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), samples), 4001)
     assert rest.splitlines() == [
         "also infeasible: j0 to j2, j7, j8 (2 samples, from 3.588 s);",
         "                 j6 (1 sample)",
@@ -451,9 +452,9 @@ def test_of_many_joints_equal_ones_are_named_together():
 
 
 def test_where_sentences_are_many_only_the_worst_joint_of_each_kind_has_one():
-    joints = many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [1, 3, 2, 1])
+    joints = many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [1, 3, 2, 1])
     limits = {
-        f"{name}_limit": Worst(f"{name}_limit", 1.0, 4.0, 3.0, "rad")
+        f"{name}_limit": Finding(f"{name}_limit", 1.0, 4.0, 3.0, "rad")
         for name in ("position", "velocity", "deflection")
     }
     three = [replace(joint, worst={**joint.worst, **limits}) for joint in joints[:3]]
@@ -465,7 +466,7 @@ def test_where_sentences_are_many_only_the_worst_joint_of_each_kind_has_one():
 
 def test_limits_of_both_types_of_joints_keep_their_units():
     units = ("m/s", "rad/s", "m/s", "rad/s", "rad/s")
-    excesses = [Worst("velocity_limit", 1.0, 4.0 + at, 3.0, unit) for at, unit in enumerate(units)]
+    excesses = [Finding("velocity_limit", 1.0, 4.0 + at, 3.0, unit) for at, unit in enumerate(units)]
     *_, rest = findings([replace(troubled(each), name=f"j{at}") for at, each in enumerate(excesses)], 4001)
     assert rest == "also beyond the velocity limit: j0 4 > 3 m/s, j1 5 > 3 rad/s"
 
@@ -483,11 +484,13 @@ def test_the_longest_report_of_seven_joints_fits_on_a_page(warned):
     limits += ["current", "voltage"]
     joints = []
     for at, name in enumerate(LONG_NAMES):
-        worst = {"infeasible": Worst("infeasible", 0.123456, 1234.5 + at, 1603.2 + at, "N m/rad")}
+        worst = {"infeasible": Finding("infeasible", 0.123456, 1234.5 + at, 1603.2 + at, "N m/rad")}
         if warned:
-            worst["near_singular"] = Worst("near_singular", 0.765, 1605.5 + at, 1603.2 + at, "N m/rad")
+            worst["near_singular"] = Finding("near_singular", 0.765, 1605.5 + at, 1603.2 + at, "N m/rad")
         for number, kind in enumerate(f"{limit}_limit" for limit in limits):
-            worst[kind] = Worst(kind, 1.234 + at, -12.345 - at, -0.0123, "N m/rad", 2 if number > 2 else None)
+            worst[kind] = Finding(
+                kind, 1.234 + at, -12.345 - at, -0.0123, "N m/rad", 2 if number > 2 else None
+            )
         joints.append(
             replace(
                 QUIET,

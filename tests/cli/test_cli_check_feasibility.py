@@ -94,7 +94,7 @@ def test_what_lies_between_the_steps_counts(vsacli, tmp_path):
         assert np.isfinite(result.tau_motor).all(), "every step by itself can be done"
     assert shoulder["samples"]["infeasible"] == np.count_nonzero(infeasible) > 0
     assert "at this load; increase it" in (text := vsacli("check-feasibility", *task).out)
-    assert ", between two samples is below the minimum" in text
+    assert ", between two samples, is below the minimum" in text
     stopped = json.loads(vsacli("check-feasibility", *task, "--json", "--stop-on-infeasible").out)
     assert stopped["samples"] == int(infeasible.argmax()) + 1
     assert stopped["verdict"] == "infeasible"

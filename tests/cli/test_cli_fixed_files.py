@@ -189,10 +189,12 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     assert base.startswith("base: stiffness is 850 N m/rad at t = 0.12")
     # statics of the two outer links, with both springs tight, as the report of the arm at rest has it
     assert shoulder.startswith("shoulder: joint-side torque of motor 1 is ")
-    assert "even at rest, above its limit of 2: no slower motion and no constant stiffness helps" in shoulder
+    assert (
+        "even at rest, above its limit of 2 N m: no slower motion and no constant stiffness helps" in shoulder
+    )
     # of the 819.4 N m/rad that gravity asks for at rest, with a margin of 1 %
-    assert ", since with 827.7 N m/rad, the least it may have, joint-side torque of motor 1 is " in shoulder
-    assert shoulder.endswith(" s, above its limit of 2")
+    assert ", since with 827.8 N m/rad, the least it may have, joint-side torque of motor 1 is " in shoulder
+    assert shoulder.endswith(" s, above its limit of 2 N m")
     assert heading.startswith("fixes; with any of them every sample of all joints but shoulder has a margin")
     assert fixes
     trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
@@ -211,7 +213,7 @@ def test_the_stiffness_that_helps_is_said(tmp_path, vsacli):
     done = vsacli("check-feasibility", robot, task, "--fixes", "--json")
     (cause,) = json.loads(done.out)["fixes"]["causes"]
     what, helps = cause["text"].rsplit(": ", 1)
-    assert what.endswith("at t = 0.000 s, even at rest, above its limit of 20")
+    assert what.endswith("at t = 0.000 s, even at rest, above its limit of 20 N m")
     assert helps.startswith("no slower motion helps, a stiffness of at most ")
     value = float(helps.split()[-4])
     for stiffness, code in ((value, 0), (value + 0.05, 3)):

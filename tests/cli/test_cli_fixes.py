@@ -27,8 +27,8 @@ def test_fixes_follow_the_report(vsacli, too_soft):
     )
     assert [cause.partition(":")[0] for cause in causes] == ["base", "shoulder", "elbow"]
     assert causes[0].startswith(
-        "base: stiffness is 790 N m/rad at t = 4.000 s, even at rest, below the 808.1 needed for a margin of "
-        "1 % (minimum 800): no slower motion helps, an increase of 18.0"
+        "base: stiffness is 790 N m/rad at t = 4.000 s, even at rest, below the 808.1 N m/rad needed for a "
+        "margin of 1 % (minimum 800): no slower motion helps, an increase of 18.0"
     )
     assert offset.startswith("2. raise the stiffness of base by 18.0")
     assert profile.startswith("1. reshape the stiffness of base by up to +18.")

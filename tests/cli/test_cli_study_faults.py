@@ -186,7 +186,7 @@ def test_a_full_disk_costs_no_finished_row(
         patch.setattr(journal_module.os, "write", write)
         full = vsacli("study", grid_study)
     assert full.code == 4
-    assert "the disk is full; the 1 rows in it stay" in full.err
+    assert "the disk is full; the row in it stays" in full.err
     assert not Path("study.h5").exists()
     assert vsacli("study", grid_study).err.startswith("1 of 6 runs are in ")
     assert content("study.h5") == content(grid_table)

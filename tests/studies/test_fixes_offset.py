@@ -179,23 +179,23 @@ def test_raised_and_lowered_joints_in_one_sentence():
 def test_corridor_and_stiffness_limit_exclude_each_other():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
     assert reason(robot, rest_to_rest(4.0, (850.0, 790.0, 850.0))) == (
-        "shoulder: stiffness is 790 N m/rad at t = 0.000 s, even at rest, below the 827.7 needed for a "
-        "margin of 1 % (minimum 819.4): no slower motion and no constant stiffness helps, since with "
-        "827.7 N m/rad, the least it may have, stiffness is 827.7 N m/rad at t = 0.000 s, above its limit "
-        "of 820"
+        "shoulder: stiffness is 790 N m/rad at t = 0.000 s, even at rest, below the 827.8 N m/rad needed for "
+        "a margin of 1 % (minimum 819.4): no slower motion and no constant stiffness helps, since with "
+        "827.8 N m/rad, the least it may have, stiffness is 827.7 N m/rad at t = 0.000 s, above its limit "
+        "of 820 N m/rad"
     )
 
 
 @pytest.mark.parametrize(
     ("asked", "change", "what", "limit"),
     [
-        (900.0, {"limits": Limits(stiffness=(0.0, 820.0))}, "stiffness is 900 N m/rad", 820),
-        slow(830.0, {"motor": {"max_torque": 2.0}}, "joint-side torque of motor 1 is 28.", 2),
+        (900.0, {"limits": Limits(stiffness=(0.0, 820.0))}, "stiffness is 900 N m/rad", "820 N m/rad"),
+        slow(830.0, {"motor": {"max_torque": 2.0}}, "joint-side torque of motor 1 is 28.", "2 N m"),
         (
             900.0,
             {"spring": (dataclasses.replace(CUBIC, max_deflection=0.02),) * 2},
             "deflection of spring 1 is 0.1",
-            0.02,
+            "0.02 rad",
         ),
     ],
     ids=["stiffness", "torque", "deflection"],
@@ -207,7 +207,7 @@ def test_the_limit_in_the_way_is_named(asked, change, what, limit):
     assert at_rest.startswith(f"shoulder: {what}")
     assert at_rest.endswith(f", even at rest, above its limit of {limit}")
     # 819.4 N m/rad at rest, of which the margin is 1 %
-    assert softest.startswith("827.7 N m/rad, the least it may have, ")
+    assert softest.startswith("827.8 N m/rad, the least it may have, ")
     assert " at t = " in softest
     assert softest.endswith(f" s, above its limit of {limit}")
 
@@ -217,7 +217,7 @@ def test_the_limit_in_the_way_is_named(asked, change, what, limit):
     [
         (
             Limits(position=(-1.0, 1.0)),
-            "base: position is 1.571 rad at t = 1.000 s, above its limit of 1; "
+            "base: position is 1.571 rad at t = 1.000 s, above its limit of 1 rad: "
             "timing and stiffness have no effect on that: change the path or the limit",
         ),
         (

@@ -230,17 +230,17 @@ def test_deflection_limit_bounds_the_profile_from_above():
 def test_stiffness_limit_below_what_the_load_needs():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
     assert reason(robot, rest_to_rest(4.0, (850.0, 810.0, 850.0))) == (
-        "shoulder: stiffness is 810 N m/rad at t = 0.000 s, even at rest, below the 827.7 needed for a "
-        "margin of 1 % (minimum 819.4): no slower motion and no constant stiffness helps, since with "
-        "827.7 N m/rad, the least it may have, stiffness is 827.7 N m/rad at t = 0.000 s, above its limit "
-        "of 820"
+        "shoulder: stiffness is 810 N m/rad at t = 0.000 s, even at rest, below the 827.8 N m/rad needed for "
+        "a margin of 1 % (minimum 819.4): no slower motion and no constant stiffness helps, since with "
+        "827.8 N m/rad, the least it may have, stiffness is 827.7 N m/rad at t = 0.000 s, above its limit "
+        "of 820 N m/rad"
     )
 
 
 def test_limits_of_the_motion_are_none_of_the_stiffness():
     robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
     assert reason(robot, rest_to_rest(1.0)) == (
-        "base: position is 1.571 rad at t = 1.000 s, above its limit of 1; "
+        "base: position is 1.571 rad at t = 1.000 s, above its limit of 1 rad: "
         "timing and stiffness have no effect on that: change the path or the limit"
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, has, marked
+from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, marked
 from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
@@ -27,24 +27,6 @@ ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
 
 OfJoint = Mapping[str, AnyArray]
 """Variables of one joint by name: (samples,), or (2, samples) for those of its motors."""
-
-
-class Excess(NamedTuple):
-    """The worst excess over a limit.
-
-    Attributes:
-        first: Index of the first sample beyond the limit.
-        step: Index of the worst sample.
-        value: Value of the variable there.
-        bound: Bound that it exceeds.
-        size: Size of the excess.
-    """
-
-    first: int
-    step: int
-    value: float
-    bound: float
-    size: float
 
 
 class LimitCheck(NamedTuple):
@@ -73,7 +55,7 @@ class LimitCheck(NamedTuple):
 
     def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        return marked(self.flag, self._outside(self.values(of_joint)) > self.tolerance + allowance)
+        return marked(self.flag, self.outside(self.values(of_joint)) > self.tolerance + allowance)
 
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
@@ -97,19 +79,8 @@ class LimitCheck(NamedTuple):
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
         """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
-        clearance: FloatArray = self._outside(self.values(of_joint)) / -(self.largest or 1.0)
+        clearance: FloatArray = self.outside(self.values(of_joint)) / -(self.largest or 1.0)
         return clearance
-
-    def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
-        """Return the worst excess among samples whose flags, (samples,), have the bit; None without any."""
-        values = self.values(of_joint)
-        outside = np.nan_to_num(self._outside(values), nan=-np.inf)
-        hit = has(flags, self.flag) & (outside > self.tolerance)
-        if not hit.any():
-            return None
-        step = int(np.where(hit, outside, -np.inf).argmax())
-        value, (lower, upper) = float(values[step]), self.range
-        return Excess(int(hit.argmax()), step, value, lower if value < lower else upper, float(outside[step]))
 
     @property
     def tolerance(self) -> float:
@@ -121,7 +92,7 @@ class LimitCheck(NamedTuple):
         """Largest absolute value of the finite bounds; 0 if there is none."""
         return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
 
-    def _outside(self, values: FloatArray) -> FloatArray:
+    def outside(self, values: FloatArray) -> FloatArray:
         """Return the distance outside the range; zero or negative inside, NaN for NaN."""
         return np.maximum(self.range[0] - values, values - self.range[1])
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.minima import (
     KNOWN,
     ROUNDING,
@@ -27,6 +26,7 @@ from vsacli.analysis.minima import (
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import usual_block
+from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -118,7 +118,7 @@ class Between:
         self._sides = Sides(self.quantities, min_margin)
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
-        self._least_between: dict[int, tuple[float, Worst]] = {}
+        self._least_between: dict[int, tuple[float, Finding]] = {}
         self._found: list[Minima] = []
         self._passed = 0
         looking = not self.notes and bool(self.quantities)
@@ -167,11 +167,12 @@ class Between:
             least = int(own.clearance.argmin())
             clearance = float(own.clearance[least])
             if clearance < self._least_between.get(number, (math.inf,))[0]:
-                self._least_between[number] = clearance, quantity.at(own.of_joint(quantity.number), least)
+                worst = quantity.at(own.of_joint(quantity.number), least, between=True)
+                self._least_between[number] = clearance, worst
 
-    def reports(self) -> list[dict[str, Worst]]:
+    def reports(self) -> list[dict[str, Finding]]:
         """Return for each joint the clearances that are lower between the samples than at any of them."""
-        reports: list[dict[str, Worst]] = [{} for _ in range(self._joints)]
+        reports: list[dict[str, Finding]] = [{} for _ in range(self._joints)]
         at_steps, sides = np.full(len(self.quantities), np.inf), self._sides
         every = np.arange(len(sides.quantity))
         np.minimum.at(at_steps, sides.quantity, sides.clearance(every, self._least_at_steps))
@@ -203,7 +204,7 @@ class Between:
         noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
         lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
         kept = lower & (sides.clearance(side, value) <= NEAR)
-        kept |= sides.flags_at(side, value) > sides.flags_at(side, at_steps)
+        kept |= (sides.beyond(side, value) & ~sides.beyond(side, at_steps)).any(axis=1)
         if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
             self._keep(found.where(kept), steps.first + nearest[kept])

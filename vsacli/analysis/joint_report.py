@@ -11,6 +11,7 @@ from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import Stop
+from vsacli.dynamics.limits import Finding
 
 COUNTED = {
     "infeasible": Flag.INFEASIBLE,
@@ -30,24 +31,6 @@ DETERMINED = 0.1
 
 JUDGED = "tau_motor"
 """Variable that decides whether a recording is sufficient, unless others are requested."""
-
-
-@dataclass(frozen=True)
-class Worst(Stored):
-    """Worst sample of a kind of trouble: time, value and bound.
-
-    `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
-    """
-
-    kind: str
-    time: float
-    value: float
-    bound: float
-    unit: str
-    motor: int | None = None
-
-    key: ClassVar = "kind"
-    shape: ClassVar = {**named("time", "value", "bound", "unit"), "motor?": "motor"}
 
 
 @dataclass(frozen=True)
@@ -98,7 +81,7 @@ class JointUncertainty(Stored):
     variables: dict[str, Spread] = field(default_factory=dict)
     asked: tuple[str, ...] = (JUDGED,)
     samples: dict[str, int] = field(default_factory=dict)
-    limits: dict[str, Worst] = field(default_factory=dict)
+    limits: dict[str, Finding] = field(default_factory=dict)
 
     @property
     def undetermined(self) -> tuple[Spread, ...]:
@@ -146,7 +129,7 @@ class JointReport(Stored):
     actuator: str
     samples: dict[str, int]
     first_time: dict[str, float]
-    worst: dict[str, Worst]
+    worst: dict[str, Finding]
     margin: float
     margin_time: float
     attainable: tuple[float, float]
@@ -163,7 +146,7 @@ class JointReport(Stored):
     end_dtheta: tuple[float, float] = UNKNOWN
     peak_dtheta: tuple[float, float] = UNKNOWN
     uncertainty: JointUncertainty | None = None
-    between: dict[str, Worst] = field(default_factory=dict)
+    between: dict[str, Finding] = field(default_factory=dict)
     dry_friction: tuple[DryFriction, ...] = ()
 
     shape: ClassVar = {

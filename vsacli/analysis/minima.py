@@ -9,26 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint, margin, nearer_end
-from vsacli.analysis.joint_report import Worst
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.variables import Block
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import MARGIN, Finding, limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 REACH = Flag.INFEASIBLE | Flag.SLACK | Flag.SINGULAR | Flag.NEAR_SINGULAR | Flag.NOT_FINITE
 """Bits that concern a stiffness in its attainable range."""
-
-MARGIN = "margin"
-"""Name of the clearance of a stiffness; clearances of limits have the names of their flags."""
 
 
 class Bounded(NamedTuple):
@@ -61,17 +57,23 @@ class Bounded(NamedTuple):
         return np.fmax(gap, -np.inf)
 
     def sides(self, min_margin: float) -> Iterator[Side]:
-        """Yield the sides of the quantity that have a bound; margins below `min_margin` are flagged."""
+        """Yield each side with a bound; margins below `min_margin` are flagged."""
         if self.limit is None:
-            yield Side(self, 1.0, 0.0, (SINGULAR_MARGIN, -SINGULAR_MARGIN, -min_margin), 1.0)
+            yield 1.0, 0.0, 1.0, SINGULAR_MARGIN, -SINGULAR_MARGIN, -min_margin
             return
+        size, tolerance = self.limit.largest or 1.0, self.limit.tolerance
         for sign, bound in zip((1.0, -1.0), self.limit.range, strict=True):
             if math.isfinite(bound):
-                tolerances = self.limit.tolerance, math.inf, math.inf
-                yield Side(self, sign, sign * bound, tolerances, self.limit.largest or 1.0)
+                yield sign, sign * bound, size, tolerance, math.inf, math.inf
 
-    def at(self, block: Block, step: int) -> Worst:
-        """Return a sample of a block for a report: the value, and the nearer bound."""
+    def side(self, of_joint: OfJoint, sign: float) -> FloatArray:
+        """Return the values with a sign, (samples,), with missing ones replaced as in `clearance`."""
+        if self.limit is None:
+            return self.clearance(of_joint)
+        return np.fmin(sign * self.limit.values(of_joint), np.inf)
+
+    def at(self, block: Block, step: int, *, between: bool = False) -> Finding:
+        """Return the value and the nearer bound at a sample of a block, or at an instant between samples."""
         of_joint, limit = block.of_joint(self.number), self.limit
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
@@ -80,33 +82,14 @@ class Bounded(NamedTuple):
         else:
             kind, motor, unit = limit.flag.label, limit.motor, limit.unit(self.joint.type)
             values, ends = limit.values(of_joint), limit.range
-        value = float(values[step])
-        return Worst(kind, float(block.time[step]), value, nearer_end(value, *map(float, ends)), unit, motor)
+        value, time = float(values[step]), float(block.time[step])
+        bound = nearer_end(value, *map(float, ends))
+        return Finding(kind, time, value, bound, unit, motor, self.joint.name, between)
 
 
-class Side(NamedTuple):
-    """One side of a bounded quantity: values that should not fall below a bound.
-
-    Attributes:
-        bounded: Quantity.
-        sign: -1 for an upper bound: values are those of the quantity with the other sign.
-        bound: Bound of these values.
-        tolerances: Distances below the bound beyond which each flag is set; infinite without a flag.
-        size: Distance from the bound that is a clearance of 1.
-    """
-
-    bounded: Bounded
-    sign: float
-    bound: float
-    tolerances: tuple[float, float, float]
-    size: float
-
-    def values(self, of_joint: OfJoint) -> FloatArray:
-        """Return the values, (samples,), with missing ones replaced as in `Bounded.clearance`."""
-        limit = self.bounded.limit
-        if limit is None:
-            return self.bounded.clearance(of_joint)
-        return np.fmin(self.sign * limit.values(of_joint), np.inf)
+Side: TypeAlias = tuple[float, float, float, float, float, float]
+"""One side of a quantity, whose values, times a sign, should not fall below a bound: sign, bound, distance
+from it that is a clearance of 1, and distances below it beyond which flags are set, the gravest first."""
 
 
 class Sides:
@@ -120,30 +103,25 @@ class Sides:
 
     Attributes:
         quantity: Index of the quantity of each side, (sides,).
-        critical: Value at which the gravest flag of each side is set, (sides,).
         size: Distance from the bound that is a clearance of 1, (sides,).
+        critical: Value at which the gravest flag of each side is set, (sides,).
     """
 
     def __init__(self, quantities: list[Bounded], min_margin: float) -> None:
-        numbered = [
-            (number, side)
-            for number, quantity in enumerate(quantities)
-            for side in quantity.sides(min_margin)
-        ]
-        self._sides = [side for _, side in numbered]
-        self.quantity = np.array([number for number, _ in numbered], dtype=np.intp)
-        self._bound, self.size = (
-            np.array([getattr(side, name) for side in self._sides]) for name in ("bound", "size")
-        )
-        self._tolerances = np.array([side.tolerances for side in self._sides]).reshape(-1, 3)
+        sides = [(number, side) for number, each in enumerate(quantities) for side in each.sides(min_margin)]
+        self._quantities = quantities
+        self.quantity = np.array([number for number, _ in sides], dtype=np.intp)
+        table = np.array([side for _, side in sides]).reshape(-1, 6)
+        self._sign, self._bound, self.size = table[:, :3].T
+        self._tolerances = table[:, 3:]
         self.critical = self._bound - self._tolerances[:, 0]
 
     def values(self, block: Block) -> FloatArray:
         """Return the values of all sides, (sides, samples)."""
-        of_joints = {
-            number: block.of_joint(number) for number in {side.bounded.number for side in self._sides}
-        }
-        rows = [side.values(of_joints[side.bounded.number]) for side in self._sides]
+        of_joints = {each.number: block.of_joint(each.number) for each in self._quantities}
+        quantities = (self._quantities[number] for number in self.quantity)
+        signed = zip(quantities, self._sign.tolist(), strict=True)
+        rows = [quantity.side(of_joints[quantity.number], sign) for quantity, sign in signed]
         return np.array(rows).reshape(-1, len(block.time))
 
     def clearance(self, side: IndexArray, value: FloatArray) -> FloatArray:
@@ -151,19 +129,16 @@ class Sides:
         clearance: FloatArray = (value - self._bound[side]) / self.size[side]
         return clearance
 
-    def flags_at(self, side: IndexArray, value: FloatArray) -> IndexArray:
-        """Return the number of flags of values, (n,), by the rule of `LimitCheck.flags`."""
-        return np.count_nonzero(self._outside(side, value), axis=1)
+    def beyond(self, side: IndexArray, value: FloatArray) -> BoolArray:
+        """Return which flags values have, (n, 3), by the rule of `LimitCheck.flags`."""
+        beyond: BoolArray = (self._bound[side] - value)[:, None] > self._tolerances[side]
+        return beyond
 
     def next_flag(self, side: IndexArray, value: FloatArray) -> FloatArray:
         """Return the values, (n,), below which sides get another flag; -inf if they have all."""
-        ahead = np.where(self._outside(side, value), np.inf, self._tolerances[side])
+        ahead = np.where(self.beyond(side, value), np.inf, self._tolerances[side])
         following: FloatArray = self._bound[side] - ahead.min(axis=1)
         return following
-
-    def _outside(self, side: IndexArray, value: FloatArray) -> BoolArray:
-        outside: BoolArray = (self._bound[side] - value)[:, None] > self._tolerances[side]
-        return outside
 
 
 def bounded_quantities(robot: Robot) -> list[Bounded]:

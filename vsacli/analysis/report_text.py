@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.base.texts import counted, together
+from vsacli.base.texts import EXPONENT, counted, significant, together
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
 from vsacli.dynamics.energy import JointEnergy
 
@@ -53,9 +53,6 @@ MOST_APART = 7
 WHOLE = 1e3
 """Number from which on no decimals are shown."""
 
-HUGE = 1e8
-"""Torque or stiffness from which on an exponent is shown, as next to a singular sample."""
-
 RESTING_SHARE = 1e-3
 """Share of its own peak velocity below which a motor counts as resting: recordings of a rest-to-rest motion,
 rounded to four digits or with noise of 1e-4 rad, had 1e-4."""
@@ -82,17 +79,22 @@ def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
         f"attainable\n{stiffness}",
         "margin\n%",
     )
-    return [header, *map(_row, joints)]
+    columns: tuple[Callable[[JointReport], tuple[float, ...]], ...] = (
+        lambda joint: (joint.peak_tau_e, *joint.peak_tau_motor),
+        lambda joint: joint.attainable,
+    )
+    huge = [any(EXPONENT <= value < math.inf for joint in joints for value in of(joint)) for of in columns]
+    return [header, *(_row(joint, *huge) for joint in joints)]
 
 
-def _row(joint: JointReport) -> tuple[str, ...]:
+def _row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, ...]:
     return (
         joint.name,
-        number(joint.peak_tau_e),
-        " / ".join(number(peak) for peak in of_motors(joint, joint.peak_tau_motor)),
+        number(joint.peak_tau_e, huge=huge),
+        " / ".join(number(peak, huge=huge) for peak in of_motors(joint, joint.peak_tau_motor)),
         _span(joint.commanded_min, joint.commanded_max),
         *(
-            (_attainable(*joint.attainable), percent(joint.margin).removesuffix(" %"))
+            (_attainable(*joint.attainable, huge_range), percent(joint.margin).removesuffix(" %"))
             if "stiffness" in kind_of(joint).commanded
             else ("-", "-")
         ),
@@ -110,23 +112,29 @@ def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...
     return pair[: kind_of(joint).motor_count]
 
 
-def _attainable(lower: float, upper: float) -> str:
+def _attainable(lower: float, upper: float, huge: bool) -> str:
     if math.isnan(lower):
         return "none"
-    return f"from {number(lower)}" if math.isinf(upper) else f"{number(lower)}-{number(upper)}"
+    least = number(lower, huge=huge)
+    return f"from {least}" if math.isinf(upper) else f"{least}-{number(upper, huge=huge)}"
 
 
 def _span(low: float, high: float) -> str:
     if math.isnan(low):
         return "-"
-    return "-".join(dict.fromkeys(rounded(value, 4) for value in (low, high)))
+    return "-".join(dict.fromkeys(significant(value) for value in (low, high)))
 
 
-def number(value: float) -> str:
-    """Return a number with three or four digits, or all those before the point."""
+def number(value: float, *, huge: bool = False) -> str:
+    """Return a number with three or four digits, or all those before the point.
+
+    Args:
+        value: number.
+        huge: whether numbers of the same column have exponents; this one then has three digits.
+    """
     if math.isnan(value):
         return "-"
-    if not 10 <= abs(value) < HUGE:
+    if huge or not 10 <= abs(value) < EXPONENT:
         return f"{value:.3g}"
     return f"{value:.1f}" if abs(value) < WHOLE else f"{value:.0f}"
 
@@ -138,20 +146,6 @@ def percent(share: float) -> str:
     if abs(share) >= 1:
         return f"{100 * share:.0f} %"
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
-
-
-def apart(value: float, bound: float) -> tuple[str, str]:
-    """Format two numbers with the digits that show their difference, at least four."""
-    for digits in range(4, 17):
-        shown = rounded(value, digits), rounded(bound, digits)
-        if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
-            return shown
-    return repr(value), repr(bound)
-
-
-def rounded(value: float, digits: int) -> str:
-    """Return a number with this many significant digits, or all those before the point."""
-    return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:

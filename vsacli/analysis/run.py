@@ -171,7 +171,7 @@ class Run:
         for minima in between:
             self._between.add(minima)
             for index in set(minima.joint.tolist()):
-                self._summaries[index].add_bounded(minima.of_joint(index))
+                self._summaries[index].add_bounded(minima.of_joint(index), between=True)
         self._passages.add(block)
         self._balances.add(block)
         for summary in self._summaries:

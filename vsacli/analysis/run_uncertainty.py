@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from vsacli.actuators.reach import ALLOWED_DEVIATIONS, margin
-from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
+from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
 from vsacli.compute.engine import NUMPY, Engine
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import Finding, keep_worse, limit_checks, worst_excess
 from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -68,7 +68,7 @@ class RunUncertainty:
         self._shown = {JUDGED, *asked}
         self._powers: dict[str, _Powers] = {}
         self._steps = [dict.fromkeys(WITHIN, 0) for _ in robot.joints]
-        self._limits: list[dict[str, tuple[float, Worst]]] = [{} for _ in robot.joints]
+        self._limits: list[dict[str, Finding]] = [{} for _ in robot.joints]
 
     @cached_property
     def _deviations(self) -> Uncertainty:
@@ -92,15 +92,15 @@ class RunUncertainty:
         """Return a block of times between the samples with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         del deviations[MARGIN]
-        return self._with(deviations, block)
+        return self._with(deviations, block, between=True)
 
-    def _with(self, deviations: Mapping[str, FloatArray], block: Block) -> Block:
+    def _with(self, deviations: Mapping[str, FloatArray], block: Block, *, between: bool = False) -> Block:
         for name, array in deviations.items():
             array[:, self._deviations.unstated[name]] = np.nan
         stored = {deviation(name): array for name, array in deviations.items()}
         block = block.replaced(**stored, flags=block.flags.copy())
         for index in range(len(self._robot.joints)):
-            self._judge_limits(block, index)
+            self._judge_limits(block, index, between=between)
         return block
 
     def _count_steps(self, block: Block, deviations: FloatArray) -> None:
@@ -111,7 +111,7 @@ class RunUncertainty:
             for steps, found in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):
                 steps[kind] += int(np.count_nonzero(found))
 
-    def _judge_limits(self, block: Block, index: int) -> None:
+    def _judge_limits(self, block: Block, index: int, *, between: bool) -> None:
         """Clear the bits of limits where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
         seen, exceeded = np.zeros((2, len(block.time)), dtype=FLAG_TYPE)
@@ -119,11 +119,9 @@ class RunUncertainty:
             seeming, known = check.flags(values), check.flags(values, check.allowance(values))
             seen |= seeming
             exceeded |= known
-            excess = check.worst(values, seeming & ~known)
-            kept, label = self._limits[index], check.flag.label
-            if excess is not None and (label not in kept or excess.size > kept[label][0]):
-                time, unit = float(block.time[excess.step]), check.unit(joint.type)
-                kept[label] = excess.size, Worst(label, time, excess.value, excess.bound, unit, check.motor)
+            within = (seeming & ~known) != 0
+            worst = worst_excess(joint, check, values, block.time, within, between=between)
+            keep_worse(self._limits[index], worst)
         block.flags[:, index] &= ~(seen & ~exceeded)  # other bits are of minima between the samples
 
     def report(self) -> list[JointUncertainty]:
@@ -135,7 +133,7 @@ class RunUncertainty:
                 variables={each.name: each for at, each in spreads if at == index},
                 asked=tuple(self._asked),
                 samples=dict(self._steps[index]),
-                limits={label: worst for label, (_, worst) in self._limits[index].items()},
+                limits=dict(self._limits[index]),
             )
             for index in range(len(types))
         ]

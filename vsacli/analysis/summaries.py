@@ -9,13 +9,13 @@ import numpy as np
 
 from vsacli.actuators.reach import margin, nearer_end
 from vsacli.analysis.dry_friction import dry_frictions
-from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty, Worst
+from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import Stop
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import Finding, limit_checks, worst_excess
 from vsacli.robot.joint import Joint
 
 REACH = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "near_singular": Flag.NEAR_SINGULAR}
@@ -30,13 +30,14 @@ class JointSummary:
         self._index = index
         self._steps = dict.fromkeys(COUNTED, 0)
         self._first_time: dict[str, float] = {}
-        self._worst: dict[str, tuple[float, Worst]] = {}
+        self._worst: dict[str, tuple[float, Finding]] = {}
         self._margin = (math.inf, math.nan, (math.nan, math.nan))
         self._stiffness = (math.nan, math.nan)
         self._peaks = np.full(5, np.nan)
         self._start: FloatArray | None = None
         self._end = np.full((2, len(MOTORS)), np.nan)
         self._limits = limit_checks(joint)
+        self._between_samples = False
         self._other_branch = "stiffness" in joint.actuator.commanded
         self._dry_friction = dry_frictions(joint.actuator.motors)
 
@@ -51,8 +52,9 @@ class JointSummary:
         self._end = np.stack(_motors_at(block, -1, index))
         if flags.any():
             self._count(flags, block.time)
-            self._record_not_finite(flags, block.time)
-            self._record_instability(flags, block)
+            damper = math.nan if block.tau_damper is None else block.tau_damper[:, index]
+            self._record_first(Flag.NOT_FINITE, flags, block.time, math.nan, "tau_motor")
+            self._record_first(Flag.INTERNAL_INSTABILITY, flags, block.time, damper, "tau_e")
         self.add_bounded(block)
         least, most = self._stiffness
         self._stiffness = (
@@ -64,14 +66,15 @@ class JointSummary:
             motor.add(block.time, block.dtheta[:, index, motor.number - 1])
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
-    def add_bounded(self, block: Block) -> None:
+    def add_bounded(self, block: Block, *, between: bool = False) -> None:
         """Merge the worst values of samples, or of minima between them, without counting their flags."""
+        self._between_samples = between
         flags = block.flags[:, self._index]
         flagged = bool(flags.any())
         if "stiffness" in self._joint.actuator.commanded:
             self._add_reach(flags, block, flagged=flagged)
         elif flagged:
-            self._record_without_stiffness(flags, block.time)
+            self._record_first(Flag.SINGULAR, flags, block.time, 0.0, "stiffness")
         if flagged:
             self._record_limits(flags, block)
 
@@ -93,7 +96,7 @@ class JointSummary:
     def report(
         self,
         energy: JointEnergy,
-        between: dict[str, Worst],
+        between: dict[str, Finding],
         uncertainty: JointUncertainty | None,
         *,
         complete: bool,
@@ -166,46 +169,34 @@ class JointSummary:
                     for name in ("stiffness", "stiffness_min", "stiffness_max")
                 )
                 bound = nearer_end(value, lower, upper)
-                unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
-                self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
+                self._keep(-gap[step], self._finding(kind, block.time[step], value, bound))
 
-    def _record_not_finite(self, flags: FlagArray, time: FloatArray) -> None:
-        """Record the first sample: values that are not finite are equally bad."""
-        hit, label = has(flags, Flag.NOT_FINITE), Flag.NOT_FINITE.label
-        if hit.any() and label not in self._first_time:
-            self._first_time[label] = first = float(time[hit.argmax()])
-            unit = VARIABLES["tau_motor"].quantity.unit(self._joint.type)
-            self._keep(0.0, Worst(label, first, math.nan, math.nan, unit))
-
-    def _record_without_stiffness(self, flags: FlagArray, time: FloatArray) -> None:
-        """Record the first singular sample of a spring without a commanded stiffness."""
-        hit = has(flags, Flag.SINGULAR)
-        if hit.any():
-            unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
-            self._keep(0.0, Worst("singular", float(time[hit.argmax()]), 0.0, math.nan, unit))
-
-    def _record_instability(self, flags: FlagArray, block: Block) -> None:
-        """Record the first sample: the instability grows from there on."""
-        hit, label = has(flags, Flag.INTERNAL_INSTABILITY), Flag.INTERNAL_INSTABILITY.label
-        if hit.any() and label not in self._first_time:
+    def _record_first(
+        self, flag: Flag, flags: FlagArray, time: FloatArray, values: FloatArray | float, of: str
+    ) -> None:
+        """Record the first sample with a flag: later ones are as bad, or follow from it."""
+        hit, kind = has(flags, flag), flag.label
+        if hit.any() and kind not in self._worst:
             step = int(hit.argmax())
-            self._first_time[label] = first = float(block.time[step])
-            unit, torque = (
-                VARIABLES["tau_e"].quantity.unit(self._joint.type),
-                block.tau_damper[step, self._index],
-            )
-            self._keep(0.0, Worst(label, first, float(torque), math.nan, unit))
+            self._first_time.setdefault(kind, float(time[step]))
+            value = float(np.broadcast_to(values, time.shape)[step])
+            self._keep(0.0, self._finding(kind, time[step], value, math.nan, of))
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)
         for check in self._limits:
-            excess, label = check.worst(values, flags), check.flag.label
-            if excess is not None:
-                first, time = float(block.time[excess.first]), float(block.time[excess.step])
-                self._first_time[label] = min(first, self._first_time.get(label, first))  # either motor
-                unit = check.unit(self._joint.type)
-                worst = Worst(label, time, excess.value, excess.bound, unit, check.motor)
-                self._keep(excess.size, worst)
+            own = flags & check.flags(values, check.allowance(values))  # the flag may be the other motor's
+            beyond, between = has(own, check.flag), self._between_samples
+            worst = worst_excess(self._joint, check, values, block.time, beyond, between=between)
+            if worst is not None:
+                first = self._first_time.get(worst.kind, worst.first)
+                self._first_time[worst.kind] = min(worst.first, first)
+                self._keep(worst.excess, worst)
+
+    def _finding(self, kind: str, time: float, value: float, bound: float, of: str = "stiffness") -> Finding:
+        unit = VARIABLES[of].quantity.unit(self._joint.type)
+        name, between = self._joint.name, self._between_samples
+        return Finding(kind, float(time), value, bound, unit, joint=name, between=between)
 
     def _torque_discontinuity(self, block: Block) -> FloatArray:
         """Return the initial torque discontinuity of motors with springs, whose torques are continuous."""
@@ -214,7 +205,7 @@ class JointSummary:
         step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_transmission[0, self._index])
         return step
 
-    def _keep(self, badness: float, worst: Worst) -> None:
+    def _keep(self, badness: float, worst: Finding) -> None:
         if worst.kind not in self._worst or badness > self._worst[worst.kind][0]:
             self._worst[worst.kind] = (badness, worst)
 

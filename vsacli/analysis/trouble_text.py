@@ -6,23 +6,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread, Worst
-from vsacli.analysis.report_text import (
-    apart,
-    by_joint,
-    kind_of,
-    number,
-    of_joints,
-    of_motors,
-    percent,
-    rounded,
-)
+from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread
+from vsacli.analysis.report_text import by_joint, kind_of, number, of_joints, of_motors, percent
 from vsacli.base.flags import Flag
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, significant
 from vsacli.base.units import time_text
+from vsacli.dynamics.limits import OFF_TARGET, Finding
 
 DIFFERENT_PEAK = 1.1
 """Ratio of a peak at the ends of a recording to the peak inside, above which its place is reported."""
@@ -47,7 +38,7 @@ FAILURES = {
 }
 """Verdicts that joints are counted for in the first line of a report, and their words there."""
 
-GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", "off_target")
+GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", OFF_TARGET)
 """Kinds of problems that come first; limits follow, and warnings come last."""
 
 COUNTED_AS = {"not_finite": "infeasible", "internal_instability": "singular"}
@@ -90,7 +81,7 @@ def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[st
             found = counted(joint.samples[kind], "sample")
             yield f"{samples} of {found} that are {kind} may not be: uncertainty decides"
     for worst in uncertainty.limits.values():
-        yield f"{excess(worst)}, but by less than its uncertainty, so it does not count"
+        yield f"{worst.text}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
         yield from _peak_at_an_end(joint, uncertainty.variables[JUDGED])
 
@@ -120,26 +111,6 @@ def undetermined_text(spread: Spread) -> str:
     return f"{subject}: {error}; {100 * DETERMINED:.0f} % is allowed"
 
 
-class Problem(NamedTuple):
-    """One kind of problem at one joint.
-
-    Attributes:
-        kind: its name, as in `JointReport.worst`.
-        joint: number of the joint, from 0 at the base.
-        size: larger values are worse among problems of the same kind.
-        sentence: value, bound, time and what to do.
-        brief: the same in a few words, for a list.
-        unit: unit of the values in `brief`; empty if these are no values.
-    """
-
-    kind: str
-    joint: int
-    size: tuple[float, int]
-    sentence: str
-    brief: str
-    unit: str = ""
-
-
 def counts(joints: Sequence[JointReport]) -> str:
     """Return how many joints fail which requirement; empty if none does, or there is only one."""
     failing = {words: sum(joint.shows(verdict) for joint in joints) for verdict, words in FAILURES.items()}
@@ -162,67 +133,68 @@ def findings(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
         joints: reports of the joints, base to tip.
         samples: number of samples of the run.
     """
-    problems = [
-        _problem(number, joint, worst, samples)
-        for number, joint in enumerate(joints)
-        for worst in joint.worst.values()
-    ]
-    yield from grouped(problems, [joint.name for joint in joints])
+    found = [(number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()]
+    names = [joint.name for joint in joints]
+    yield from grouped(found, names, lambda index, worst: _worded(joints[index], worst, samples))
 
 
-def _problem(number: int, joint: JointReport, worst: Worst, samples: int) -> Problem:
-    counted = COUNTED_AS.get(worst.kind, worst.kind)
-    if counted not in joint.samples:
-        return limit_problem(number, worst, _limit(joint, worst))
-    size = _share_beyond(worst), joint.samples[counted]
-    sentence = _SENTENCES[worst.kind](joint, worst, samples)
-    return Problem(worst.kind, number, size, sentence, f"({_when(joint, counted, samples)})")
+Words = Callable[[int, Finding], tuple[str, str, int]]
+"""Words for a finding of a joint by index: a sentence, a few words for a list, and the number of samples."""
 
 
-def limit_problem(number: int, worst: Worst, sentence: str) -> Problem:
-    """Return that a joint exceeds a limit, as the sentence says."""
-    value, bound = apart(worst.value, worst.bound)
-    brief = f"{value} {'<' if worst.value < worst.bound else '>'} {bound}"
-    return Problem(worst.kind, number, (_share_beyond(worst), 0), sentence, brief, worst.unit)
-
-
-def grouped(problems: Iterable[Problem], names: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence for each kind of problem of a joint, the most critical first.
+def grouped(
+    found: Iterable[tuple[int, Finding]],
+    names: Sequence[str],
+    words: Words = lambda _, finding: (finding.text, finding.brief, 0),
+) -> Iterator[str]:
+    """Yield a sentence for each kind of finding of a joint, the most critical first.
 
     Where many joints have a kind, those beyond the first few follow in a few words each. The report of seven
     joints that fail in every way stays on one page: it then has fewer sentences, and lists of names alone.
 
     Args:
-        problems: problems of all joints, in any order.
+        found: findings of all joints, each with the index of its joint, in any order.
         names: names of the joints, base to tip.
+        words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
-    kinds: dict[str, list[Problem]] = {}
-    for problem in problems:
-        kinds.setdefault(problem.kind, []).append(problem)
+    kinds: dict[str, list[tuple[int, Finding]]] = {}
+    for index, finding in found:
+        kinds.setdefault(finding.kind, []).append((index, finding))
     in_full = {
-        kind: len(found) if len(found) <= MOST_IN_FULL + 1 else MOST_IN_FULL for kind, found in kinds.items()
+        kind: len(own) if len(own) <= MOST_IN_FULL + 1 else MOST_IN_FULL for kind, own in kinds.items()
     }
     if sum(in_full.values()) > MOST_SENTENCES:
         in_full = dict.fromkeys(kinds, 1)
     for kind in sorted(kinds, key=_rank):
-        found = sorted(kinds[kind], key=lambda problem: problem.size, reverse=True)
-        yield from (f"{names[each.joint]}: {each.sentence}" for each in found[: in_full[kind]])
-        others = sorted(found[in_full[kind] :], key=lambda problem: problem.joint)
+        own = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
+        own.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
+        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in own[: in_full[kind]])
+        others = {index: (brief, finding) for _, _, brief, _, index, finding in own[in_full[kind] :]}
         if others and len(kinds) > MOST_LISTS:
-            yield f"also {_words(kind)}: {', '.join(names[each.joint] for each in others)}"
+            yield f"also {_words(kind)}: {', '.join(names[index] for index in sorted(others))}"
         elif others:
-            yield _also(kind, others, names)
+            yield _also(kind, dict(sorted(others.items())), names)
 
 
-def _also(kind: str, problems: Sequence[Problem], names: Sequence[str]) -> str:
-    """Return problems of one kind in a list, with their unit once if it is the same."""
-    units = {problem.unit for problem in problems}
-    unit = f" ({problems[0].unit})" if len(units) == 1 and problems[0].unit else ""
+def _also(kind: str, others: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
+    """Return findings of one kind in a list, with their unit once if it is the same."""
+    values = kind.endswith("_limit") or kind == OFF_TARGET
+    units = {finding.unit if values else "" for _, finding in others.values()}
+    unit = "".join(f" ({unit})" for unit in units if unit) if len(units) == 1 else ""
     said = {
-        problem.joint: problem.brief if len(units) == 1 else f"{problem.brief} {problem.unit}"
-        for problem in problems
+        index: brief if len(units) == 1 else f"{brief} {finding.unit}"
+        for index, (brief, finding) in others.items()
     }
     return of_joints(f"also {_words(kind)}{unit}: ", said, names)
+
+
+def _worded(joint: JointReport, worst: Finding, samples: int) -> tuple[str, str, int]:
+    """Return the words of a finding of a run of so many samples."""
+    counted_as = COUNTED_AS.get(worst.kind, worst.kind)
+    if counted_as not in joint.samples:
+        return f"{worst.text} (first at {time_text(joint.first_time[worst.kind])})", worst.brief, 0
+    sentence = _SENTENCES[worst.kind](joint, worst, samples)
+    return sentence, f"({_when(joint, counted_as, samples)})", joint.samples[counted_as]
 
 
 def _rank(kind: str) -> tuple[int, int]:
@@ -230,12 +202,6 @@ def _rank(kind: str) -> tuple[int, int]:
     if kind in GRAVEST:
         return 0, GRAVEST.index(kind)
     return (2, 0) if kind == "near_singular" else (1, Flag.labeled(kind).value)
-
-
-def _share_beyond(worst: Worst) -> float:
-    """Return the excess as a share of the bound; infinite where there is none, as no stiffness would do."""
-    known = worst.bound and not math.isnan(worst.bound)
-    return abs(worst.value - worst.bound) / abs(worst.bound) if known else math.inf
 
 
 def _words(kind: str) -> str:
@@ -252,28 +218,18 @@ def _when(joint: JointReport, kind: str, samples: int) -> str:
     return words if found == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
 
 
-def _between(joint: JointReport, worst: Worst) -> str:
-    """Return a clause that the worst instant lies between two samples; empty if it is a sample."""
-    return ", between two samples" if worst.time in {each.time for each in joint.between.values()} else ""
-
-
-def _at(joint: JointReport, worst: Worst) -> str:
-    return f"at t = {time_text(worst.time)}{_between(joint, worst)}"
-
-
-def _infeasible(joint: JointReport, worst: Worst, samples: int) -> str:
-    when, hints = _at(joint, worst), f"({_when(joint, 'infeasible', samples)}){_hints(joint)}"
+def _infeasible(joint: JointReport, worst: Finding, samples: int) -> str:
+    when, hints = worst.when(closed=True), f"({_when(joint, 'infeasible', samples)}){_hints(joint)}"
     if math.isnan(worst.bound):
         return f"the springs cannot carry the elastic torque {when} at any stiffness; reduce the load {hints}"
-    value, bound = apart(worst.value, worst.bound)
-    low = worst.value < worst.bound
-    relation = "below the minimum" if low else "above the maximum"
+    value, bound = worst.numbers
+    relation = "below the minimum" if worst.below else "above the maximum"
     if "stiffness" not in kind_of(joint).commanded:
         load = f"elastic torque {value} {worst.unit} {when} is {relation} of {bound} {worst.unit}"
         return f"{load} that its spring carries; reduce the load {hints}"
     return (
         f"stiffness {value} {worst.unit} {when} is {relation} of {bound} {worst.unit} at this load; "
-        f"{'increase' if low else 'decrease'} it {hints}"
+        f"{'increase' if worst.below else 'decrease'} it {hints}"
     )
 
 
@@ -283,51 +239,38 @@ def _hints(joint: JointReport) -> str:
     return slack + ("; the opposite branch reaches it" if joint.other_branch else "")
 
 
-def _singular(joint: JointReport, worst: Worst, samples: int) -> str:
-    when, where = _when(joint, "singular", samples), _at(joint, worst)
+def _singular(joint: JointReport, worst: Finding, samples: int) -> str:
+    when = _when(joint, "singular", samples)
     if math.isnan(worst.bound):
-        return f"the spring is slack {where}, so that motor torques are undefined ({when})"
+        return f"the spring is slack {worst.when()}, so that motor torques are undefined ({when})"
     change = "decrease" if worst.bound == joint.attainable[1] else "increase"
     return (
-        f"stiffness {rounded(worst.value, 4)} {worst.unit} {where} is singular: motor torques are undefined "
-        f"at the end of the attainable range; {change} it ({when})"
+        f"stiffness {significant(worst.value)} {worst.unit} {worst.when(closed=True)} is singular: motor "
+        f"torques are undefined at the end of the attainable range; {change} it ({when})"
     )
 
 
-def _near_singular(joint: JointReport, worst: Worst, samples: int) -> str:
-    gap, when = abs(worst.value - worst.bound) / worst.value, _when(joint, "near_singular", samples)
+def _near_singular(joint: JointReport, worst: Finding, samples: int) -> str:
+    gap, when = worst.excess / worst.value, _when(joint, "near_singular", samples)
     return (
-        f"warning: stiffness {rounded(worst.value, 4)} {worst.unit} {_at(joint, worst)} is {100 * gap:.2g} % "
-        f"from the singularity, where motor torques grow without bound ({when})"
+        f"warning: stiffness {significant(worst.value)} {worst.unit} {worst.when(closed=True)} is "
+        f"{100 * gap:.2g} % from the singularity, where motor torques grow without bound ({when})"
     )
 
 
-def _not_finite(joint: JointReport, worst: Worst, samples: int) -> str:
+def _not_finite(joint: JointReport, worst: Finding, samples: int) -> str:
     return (
-        f"a motor variable is not finite {_at(joint, worst)}: motion, stiffness or load are too large or not "
+        f"a motor variable is not finite {worst.when()}: motion, stiffness or load are too large or not "
         f"numbers (infeasible: {_when(joint, 'infeasible', samples)})"
     )
 
 
-def _unstable(joint: JointReport, worst: Worst, samples: int) -> str:
+def _unstable(joint: JointReport, worst: Finding, samples: int) -> str:
     return (
         f"the motion inside its damped transmission is unstable from t = {time_text(worst.time)} on: its "
         f"damper carries {number(worst.value)} {worst.unit} that the springs cannot; increase the stiffness "
         f"({_when(joint, 'singular', samples)})"
     )
-
-
-def _limit(joint: JointReport, worst: Worst) -> str:
-    return f"{excess(worst)}{_between(joint, worst)} (first at {time_text(joint.first_time[worst.kind])})"
-
-
-def excess(worst: Worst) -> str:
-    """Return by how much a limit is exceeded, and where."""
-    whose = Flag.labeled(worst.kind).quantity_of(worst.motor)
-    value, bound = apart(worst.value, worst.bound)
-    relation = "below" if worst.value < worst.bound else "above"
-    when = f"at t = {time_text(worst.time)}"
-    return f"{whose} is {value} {worst.unit} {when}, {relation} its limit of {bound} {worst.unit}"
 
 
 _SENTENCES = {

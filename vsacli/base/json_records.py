@@ -26,8 +26,8 @@ class Published:
     """A dataclass with a published JSON form.
 
     `shape` has the keys of the JSON object in their order and nesting, each with the attribute whose value it
-    holds. A key that ends with `?` is omitted while that value is None or empty. Without a shape, all fields
-    are published under their own names.
+    holds. A key that ends with `?` is omitted while that value is None, False or empty. Without a shape, all
+    fields are published under their own names.
     """
 
     shape: ClassVar[Shape] = {}
@@ -89,7 +89,7 @@ def _written(record: Published, shape: Shape) -> dict[str, Any]:
     content = {}
     for key, inner in shape.items():
         value = json_value(getattr(record, inner)) if isinstance(inner, str) else _written(record, inner)
-        if not (key.endswith(OPTIONAL) and value in (None, [], {})):
+        if not (key.endswith(OPTIONAL) and (value is False or value in (None, [], {}, ""))):
             content[key.removesuffix(OPTIONAL)] = value
     return content
 

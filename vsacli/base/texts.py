@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
@@ -72,6 +74,39 @@ def on_one_line(value: Any) -> str:
 def counted(number: int, noun: str, several: str = "") -> str:
     """Return a number with its noun, in the plural unless it is 1; regular plurals need not be given."""
     return f"{number} {noun if number == 1 else several or noun + 's'}"
+
+
+EXPONENT = 1e6
+"""Absolute value from which on numbers are shown with an exponent."""
+
+
+def significant(value: float, digits: int = 4, toward: float = 0.0) -> str:
+    """Return a number with this many significant digits, or all those before the point.
+
+    It is rounded to the nearest number, or toward +-infinity, except from rounding of floats.
+    """
+    if abs(value) < EXPONENT:
+        digits = max(digits, len(f"{abs(value):.0f}"))
+    if toward and math.isfinite(value):
+        rounding = ROUND_CEILING if toward > 0 else ROUND_FLOOR
+        value = float(Context(prec=digits, rounding=rounding).create_decimal(f"{value:.12g}"))
+    return f"{value:.{digits}g}"
+
+
+def distinguish(value: float, bound: float, *, safely: bool = False) -> tuple[str, str]:
+    """Format two numbers with the digits that show their difference, at least four.
+
+    Args:
+        value: value.
+        bound: bound.
+        safely: whether the bound is rounded away from the value.
+    """
+    toward = bound - value if safely else 0.0
+    for digits in range(4, 17):
+        shown = significant(value, digits), significant(bound, digits, toward)
+        if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
+            return shown
+    return repr(value), repr(bound)
 
 
 def joined(words: Iterable[str], conjunction: str = "and") -> str:

@@ -1,15 +1,24 @@
-"""Limits of a joint, including those of its actuator, and the flags where they are exceeded."""
+"""Limits of a joint, flags where they are exceeded, and findings: quantities beyond a bound, and their words.
+
+Runs, simulations, searches of fixes and planned excitations make one record, `Finding`; `worst_excess` makes
+that of a limit.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
-from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import Flag
+from vsacli.base.json_records import Stored, named
 from vsacli.base.signals import DAMPING
+from vsacli.base.texts import distinguish, significant
+from vsacli.base.units import time_text
 from vsacli.robot.joint import Joint
 
 
@@ -50,3 +59,169 @@ def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
             too_far |= check.flags(of_joint, check.largest_allowance)
     found: BoolArray = (beyond != 0) & (too_far == 0)
     return found
+
+
+MARGIN = "margin"
+"""Kind of the distance of a stiffness from its attainable range; limits have the names of their flags."""
+
+OFF_TARGET = "off_target"
+"""Kind of the final position error of a simulation; its bound is the goal tolerance, signed as the error."""
+
+
+@dataclass(frozen=True)
+class Finding(Stored):
+    """A quantity of a joint at the instant at which it is furthest beyond a bound, or nearest to it.
+
+    Attributes:
+        kind: Name of a flag, `MARGIN` or `OFF_TARGET`.
+        time: Time of the instant, s.
+        value: Value of the quantity there.
+        bound: Bound of the value; NaN where the elastic torque itself cannot be carried.
+        unit: Unit of value and bound.
+        motor: Motor or spring 1 or 2; None for a quantity of the joint.
+        joint: Name of the joint.
+        between: Whether the instant lies between two samples.
+        at_rest: Whether the motion is held at that instant.
+        end: End of the attainable range if the bound keeps a margin from it, else NaN.
+        margin: This margin.
+        advice: What to do, as a clause.
+        fixable: Whether any change that was tried helps.
+        first: Time of the first sample beyond the bound among those compared, s.
+    """
+
+    kind: str
+    time: float
+    value: float
+    bound: float
+    unit: str
+    motor: int | None = None
+    joint: str = ""
+    between: bool = False
+    at_rest: bool = False
+    end: float = math.nan
+    margin: float = 0.0
+    advice: str = ""
+    fixable: bool = True
+    first: float = field(default=math.nan, compare=False)
+
+    key: ClassVar = "kind"
+    shape: ClassVar = {
+        **named("time", "value", "bound", "unit"),
+        **{f"{name}?": name for name in ("motor", "joint", "between", "at_rest")},
+    }
+
+    def __str__(self) -> str:
+        return f"{self.joint}: {self.text}"
+
+    @property
+    def excess(self) -> float:
+        """Distance of the value from the bound."""
+        return abs(self.value - self.bound)
+
+    @property
+    def share(self) -> float:
+        """Excess as a share of the bound; infinite where there is none, as no stiffness would do."""
+        return self.excess / abs(self.bound) if abs(self.bound) > 0 else math.inf
+
+    @property
+    def below(self) -> bool:
+        """Whether the value is below its bound."""
+        return self.value < self.bound
+
+    @property
+    def quantity(self) -> str:
+        """Quantity in words, with the number of its motor."""
+        flag = Flag.__members__.get(self.kind.upper())
+        if flag is None or flag.quantity is None:
+            return "elastic torque" if flag is Flag.INFEASIBLE else "stiffness"
+        return flag.quantity_of(self.motor)
+
+    def when(self, *, closed: bool = False) -> str:
+        """Return the time in words; closed by a comma, if it needs one before a verb."""
+        between = ", between two samples" if self.between else ""
+        added = f"{between}{', even at rest' if self.at_rest else ''}"
+        return f"at t = {time_text(self.time)}{added}{',' if added and closed else ''}"
+
+    @property
+    def numbers(self) -> tuple[str, str]:
+        """Value and bound as texts; a bound that a margin requires is rounded so that its text suffices."""
+        return distinguish(self.value, self.bound, safely=self.margin > 0)
+
+    @property
+    def brief(self) -> str:
+        """Value and bound without their unit, for a list."""
+        value, bound = self.numbers
+        if self.kind == OFF_TARGET:
+            return f"{self.value:.3g} (tolerance {abs(self.bound):.3g})"
+        return f"{value} {'<' if self.below else '>'} {bound}"
+
+    @property
+    def text(self) -> str:
+        """The finding as a clause without the name of the joint, and the advice."""
+        return f"{self._fact('')}{self.advice and ': '}{self.advice}"
+
+    @property
+    def clause(self) -> str:
+        """The finding as a clause that names the joint."""
+        return f"the {self._fact(f' of {self.joint}').removeprefix('the ')}"
+
+    def _fact(self, whose: str) -> str:
+        """Return the finding as a clause in which the quantity, or the springs, are followed by `whose`."""
+        if self.kind == OFF_TARGET:
+            error, tolerance = (f"{value:.3g} {self.unit}" for value in (self.value, abs(self.bound)))
+            return f"final q error{whose} {error} exceeds the goal tolerance of {tolerance}"
+        if self.kind == Flag.NOT_FINITE.label:
+            return f"a motor variable{whose} is not finite {self.when()}"
+        if math.isnan(self.bound):
+            return f"the springs{whose} cannot carry the elastic torque {self.when()}"
+        (value, bound), side = self.numbers, "below" if self.below else "above"
+        limit = f"its limit of {bound} {self.unit}"
+        if self.margin:
+            end = f"{'minimum' if self.below else 'maximum'} {significant(self.end)}"
+            limit = f"the {bound} {self.unit} needed for a margin of {100 * self.margin:.4g} % ({end})"
+        return f"{self.quantity}{whose} is {value} {self.unit} {self.when()}, {side} {limit}"
+
+
+def worst_excess(
+    joint: Joint,
+    check: LimitCheck,
+    of_joint: OfJoint,
+    time: FloatArray,
+    beyond: BoolArray,
+    *,
+    between: bool = False,
+) -> Finding | None:
+    """Return the worst excess over a limit, among samples that are beyond it; None without any.
+
+    Args:
+        joint: Joint with the limit.
+        check: Limit.
+        of_joint: Variables of the joint, by name.
+        time: Times of the samples, (samples,).
+        beyond: Mask of the samples to compare, (samples,).
+        between: Whether the times lie between samples.
+    """
+    values = check.values(of_joint)
+    outside = np.nan_to_num(check.outside(values), nan=-np.inf)
+    beyond = beyond & (outside > check.tolerance)
+    if not beyond.any():
+        return None
+    step = int(np.where(beyond, outside, -np.inf).argmax())
+    value, (lower, upper) = float(values[step]), check.range
+    return Finding(
+        check.flag.label,
+        float(time[step]),
+        value,
+        lower if value < lower else upper,
+        check.unit(joint.type),
+        check.motor,
+        joint.name,
+        between,
+        first=float(time[beyond.argmax()]),
+    )
+
+
+def keep_worse(worst: dict[str, Finding], found: Finding | None) -> None:
+    """Keep a finding, if there is one, where it is the worst of its kind so far."""
+    if found is not None and (found.kind not in worst or found.excess > worst[found.kind].excess):
+        worst[found.kind] = found

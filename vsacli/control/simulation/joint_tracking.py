@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report_text import number
-from vsacli.analysis.trouble_text import Problem, excess, limit_problem
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored, named
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
 from vsacli.dynamics.energy import JointEnergy
+from vsacli.dynamics.limits import OFF_TARGET, Finding
 
 _GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
 
@@ -113,7 +111,7 @@ class JointTracking(Stored):
     stiffness: Deviation
     peak_tau_motor: tuple[float, float]
     samples_over_limit: int
-    worst: dict[str, Worst]
+    worst: dict[str, Finding]
     energy: JointEnergy
     tolerance: float = math.nan
 
@@ -181,22 +179,10 @@ def error_text(value: float) -> str:
     return number(value) if abs(value) >= 10 else "0" if abs(value) < SMALLEST_ERROR else f"{value:.2g}"
 
 
-def problems(joints: Sequence[JointTracking], complete: bool) -> Iterator[Problem]:
-    """Yield the limits that joints exceed and, of a complete run, how far off target they end."""
+def tracking_findings(joints: Sequence[JointTracking], complete: bool) -> Iterator[tuple[int, Finding]]:
+    """Yield the limits that joints exceed and, of a complete run, how far off target they end, by joint."""
     for index, joint in enumerate(joints):
-        yield from (limit_problem(index, worst, excess(worst)) for worst in joint.worst.values())
+        yield from ((index, worst) for worst in joint.worst.values())
         if complete and joint.off_course:
-            yield _off_target(index, joint)
-
-
-def _off_target(index: int, joint: JointTracking) -> Problem:
-    unit = joint.unit
-    error, tolerance = f"{joint.q.final:.3g}", f"{joint.tolerance:.3g}"
-    return Problem(
-        kind="off_target",
-        joint=index,
-        size=(abs(joint.q.final) / max(joint.tolerance, sys.float_info.min), 0),
-        sentence=f"final q error {error} {unit} exceeds the goal tolerance of {tolerance} {unit}",
-        brief=f"{error} (tolerance {tolerance})",
-        unit=unit,
-    )
+            error, tolerance = joint.q.final, math.copysign(joint.tolerance, joint.q.final)
+            yield index, Finding(OFF_TARGET, math.nan, error, tolerance, joint.unit, joint=joint.name)

@@ -21,8 +21,8 @@ from vsacli.control.simulation.joint_tracking import (
     Deviation,
     JointTracking,
     error_text,
-    problems,
     rows,
+    tracking_findings,
 )
 
 VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
@@ -125,7 +125,7 @@ class SimulationReport(Stored):
         """Return the report in its parts, as people read it."""
         found = [
             *([] if self.ending is None else [self.ending]),
-            *grouped(problems(self.joints, self.complete), [joint.name for joint in self.joints]),
+            *grouped(tracking_findings(self.joints, self.complete), [joint.name for joint in self.joints]),
             *warnings_and_notes(self.warnings, self.notes),
         ]
         lines = [

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vsacli.analysis.joint_report import Worst
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, of_joint
 from vsacli.base.flags import LIMITS, has
 from vsacli.base.simulation_variables import COMMANDS
@@ -15,7 +14,7 @@ from vsacli.base.units import STIFFNESS
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.joint_tracking import Deviation, GoalTolerance, JointTracking
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import Finding, keep_worse, limit_checks, worst_excess
 from vsacli.dynamics.losses import positive_part, trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -100,7 +99,7 @@ class _JointSummary:
     def __init__(self, joint: Joint, index: int) -> None:
         self._joint, self._index = joint, index
         self._checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
-        self._worst: list[tuple[float, Worst | None]] = [(0.0, None)] * len(self._checks)
+        self._worst: dict[str, Finding] = {}
         self._q = self._stiffness = Deviation(math.nan, math.nan, math.nan)
         self._peaks: FloatArray = np.full(2, np.nan)
         self._lowest, self._highest = math.inf, -math.inf
@@ -117,12 +116,8 @@ class _JointSummary:
         self._over_limit += int(np.count_nonzero(has(flags, LIMITS)))
         names = {check.variable: _checked(check.variable) for check in self._checks}
         values = of_joint({variable: getattr(block, name) for variable, name in names.items()}, index)
-        for place, check in enumerate(self._checks):
-            excess, label = check.worst(values, flags), check.flag.label
-            if excess is not None and excess.size > self._worst[place][0]:
-                when, unit = float(time[excess.step]), check.unit(self._joint.type)
-                found = Worst(label, when, excess.value, excess.bound, unit, check.motor)
-                self._worst[place] = excess.size, found
+        for check in self._checks:
+            keep_worse(self._worst, worst_excess(self._joint, check, values, time, has(flags, check.flag)))
 
     def report(self, energy: JointEnergy, goal: GoalTolerance) -> JointTracking:
         """Return the findings, with the energy of the joint."""
@@ -134,19 +129,10 @@ class _JointSummary:
             stiffness=self._stiffness,
             peak_tau_motor=(first, second),
             samples_over_limit=self._over_limit,
-            worst=self._worst_of_limits(),
+            worst=dict(self._worst),
             energy=energy,
             tolerance=goal.of(self._highest - self._lowest),
         )
-
-    def _worst_of_limits(self) -> dict[str, Worst]:
-        """Return the worst excess of each limit, over both motors."""
-        worst: dict[str, Worst] = {}
-        most: dict[str, float] = {}
-        for size, found in self._worst:
-            if found is not None and size > most.get(found.kind, 0.0):
-                worst[found.kind], most[found.kind] = found, size
-        return worst
 
 
 def _checked(variable: str) -> str:

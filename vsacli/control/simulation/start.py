@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.analysis.report_text import apart
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.flags import Flag, has
+from vsacli.base.texts import distinguish
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
@@ -80,7 +80,7 @@ def _no_start(joint: Joint, values: Mapping[str, FloatArray], singular: bool) ->
     bound, relation, change = (
         (low, "below the minimum", "increase") if stiffness < low else (high, "above the maximum", "decrease")
     )
-    value, limit = apart(stiffness, bound)
+    value, limit = distinguish(stiffness, bound)
     unit = STIFFNESS.unit(joint.type)
     subject = f"{joint.name}: stiffness {value} {unit} at the start is {relation}"
     return f"{subject} of {limit} {unit} at this load; {change} it"

@@ -22,7 +22,7 @@ from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block, usual_block
-from vsacli.dynamics.limits import limit_checks, limit_flags
+from vsacli.dynamics.limits import MARGIN, Finding, limit_checks, limit_flags, worst_excess
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.loads import Instants, Load, TaskSamples, evenly_chosen, joined
@@ -132,15 +132,15 @@ class Acceptance:
         """Return a mask of the samples of one joint that are not accepted, (samples,)."""
         return self._refused(joint, self._driven(joint, load), load.instants)
 
-    def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
+    def beyond_position(self, trajectory: Trajectory) -> dict[int, Finding]:
         """Return the violation of a position limit, which no timing changes, by index of the joint."""
-        found: dict[int, Trouble] = {}
+        found: dict[int, Finding] = {}
         for part in self.parts(trajectory):
             for index, joint in enumerate(self.robot.joints):
                 values = {"q": part.motion.q[:, index]}
-                trouble = self._limit_trouble(joint, values, part.motion.time, part.instants)
-                if trouble is not None:
-                    found.setdefault(index, trouble)
+                worst = self._beyond_limit(joint, values, part.motion.time, part.instants)
+                if worst is not None:
+                    found.setdefault(index, worst)
         return found
 
     def reasons(self, part: TaskSamples) -> tuple[str, ...]:
@@ -149,22 +149,22 @@ class Acceptance:
         found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
         return tuple(reason for reason in found if reason)
 
-    def trouble(self, joint: Joint, load: Load) -> Trouble | None:
+    def worst(self, joint: Joint, load: Load) -> Finding | None:
         """Return the worst violation among the samples of one joint; None if all are accepted."""
         values = self._driven(joint, load)
-        of_limits = self._limit_trouble(joint, values, load.time, load.instants)
-        return self._reach_trouble(joint, load, values) or of_limits
+        of_limits = self._beyond_limit(joint, values, load.time, load.instants)
+        return self._short_of_margin(joint, load, values) or of_limits
 
     def reason(self, joint: Joint, load: Load) -> str:
         """Return the worst violation of one joint as a clause; "" if all samples are accepted."""
-        trouble = self.trouble(joint, load)
-        return "" if trouble is None else trouble.clause(joint)
+        worst = self.worst(joint, load)
+        return "" if worst is None else worst.clause
 
     def path_reason(self, joint: Joint, load: Load) -> str:
         """Return a position or velocity limit that the motion exceeds, as a clause; "" if there is none."""
         values = {"q": load.command.q, "dq": load.command.dq}
-        trouble = self._limit_trouble(joint, values, load.time, load.instants)
-        return "" if trouble is None else trouble.clause(joint)
+        worst = self._beyond_limit(joint, values, load.time, load.instants)
+        return "" if worst is None else worst.clause
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """Return all variables of one joint, by name."""
@@ -187,7 +187,8 @@ class Acceptance:
                 near |= check.clearance(values) < self.reserve
         return near
 
-    def _reach_trouble(self, joint: Joint, load: Load, values: OfJoint) -> Trouble | None:
+    def _short_of_margin(self, joint: Joint, load: Load, values: OfJoint) -> Finding | None:
+        """Return the sample that is furthest from the required margin, if it is short of it."""
         asked = load.command.commanded["stiffness"]
         lower, upper = values["stiffness_min"], values["stiffness_max"]
         gap = margin(asked, lower, upper)
@@ -198,74 +199,28 @@ class Acceptance:
             return None
         low, high = lower[step] / (1 - self.min_margin), upper[step] / (1 + self.min_margin)
         bound = low if math.isnan(low) or asked[step] < low else high
-        unit = units.STIFFNESS.unit(joint.type)
-        found = Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit)
-        return found._replace(attainable=lower[step] if bound == low else upper[step], margin=self.min_margin)
+        end = lower[step] if bound == low else upper[step]
+        return Finding(
+            MARGIN,
+            float(load.time[step]),
+            float(asked[step]),
+            float(bound),
+            units.STIFFNESS.unit(joint.type),
+            joint=joint.name,
+            end=float(end),
+            margin=self.min_margin,
+        )
 
-    def _limit_trouble(
+    def _beyond_limit(
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
-    ) -> Trouble | None:
+    ) -> Finding | None:
         """Return the worst violation of the first limit that the given variables exceed, if there is one."""
         flags = limit_flags(joint, values, np.zeros(len(time), dtype=FLAG_TYPE))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
-        for check in limit_checks(joint):
-            if check.variable in values and (excess := check.worst(values, flags)):
-                whose, unit = check.flag.quantity_of(check.motor), check.unit(joint.type)
-                return Trouble(check.variable, whose, time[excess.step], excess.value, excess.bound, unit)
-        return None
-
-
-class Trouble(NamedTuple):
-    """The worst violation of a bound at a joint.
-
-    Attributes:
-        variable: name in results of the variable that violates the bound.
-        whose: variable in words.
-        time: time of the worst sample, s.
-        value: value of the variable at that time.
-        bound: violated bound; NaN if no stiffness carries the elastic torque.
-        unit: unit of value and bound.
-        attainable: end of the attainable range if the bound follows from it; NaN for a limit of the robot.
-        margin: required margin between `attainable` and the bound.
-    """
-
-    variable: str
-    whose: str
-    time: float
-    value: float
-    bound: float
-    unit: str
-    attainable: float = math.nan
-    margin: float = 0.0
-
-    def clause(self, joint: Joint) -> str:
-        """Return the violation as a clause that names the joint."""
-        when = f"at t = {self.time:.3f} s"
-        if math.isnan(self.bound):
-            whatever = "" if math.isnan(self.value) else " at any stiffness"
-            return f"the springs of {joint.name} cannot carry its elastic torque {when}{whatever}"
-        below = self.value < self.bound
-        if self.variable == "stiffness":
-            needed = f"{'at least' if below else 'at most'} {stiffness_text(joint, self.bound)}"
-            return f"{joint.name} needs {needed} {when}, but the command is {self.value:.6g}"
-        value, bound = apart(self.value, self.bound)
-        side = f"{'below' if below else 'above'} its limit of {bound} {self.unit}"
-        return f"the {self.whose} of {joint.name} is {value} {self.unit} {when}, {side}"
-
-
-def apart(value: float, bound: float) -> tuple[str, str]:
-    """Return a value and its bound with four digits, or with as many more as they need to differ."""
-    for digits in (4, 6, 9):
-        texts = f"{value:.{digits}g}", f"{bound:.{digits}g}"
-        if texts[0] != texts[1]:
-            break
-    return texts
-
-
-def stiffness_text(joint: Joint, value: float) -> str:
-    """Return a stiffness with its unit, as text."""
-    return f"{value:.6g} {units.STIFFNESS.unit(joint.type)}"
+        checks = (check for check in limit_checks(joint) if check.variable in values)
+        worst = (worst_excess(joint, check, values, time, has(flags, check.flag)) for check in checks)
+        return next(filter(None, worst), None)
 
 
 BISECTIONS = 50

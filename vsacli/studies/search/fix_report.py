@@ -5,27 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.texts import joined
+from vsacli.base.texts import joined, significant
+from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
-
-DIGITS = 4
-"""Digits of a printed change."""
-
-
-def rounded(value: float, *, up: bool) -> str:
-    """Return a positive value with `DIGITS` digits, rounded up or down so that it still suffices."""
-    unit = 10.0 ** (math.floor(math.log10(value)) + 1 - DIGITS) if value > 0 else 1.0
-    whole = math.ceil(value / unit - ROUNDING) if up else math.floor(value / unit + ROUNDING)
-    return f"{whole * unit:.10g}"
-
-
-ROUNDING = 1e-6
-"""Share of the last digit that is rounding of a value that has no more digits."""
-
 
 _OTHER_SPRINGS = (
     "to keep the commanded stiffness, change the springs: vsacli sensitivity ranks their parameters by their "
@@ -117,7 +103,9 @@ class JointChange(Published):
     shape: ClassVar = named("largest", "time", "rms")
 
     def __str__(self) -> str:
-        size = f"{'-' if self.largest < 0 else '+'}{rounded(abs(self.largest), up=True)} {self.unit}"
+        size = (
+            f"{'-' if self.largest < 0 else '+'}{significant(abs(self.largest), toward=math.inf)} {self.unit}"
+        )
         return f"{self.joint} by up to {size} (at t = {self.time:.3f} s)"
 
 
@@ -229,24 +217,6 @@ class Fix(Published):
 
 
 @dataclass(frozen=True)
-class Cause(Published):
-    """The reason why a joint makes a task infeasible.
-
-    Attributes:
-        joint: name of the joint.
-        text: exceeded bound, and whether a change helps at rest, as a clause.
-        fixable: whether any change that was tried helps.
-    """
-
-    joint: str
-    text: str
-    fixable: bool = True
-
-    def __str__(self) -> str:
-        return f"{self.joint}: {self.text}"
-
-
-@dataclass(frozen=True)
 class Fixes(Published):
     """The fixes of a task: the smallest change of each kind alone, and combinations.
 
@@ -264,8 +234,23 @@ class Fixes(Published):
     stiffness_offset: StiffnessOffset | NotPossible | None = None
     stiffness_profile: StiffnessProfile | NotPossible | None = None
     transition: LongerTransition | NotPossible | None = None
-    causes: tuple[Cause, ...] = ()
+    causes: tuple[Finding, ...] = ()
     fixes: tuple[Fix, ...] = ()
+
+    shape: ClassVar = {
+        **named("min_margin", "slow_down", "stiffness_offset", "stiffness_profile", "transition"),
+        "causes": "published_causes",
+        "fixes": "fixes",
+    }
+
+    @property
+    def published_causes(self) -> list[dict[str, Any]]:
+        """JSON values of the causes, with their words."""
+        return [
+            {"joint": cause.joint, "text": cause.text, "fixable": cause.fixable, "kind": cause.kind}
+            | cause.as_json()
+            for cause in self.causes
+        ]
 
     def __str__(self) -> str:
         return "\n".join(self._lines())

@@ -16,17 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import MIN_MARGIN, check_min_margin
+from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin
 from vsacli.base.progress import Countdown, Progress, unseen
+from vsacli.base.texts import significant
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
 from vsacli.dynamics.inverse import fitted
+from vsacli.dynamics.limits import Finding
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Trouble, apart
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.fix_report import Cause, Fix, Fixes, NotPossible
-from vsacli.studies.search.loads import Load
+from vsacli.studies.search.fix_report import Fix, Fixes, NotPossible
+from vsacli.studies.search.loads import Load, joint_loads
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.studies.search.scans import (
     WATCHED_STEPS,
@@ -121,7 +123,7 @@ class _Tried(NamedTuple):
         return any(each.longer > 0 for each in candidates)
 
 
-def _tried(task: Task, found_causes: Mapping[int, Cause], searches: Countdown) -> _Tried:
+def _tried(task: Task, found_causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
     """Search for fixes of all joints that can be fixed."""
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
@@ -249,22 +251,20 @@ def _superfluous(fix: Fix, beside: Fix) -> bool:
     return beside.kinds == fix.kinds and beside.size <= fix.size and not faster
 
 
-def causes(task: Task) -> Iterator[tuple[int, Cause]]:
-    """Yield the index of each joint with a refused sample, and the cause."""
+def causes(task: Task) -> Iterator[tuple[int, Finding]]:
+    """Yield the index of each joint with a refused sample, and the worst violation with advice."""
     acceptance = task.acceptance
     refused = np.flatnonzero(acceptance.refused_joints(task.trajectory)).tolist()
     steps = acceptance.watched(task.trajectory, WATCHED_STEPS)
     moving, resting = (part.loads(acceptance.robot) for part in (steps, steps.slowed(math.inf)))
     beyond = acceptance.beyond_position(task.trajectory)
     for index in refused:
-        joint = acceptance.robot.joints[index]
         if index in beyond:
             advice = "timing and stiffness have no effect on that: change the path or the limit"
-            text = f"{_what(beyond[index])}; {advice}"
-            yield index, Cause(joint.name, text, fixable=False)
+            yield index, replace(beyond[index], advice=advice, fixable=False)
         else:
-            text, hopeful = _text(task, index, moving[index], resting[index])
-            yield index, Cause(joint.name, text, fixable=hopeful or is_fixable(task, index))
+            cause = _cause(task, index, moving[index], resting[index])
+            yield index, replace(cause, fixable=cause.fixable or is_fixable(task, index))
 
 
 def is_fixable(task: Task, index: int) -> bool:
@@ -286,22 +286,25 @@ def _alone(task: Task, index: int) -> Task:
     return Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
 
 
-def _text(task: Task, index: int, moving: Load, resting: Load) -> tuple[str, bool]:
-    """Return the cause as a clause, and whether it implies that some change helps."""
+def _cause(task: Task, index: int, moving: Load, resting: Load) -> Finding:
+    """Return the worst violation at rest, or else in motion, with advice; fixable where that implies it."""
     acceptance, joint = task.acceptance, task.acceptance.robot.joints[index]
-    at_rest = acceptance.trouble(joint, resting)
+    at_rest = acceptance.worst(joint, resting)
     if at_rest is None:
-        worst = acceptance.trouble(joint, moving)
-        return ("falls short between the samples" if worst is None else _what(worst)), True
+        (whole,) = joint_loads(acceptance.robot, task.trajectory, [index])
+        whole = whole.at(whole.steps)
+        first = float(whole.time[acceptance.refused_steps(joint, whole).argmax()])
+        unbounded = Finding(Flag.NOT_FINITE.label, first, math.nan, math.nan, "", joint=joint.name)
+        return acceptance.worst(joint, moving) or acceptance.worst(joint, whole) or unbounded
+    found = replace(at_rest, at_rest=True, fixable=False)
     if "stiffness" not in joint.actuator.commanded:
-        why = "no slower motion helps, and it has no stiffness to choose"
-        return f"{_what(at_rest, resting=True)}: {why}", False
+        return replace(found, advice="no slower motion helps, and it has no stiffness to choose")
     try:
         smallest_offset(acceptance, joint, resting)
     except ImpossibleError:
         why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
-        return f"{_what(at_rest, resting=True)}: {why}", False
-    return f"{_what(at_rest, resting=True)}: {_constant(task, index, moving)}", True
+        return replace(found, advice=why)
+    return replace(found, advice=_constant(task, index, moving), fixable=True)
 
 
 def _constant(task: Task, index: int, moving: Load) -> str:
@@ -331,27 +334,10 @@ def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
         offset = lowest_offset(acceptance, joint, resting)
     except ImpossibleError:
         return ""
-    trouble = acceptance.trouble(joint, resting.changed(offset))
-    if trouble is None:
+    worst = acceptance.worst(joint, resting.changed(offset))
+    if worst is None:
         return ""
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
     constant = asked.min() == asked.max()
-    least = f"{asked[0] + offset:.4g} {unit}" if constant else f"{offset:+.4g} {unit}"
-    return f", since with {least}, the least it may have, {_what(trouble)}"
-
-
-def _what(trouble: Trouble, *, resting: bool = False) -> str:
-    """Return the exceeded bound and the time, as a clause."""
-    when = f"at t = {trouble.time:.3f} s" + (", even at rest" if resting else "")
-    if math.isnan(trouble.bound):
-        return f"its springs cannot carry the elastic torque {when}"
-    side = "below" if trouble.value < trouble.bound else "above"
-    value, shown = apart(trouble.value, trouble.bound)
-    bound = f"its limit of {shown}" if math.isnan(trouble.attainable) else _needed(trouble, shown)
-    return f"{trouble.whose} is {value} {trouble.unit} {when}, {side} {bound}"
-
-
-def _needed(trouble: Trouble, shown: str) -> str:
-    """Return the stiffness that the margin requires, and the end of the attainable range, as a clause."""
-    end = "minimum" if trouble.value < trouble.bound else "maximum"
-    return f"the {shown} needed for a margin of {100 * trouble.margin:.4g} % ({end} {trouble.attainable:.4g})"
+    least = significant(asked[0] + offset, toward=math.inf) if constant else f"{offset:+.4g}"
+    return f", since with {least} {unit}, the least it may have, {worst.text}"

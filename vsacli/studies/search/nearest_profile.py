@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, evenly
+from vsacli.base.texts import significant
+from vsacli.base.units import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import (
     Acceptance,
     ImpossibleError,
     admissible_stiffness,
     checked_range,
-    stiffness_text,
     variable_stiffness_actuator,
 )
 from vsacli.studies.search.loads import Load
@@ -277,8 +278,9 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
     worst = int((low - high).argmax())
     if low[worst] > high[worst]:
         raise ImpossibleError(
-            f"{joint.name} needs at least {stiffness_text(joint, low[worst])} at t = {load.time[worst]:.3f} s"
-            f", but its limits of stiffness and deflection allow at most {high[worst]:.6g}"
+            f"{joint.name} needs a stiffness of at least {significant(low[worst], toward=math.inf)} at t = "
+            f"{load.time[worst]:.3f} s, but its limits of stiffness and deflection allow at most "
+            f"{significant(high[worst])} {STIFFNESS.unit(joint.type)}"
         )
 
 

@@ -14,8 +14,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vsacli.base.arrays import IndexArray, evenly
+from vsacli.base.texts import significant
+from vsacli.base.units import STIFFNESS
 from vsacli.robot.joint import Joint
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, stiffness_text
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
 from vsacli.studies.search.changed_motion import rate_of
 from vsacli.studies.search.loads import Load, TaskSamples, joined
 from vsacli.trajectory.trajectory import Trajectory
@@ -263,11 +265,12 @@ def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, fl
     rise, fall = admissible.low - asked, admissible.high - asked
     first, last = int(rise.argmax()), int(fall.argmin())
     if rise[first] > fall[last]:
+        unit = STIFFNESS.unit(joint.type)
         raise ImpossibleError(
             f"none takes {joint.name} from {asked[first]:.6g} to at least "
-            f"{stiffness_text(joint, admissible.low[first])} at t = {load.time[first]:.3f} s "
+            f"{significant(admissible.low[first], toward=math.inf)} {unit} at t = {load.time[first]:.3f} s "
             f"and from {asked[last]:.6g} to at most "
-            f"{stiffness_text(joint, admissible.high[last])} at t = {load.time[last]:.3f} s"
+            f"{significant(admissible.high[last], toward=-math.inf)} {unit} at t = {load.time[last]:.3f} s"
         )
     return float(rise[first]), float(fall[last])
 

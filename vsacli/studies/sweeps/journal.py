@@ -182,7 +182,8 @@ class Journal:
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
-            kept = f"the {len(self):,} rows in it stay, and the same command goes on with them"
+            rows = "row in it stays" if len(self) == 1 else f"{len(self):,} rows in it stay"
+            kept = f"the {rows}, and the same command goes on from there"
             raise StorageError(self.path, f"cannot be written: {reason(error)}; {kept}") from error
         self._places[row.key] = (self._end, len(line))
         self._end += len(line)

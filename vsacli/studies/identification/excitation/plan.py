@@ -15,6 +15,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
 from vsacli.documents.fields import LARGEST
+from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import (
     MARGIN,
@@ -33,7 +34,7 @@ from vsacli.studies.identification.excitation.fisher import (
     executed,
     predicted_errors,
 )
-from vsacli.studies.identification.excitation.plan_report import ActiveLimit, Excitation, Usefulness
+from vsacli.studies.identification.excitation.plan_report import Excitation, Usefulness
 from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -239,11 +240,11 @@ def _usefulness(
         return Usefulness(conditions, reason=str(error))
 
 
-def _active(design: Design, block: Block) -> tuple[ActiveLimit, ...]:
+def _active(design: Design, block: Block) -> tuple[Finding, ...]:
     quantities = watched(design)
     gaps = clearances(quantities, block)
     return tuple(
-        ActiveLimit(quantity.joint.name, quantity.at(block, int(of_quantity.argmin())))
+        quantity.at(block, int(of_quantity.argmin()))
         for quantity, of_quantity in zip(quantities, gaps, strict=True)
         if of_quantity.min() < MARGIN + ACTIVE
     )

@@ -8,16 +8,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from vsacli.analysis.joint_report import Worst
-from vsacli.analysis.minima import MARGIN as CORRIDOR
 from vsacli.analysis.report import Report
-from vsacli.base.flags import Flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.tables import ReportText, headline
 from vsacli.base.texts import counted, one_line
 from vsacli.base.version import __version__
 from vsacli.documents.commented import WIDTH, commented_document
+from vsacli.dynamics.limits import MARGIN as CORRIDOR
+from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import MARGIN, RATE
 from vsacli.studies.identification.excitation.fisher import PredictedError
@@ -25,28 +24,6 @@ from vsacli.studies.identification.identification_text import by_joint
 from vsacli.studies.search.fixed_text import formula
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.trajectory import Trajectory
-
-
-@dataclass(frozen=True)
-class ActiveLimit(Published):
-    """A bound that limits the amplitude of an excitation.
-
-    Attributes:
-        joint: name of the joint.
-        nearest: sample closest to the bound.
-    """
-
-    joint: str
-    nearest: Worst
-
-    shape: ClassVar = named("joint", "nearest")
-
-    def __str__(self) -> str:
-        worst = self.nearest
-        corridor = worst.kind == CORRIDOR
-        what = "stiffness" if corridor else Flag.labeled(worst.kind).quantity_of(worst.motor)
-        reason = " that its load allows" if corridor else ""
-        return f"{self.joint}: {what} {worst.value:.4g} of {worst.bound:.4g} {worst.unit}{reason}"
 
 
 @dataclass(frozen=True)
@@ -92,7 +69,7 @@ class Excitation(Published):
     planned: Usefulness
     own: Usefulness | None
     structural: tuple[str, ...]
-    active: tuple[ActiveLimit, ...]
+    active: tuple[Finding, ...]
     assumptions: tuple[str, ...]
 
     format: ClassVar[str] = "vsacli-excitation/2"
@@ -100,8 +77,15 @@ class Excitation(Published):
         "format": "format",
         **named("seed", "noise", "planned"),
         "own?": "own",
-        **named("structural", "active", "assumptions", "report"),
+        "structural": "structural",
+        "active": "published_active",
+        **named("assumptions", "report"),
     }
+
+    @property
+    def published_active(self) -> list[dict[str, Any]]:
+        """JSON values of the bounds that limit the amplitude."""
+        return [{"joint": each.joint, "nearest": each.as_json()} for each in self.active]
 
     @property
     def condition(self) -> float:
@@ -130,7 +114,7 @@ class Excitation(Published):
         """Return the report in parts."""
         lines = [
             *self._legend(),
-            *(f"active limit, {100 * MARGIN:g} % from its bound: {each}" for each in self.active),
+            *(f"active limit, {100 * MARGIN:g} % from its bound: {_nearest(each)}" for each in self.active),
             *([] if self.active else ["active limits: none"]),
             f"seed of the search: {self.seed}",
         ]
@@ -172,6 +156,12 @@ class Excitation(Published):
                 theirs = [] if own is None else [_error(own.get(each.path))]
                 rows.append((name, each.unit, f"{each.value:.4g}", _error(each), _share(each), *theirs))
         return rows
+
+
+def _nearest(finding: Finding) -> str:
+    value, bound = finding.numbers
+    reason = " that its load allows" if finding.kind == CORRIDOR else ""
+    return f"{finding.joint}: {finding.quantity} {value} of {bound} {finding.unit}{reason}"
 
 
 def _error(number: PredictedError | None) -> str:
