@@ -137,7 +137,7 @@ def random_task(seed: int) -> Task | None:
     trajectory = Trajectory(times, position, stiffness, name="random")
     task = Task(robot, trajectory, index, name)
     flags = compute_block(robot, trajectory.at(np.linspace(*span, 401))).flags
-    sprung = hasattr(robot.joints[index].actuator, "spring")
+    sprung = getattr(robot.joints[index].actuator, "spring", None) is not None
     if flags.any() or (name == "phi" and not sprung) or not np.isfinite(task.size(np.array([0.1]))).all():
         return None
     return task

@@ -30,7 +30,7 @@ SPAN = (0.0, 2.0)
 AMPLITUDE = 0.3
 
 
-def swinging(deviations, *, stiffness=1500.0, unreliable=(0.0, 0.0), known=True):
+def swinging(deviations, *, stiffness=1500.0, unreliable=(0.0, 0.0), known=True, rate=500.0):
     """Three joints that swing by `AMPLITUDE`; deviations of q to d4q, each joint's alike."""
     sines = Sinusoids(
         signal=POSITION,
@@ -45,7 +45,7 @@ def swinging(deviations, *, stiffness=1500.0, unreliable=(0.0, 0.0), known=True)
         covariances[2] = np.nan
     firm = Constant(signal=STIFFNESS, span=SPAN, value=(stiffness,) * 3)
     position = Blurred(sines, covariances, unreliable=unreliable)
-    return Trajectory(UniformTimes(SPAN[1], 500.0), position, {"stiffness": firm}, name="swing")
+    return Trajectory(UniformTimes(SPAN[1], rate), position, {"stiffness": firm}, name="swing")
 
 
 def limited(**limits):
@@ -119,6 +119,16 @@ def test_what_lies_beyond_the_allowance_stays_flagged_and_what_does_not_is_named
     np.testing.assert_array_equal(flagged, beyond > 1.8e-4 + 0.2998e-9)
     named = result.report.joints[0].uncertainty.limits["position_limit"]
     assert abs(named.value) - 0.2998 == pytest.approx(beyond[beyond <= 1.8e-4].max())
+
+
+def test_a_peak_between_samples_that_keep_their_limit_within_the_uncertainty_counts():
+    """Samples are 1e-4 beyond the limit, of which 2e-4 are allowed, and the four peaks 0.04."""
+    sample = AMPLITUDE * math.sin(math.pi / 3)
+    result = inverse_dynamics(limited(position=sample - 1e-4), swinging((1e-4, *STEADY[1:]), rate=6.0))
+    joint = result.report.joints[0]
+    assert abs(joint.worst["position_limit"].value) == pytest.approx(AMPLITUDE)
+    assert result.report.verdict == "over_limit"
+    assert has(result.flags[:, 0], Flag.POSITION_LIMIT).sum() == joint.samples["over_limit"] == 4
 
 
 def test_the_allowance_of_a_one_sided_limit_is_a_share_of_the_bound():
@@ -198,7 +208,7 @@ def test_the_unreliable_ends_of_a_record_do_not_count():
 
     steady = swinging(STEADY).position
     position = Frayed(steady.exact, steady.covariances, unreliable=(0.21, 0.11))
-    ends = Trajectory(UniformTimes(SPAN[1], 500.0), position, swinging(STEADY).commanded, name="frayed")
+    ends = Trajectory(UniformTimes(SPAN[1], rate), position, swinging(STEADY).commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), ends).report.verdict == "ok"
     assert "unreliable end" not in str(inverse_dynamics(vsa_3r(), ends).report)
     shorter = dataclasses.replace(position, unreliable=(0.19, 0.11))
