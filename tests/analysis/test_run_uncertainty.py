@@ -208,7 +208,7 @@ def test_the_unreliable_ends_of_a_record_do_not_count():
 
     steady = swinging(STEADY).position
     position = Frayed(steady.exact, steady.covariances, unreliable=(0.21, 0.11))
-    ends = Trajectory(UniformTimes(SPAN[1], rate), position, swinging(STEADY).commanded, name="frayed")
+    ends = Trajectory(UniformTimes(SPAN[1], 500.0), position, swinging(STEADY).commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), ends).report.verdict == "ok"
     assert "unreliable end" not in str(inverse_dynamics(vsa_3r(), ends).report)
     shorter = dataclasses.replace(position, unreliable=(0.19, 0.11))

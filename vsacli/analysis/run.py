@@ -163,9 +163,7 @@ class Run:
             block, between = block.taken(slice(last + 1)), [each.where(each.step <= last) for each in between]
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
-            for (
-                minima
-            ) in between:  # again: limits that the samples keep within their uncertainty were cleared
+            for minima in between:  # again, since the samples themselves may keep limits within it
                 minima.mark(block.flags)
         self._samples += len(block.time)
         for minima in between:
