@@ -19,12 +19,14 @@ from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 from scipy.optimize import minimize_scalar
 
+from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
+from vsacli.dynamics.limits import worst_excess
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves.sinusoids import Sinusoids
@@ -251,3 +253,18 @@ def test_limits_about_a_last_sample_that_is_not_the_peak(vsacli: Callable[..., O
     inputs = REPOSITORY / "robots/vsa_3r.yaml", REPOSITORY / "trajectories/rest_to_rest.yaml"
     changes = "--set", f"joints.shoulder.actuator.motor.max_torque={bound}", "--set", "rate=40"
     assert vsacli("check-feasibility", *inputs, *changes).code == 3
+
+
+def test_a_flag_of_one_motor_states_nothing_of_the_other() -> None:
+    """Motor 2 has the larger limit, and is over it by less than the tolerance, but by more than motor 1."""
+    joint = shipped_robot("vsa_3r").joints[0]
+    torques = {"tau_motor": np.array([[1 + 2e-9], [1e3 + 9e-7]])}
+    checks = [
+        LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor, (-bound, bound))
+        for motor, bound in ((1, 1.0), (2, 1e3))
+    ]
+    beyond = np.array([True])
+    first, second = (worst_excess(joint, check, torques, np.zeros(1), beyond) for check in checks)
+    assert first is not None
+    assert first.motor == 1
+    assert second is None

@@ -524,3 +524,11 @@ def test_motors_of_many_joints_that_start_equal_are_named_together():
     assert "initial motor positions: j0 to j4, j6, j7 +0.07276 -0.05513 rad;\n" in text
     assert "                         j5 +0.1 +0.2 rad\n" in text
     assert "final motor positions: j0 to j7 -0.8426 -1.24 rad\n" in text
+
+
+def test_a_column_has_one_number_format():
+    """Next to a singular sample, torques have exponents; so have those of the other joints."""
+    huge = replace(QUIET, name="wrist", peak_tau_motor=(2.96e8, 8570501.0))
+    text = render(report(QUIET, huge))
+    assert line(text, "wrist").split()[2:5] == ["2.96e+08", "/", "8.57e+06"]
+    assert line(text, "elbow").split()[2:5] == ["98.9", "/", "91.6"]
