@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.analysis.minima import (
+    DECISIVE,
     KNOWN,
     ROUNDING,
     Brackets,
@@ -193,7 +194,7 @@ class Between:
     def _search(self, known: Known, steps: Known) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
 
-        Of those that differ from the samples by rounding only, minima with a further flag are kept.
+        Of those that hardly differ from the samples, minima with a further flag that decides are kept.
         """
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
@@ -204,7 +205,8 @@ class Between:
         noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
         lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
         kept = lower & (sides.clearance(side, value) <= NEAR)
-        kept |= (sides.beyond(side, value) & ~sides.beyond(side, at_steps)).any(axis=1)
+        further = sides.beyond(side, value) & ~sides.beyond(side, at_steps)
+        kept |= further[:, :DECISIVE].any(axis=1)
         if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
             self._keep(found.where(kept), steps.first + nearest[kept])

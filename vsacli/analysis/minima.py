@@ -92,6 +92,10 @@ Side: TypeAlias = tuple[float, float, float, float, float, float]
 from it that is a clearance of 1, and distances below it beyond which flags are set, the gravest first."""
 
 
+DECISIVE = 2
+"""Number of these flags on which the verdict depends; the last, of a near-singular sample, is a warning."""
+
+
 class Sides:
     """The sides of quantities, as functions of time that do not depend on the bounds, except for margins.
 
