@@ -130,7 +130,6 @@ def test_a_yaml_file_with_the_name_of_a_table(csv):
             "expected a header line with column names such as time, base.q, found numbers; without one, "
             "columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}",
         ),
-        ("time q1\n1 2\n", "expected commas, semicolons or tabs between columns, found spaces"),
         (
             "a,b\0\n1,2\n",
             "expected a header line with column names such as time, base.q in UTF-8, found other bytes",

@@ -110,8 +110,10 @@ def test_stamps_that_go_back_are_told_with_their_line(tmp_path: Path) -> None:
     time, q = signal(100)
     time[60] = time[58]
     described = recording(tmp_path, table(time, a_pos=q))
-    message = "log.csv:62: time must increase, but 0.116 s follows 0.118 s; sort the rows by time"
-    assert described["warnings"][0] == message
+    message = (
+        "log.csv:62: time must increase, but 0.116 s follows 0.118 s; correct these stamps, or set rate: "
+    )
+    assert described["warnings"][0].startswith(message + "500 ")
     assert "100 rows, 0.198 s, 500 Hz\n" in render(described)
 
 

@@ -340,7 +340,7 @@ BAD = {
         "t [s],m1\n0,1\n1,2\n",
         [],
     ),
-    "m.csv:4: time must increase, but 1.0 follows 1.0; sort the rows by time": (
+    "m.csv:4: time must increase, but 1 s appears twice; correct these stamps, or set rate": (
         "time,base.q\n0,1\n1,2\n1,3\n",
         [],
     ),

@@ -158,8 +158,16 @@ def test_positions_may_be_negative():
 @pytest.mark.parametrize(
     ("times", "message"),
     [
-        ([0, 1, 1, 0], "time[2] must increase, but 1.0 s appears twice; delete one of the samples"),
-        ([0, 2, 1], "time[2] must increase, but 1.0 s follows 2.0 s; sort the samples by time"),
+        (
+            [0, 1, 1, 0],
+            "time[2] must increase, but 1 s appears twice (2 such rows); correct these "
+            "stamps, or set rate: 1 in their place if the rows are equally spaced",
+        ),
+        (
+            [0, 2, 1],
+            "time[2] must increase, but 1 s follows 2 s; correct these "
+            "stamps, or set rate: 0.5 in their place if the rows are equally spaced",
+        ),
         ([0, 1, np.nan, 0], "time[2] must be finite, not nan"),
         ([-np.inf, 1], "time[0] must be finite, not -inf"),
     ],

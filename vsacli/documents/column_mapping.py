@@ -98,11 +98,13 @@ class ColumnMapping:
         columns: columns of the file, by the names under which they are read.
         ignore: `REST`, or columns to leave out.
         rate: rows per second of a file without times; None if the file has times.
+        skip_rows: numbers of lines of the file that are neither header nor rows.
     """
 
     columns: Mapping[str, MappedColumn] = dataclasses.field(default_factory=dict)
     ignore: str | tuple[str | int, ...] = ()
     rate: float | None = None
+    skip_rows: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.columns or self.ignore)
@@ -141,7 +143,8 @@ class ColumnMapping:
                 )
         rest = REST in (self.ignore, other.ignore)
         ignore = REST if rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
-        return ColumnMapping({**self.columns, **other.columns}, ignore, self.rate or other.rate)
+        skip_rows = tuple(sorted({*self.skip_rows, *other.skip_rows}))
+        return ColumnMapping({**self.columns, **other.columns}, ignore, self.rate or other.rate, skip_rows)
 
 
 AS_NAMED = ColumnMapping()

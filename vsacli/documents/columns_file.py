@@ -18,7 +18,17 @@ from vsacli.documents import tree
 from vsacli.documents.column_mapping import AS_NAMED, REST, ColumnMapping, MappedColumn
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.field_kinds import Check, OwnKind, Refer, Schema, Text
-from vsacli.documents.fields import LARGEST, NON_ZERO, POSITIVE, check_fields, number, text, value
+from vsacli.documents.fields import (
+    LARGEST,
+    NON_ZERO,
+    POSITIVE,
+    Integer,
+    Items,
+    check_fields,
+    number,
+    text,
+    value,
+)
 from vsacli.documents.nested import read_record
 from vsacli.documents.number import evaluate
 from vsacli.documents.reading import read_document
@@ -152,19 +162,27 @@ def ignore_field() -> Any:
     return value(Ignored(), f"columns to ignore; `{REST}`: all columns that are not used", default=None)
 
 
+def skip_rows_field() -> Any:
+    """Declare a field for lines that are neither header nor rows."""
+    doc = "line numbers of a preamble above the header, or of a row of units below it, to leave out"
+    return value(Items(Integer()), doc, check=POSITIVE, default=None)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ColumnsFile:
     """The content of a columns file: the keys of a trajectory file that concern its recordings."""
 
     columns: Mapping[str, MappedColumn] | None = columns_field()
     ignore: str | tuple[str | int, ...] | None = ignore_field()
+    skip_rows: tuple[int, ...] | None = skip_rows_field()
     rate: float | None = number(
         RATE, "sampling rate of recordings without a time column", check=POSITIVE, default=None
     )
 
     def __post_init__(self) -> None:
-        nothing = FieldProblem((), "says nothing: give columns, ignore or rate")
-        check_fields(self, *([] if self.columns or self.ignore or self.rate else [nothing]))
+        nothing = FieldProblem((), "says nothing: give columns, ignore, skip_rows or rate")
+        stated = self.columns or self.ignore or self.skip_rows or self.rate
+        check_fields(self, *([] if stated else [nothing]))
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
@@ -176,7 +194,9 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
     if path is None:
         return AS_NAMED
     document, _ = read_document(path, ColumnsFile, FORMAT)
-    return ColumnMapping(document.columns or {}, document.ignore or (), document.rate)
+    return ColumnMapping(
+        document.columns or {}, document.ignore or (), document.rate, document.skip_rows or ()
+    )
 
 
 def checked_rate(given: Any) -> float:

@@ -1,8 +1,9 @@
 """CSV files: the header, and the rows as texts or numbers. Columns are positions here, without a meaning.
 
-A tab, semicolon or comma in the header separates the cells. With separators other than the comma, numbers may
-have decimal commas. Cells may be in double quotes, and a comment goes from `#` to the end of a line. NumPy
-reads the numbers; single lines are parsed only if they are unusual, and to report problems.
+A tab, semicolon or comma in the header separates the cells, or blanks if there is none of these. With
+separators other than the comma, numbers may have decimal commas. Cells may be in double quotes, and a comment
+goes from `#` to the end of a line. NumPy reads the numbers; single lines are parsed only if they are unusual,
+and to report problems.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -34,6 +35,8 @@ MAX_HEADER = 100_000
 lines."""
 SEPARATORS = ("\t", ";", ",")
 """Separators in the order in which the header line is searched for them, outside quotes."""
+BLANKS = " "
+"""Separator of a file whose header has none of these but several words; any number of blanks separates."""
 COMMENT = "#"
 QUOTE = '"'
 NOT_UTF8 = "\ufffd"
@@ -44,8 +47,24 @@ MAX_KINDS = 10
 """Maximum number of kinds of problems to report."""
 MAX_ALIKE = 1000
 """Number of problems of one kind after which reading stops."""
-NOTHING = ("", "nan")
-"""Cells without a number, where empty cells are allowed."""
+MISSING = frozenset(
+    (
+        "",
+        "nan",
+        "-nan",
+        "+nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "-1.#ind",
+        "1.#qnan",
+        "na",
+        "n/a",
+        "#n/a",
+        "null",
+        "none",
+    )
+)
+"""Cells without a number, in lower case, as C compilers, spreadsheets and statistics programs write them."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _INDEX = re.compile(r"\d+")
@@ -57,6 +76,9 @@ _KEY = re.compile(r"format: +\S")
 """Beginning of a YAML file of this program."""
 
 _QUOTED = re.compile(r'"[^"]*"')
+_UNIT = re.compile(r"\[[^\]]*\]")
+_BETWEEN_BLANKS = re.compile(r'(?:"[^"]*"|[^\s"\[]+(?:\[[^\]]*\]\S*)*)(?:\s+\[[^\]]*\])?')
+"""A cell of a line whose separators are blanks, with its unit in brackets."""
 
 
 class Header(NamedTuple):
@@ -66,11 +88,26 @@ class Header(NamedTuple):
         line: line number of the header, from 1; 0 if the table has none and the first line is a row.
         separator: character between the cells of a line.
         columns: names of the columns as written, without quotes; empty texts if there is no header.
+        skipped: numbers of lines that are neither header nor rows.
     """
 
     line: int
     separator: str
     columns: tuple[str, ...]
+    skipped: frozenset[int] = frozenset()
+
+    @property
+    def above(self) -> int:
+        """Number of lines above the first one that may be a row."""
+        line = self.line
+        while line + 1 in self.skipped:
+            line += 1
+        return line
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether lines are skipped between rows."""
+        return any(line > self.above for line in self.skipped)
 
 
 def split_heading(text: str) -> tuple[str, str | None]:
@@ -81,8 +118,10 @@ def split_heading(text: str) -> tuple[str, str | None]:
     return match["name"], match["unit"]
 
 
-def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> Header:
-    """Return the header of a CSV file with any column names; see `header_of` for `numbered`.
+def read_header(
+    path: str | os.PathLike[str], numbered: Sequence[int] = (), skipped: Collection[int] = ()
+) -> Header:
+    """Return the header of a CSV file with any column names; see `header_of` for `numbered` and `skipped`.
 
     Raises:
         InputError: the file cannot be read, or does not begin like a table.
@@ -91,12 +130,19 @@ def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> H
     check_input_file(name, MAX_BYTES)
     try:
         with recognizing_other_formats(name), open(place_of(name), "rb") as content:
-            return header_of(content, name, strict=False, numbered=numbered)
+            return header_of(content, name, strict=False, numbered=numbered, skipped=skipped)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
 
 
-def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Sequence[int] = ()) -> Header:
+def header_of(
+    content: BinaryIO,
+    name: str,
+    *,
+    strict: bool = True,
+    numbered: Sequence[int] = (),
+    skipped: Collection[int] = (),
+) -> Header:
     """Return the header of a table.
 
     Args:
@@ -105,33 +151,44 @@ def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Se
         strict: whether each column must have a unique name.
         numbered: numbers of columns, from 1, that need no name: if all of them hold numbers, the line is a
             row.
+        skipped: numbers of lines to leave out.
 
     Raises:
         InputError: with every problem of the line.
     """
     file = TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
     number, line, comment = 0, "\n", 0
-    while (line == "\n" or line.startswith(COMMENT)) and len(line) < MAX_HEADER:
-        comment = number if line != "\n" else comment
+    while (line == "\n" or line.startswith(COMMENT) or (line and number in skipped)) and len(
+        line
+    ) < MAX_HEADER:
+        comment = number if line.startswith(COMMENT) else comment
         number, line = number + 1, file.readline(MAX_HEADER)
     file.detach()
     text = line.partition(COMMENT)[0]
-    bare = _QUOTED.sub("", text)
-    separator = next((mark for mark in SEPARATORS if mark in bare), SEPARATORS[-1])
+    separator = separator_of(text)
     columns = tuple(cell.strip() for cell in cells_of(text.rstrip("\r\n"), separator))
     numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
     if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
-        return Header(0, separator, ("",) * len(columns))
+        return Header(0, separator, ("",) * len(columns), frozenset(skipped))
     number = number if line else 0
     found = _header_problems(line, columns, comment, strict)
     problems = [Problem(name, number, message) for message in found]
     if problems:
         raise InputError(problems)
-    return Header(number, separator, columns)
+    return Header(number, separator, columns, frozenset(skipped))
+
+
+def separator_of(line: str) -> str:
+    """Return the separator in a line, preferably the header."""
+    bare = _QUOTED.sub("_", line)
+    blanks = BLANKS if len(_UNIT.sub("", bare).split()) > 1 else SEPARATORS[-1]
+    return next((mark for mark in SEPARATORS if mark in bare), blanks)
 
 
 def cells_of(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without quotes."""
+    if separator == BLANKS:
+        return [cell.replace(QUOTE, "") for cell in _BETWEEN_BLANKS.findall(line)]
     return next(csv.reader([line], delimiter=separator), [""]) if QUOTE in line else line.split(separator)
 
 
@@ -141,6 +198,11 @@ def is_number(cell: str) -> bool:
         return math.isfinite(float(cell)) and cell.isascii() and "_" not in cell
     except ValueError:
         return False
+
+
+def is_missing(cell: str) -> bool:
+    """Return whether a cell says that there is no number, as empty ones do."""
+    return cell.strip().lower() in MISSING
 
 
 def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: bool) -> Iterator[str]:
@@ -156,8 +218,6 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
         yield f"{HEADER}, found numbers{_advice(comment)}"
     elif _KEY.match(line):
         yield f"{HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
-    elif len(columns) == 1 and len(line.partition("[")[0].split()) > 1:
-        yield "expected commas, semicolons or tabs between columns, found spaces"
     elif strict:
         yield from (f"column {i} has no name" for i, column in enumerate(columns, 1) if not column)
         repeated = Counter(column for column in columns if column)
@@ -177,7 +237,7 @@ class Rows(NamedTuple):
         path: path of the file.
         header: header of the file.
         used: positions of the columns to read, ascending, from 0.
-        empty_cells: whether cells of these columns may be empty, or hold `nan`.
+        empty_cells: whether cells of these columns may be empty, or say otherwise that a number is missing.
     """
 
     path: str
@@ -210,7 +270,7 @@ class Rows(NamedTuple):
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield number and content of each line below the header that is not empty."""
         with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
-            yield from filled_lines(file, self.header.line)
+            yield from filled_lines(file, self.header)
 
 
 def wrong_count(expected: int, found: int) -> str:
@@ -232,11 +292,11 @@ def of_columns(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
         yield f"{where}: {problem}"
 
 
-def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:
-    """Yield number and content of each line below the header that is not empty."""
+def filled_lines(file: Iterable[str], header: Header) -> Iterator[tuple[int, str]]:
+    """Yield number and content of each line below the header that is neither empty nor skipped."""
     for number, line in enumerate(file, 1):
         content = line.rstrip("\n").partition(COMMENT)[0]
-        if number > header_line and content:
+        if number > header.line and content.strip(BLANKS) and number not in header.skipped:
             yield number, content
 
 
@@ -249,7 +309,7 @@ def read_numbers(rows: Rows) -> FloatArray:
         InputError: a cell is not a number, or a line is not a row of this table; with file and line.
     """
     values, reason = np.empty((0, 0)), None
-    if rows.all_used or _is_regular(rows):
+    if not rows.header.interrupted and (rows.all_used or _is_regular(rows)):
         values, reason = _loaded(rows, float)
     if not values.size:
         values, reason = _loaded(rows, float, _cleaned(rows))
@@ -276,10 +336,14 @@ def _loaded(
             values = np.loadtxt(
                 os.path.abspath(place_of(rows.path)) if cleaned is None else cleaned,
                 dtype=kind,
-                delimiter=header.separator if cleaned is None else "\t",
+                delimiter="\t"
+                if cleaned is not None
+                else None
+                if header.separator == BLANKS
+                else header.separator,
                 comments=COMMENT,
                 encoding="latin-1",  # decodes any comment; numbers are ASCII
-                skiprows=header.line if cleaned is None else 0,
+                skiprows=header.above if cleaned is None else 0,
                 usecols=used if cleaned is None else None,
                 ndmin=2,
             )
@@ -292,12 +356,14 @@ def _is_regular(rows: Rows) -> bool:
     """Return whether each line has as many cells as the header, so that columns can be picked by position.
 
     NumPy's reader does not count the cells that it skips. Lines with quotes or comments are parsed one by
-    one.
+    one, as are those with blanks for separators.
     """
     expected, separator = len(rows.header.columns) - 1, ord(rows.header.separator)
+    if rows.header.separator == BLANKS:
+        return False
     rest = b""
     with open(place_of(rows.path), "rb") as file:
-        for _ in range(rows.header.line):
+        for _ in range(rows.header.above):
             file.readline()
         while chunk := file.read(CHUNK):
             text, _, rest = (rest + chunk).rpartition(b"\n")
@@ -328,7 +394,7 @@ def _cleaned(rows: Rows) -> Iterator[str]:
             raise _IrregularError(line)
         used = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
         if rows.empty_cells:
-            used = [cell or "nan" for cell in used]
+            used = ["nan" if not cell[-1:].isdigit() and is_missing(cell) else cell for cell in used]
         yield "\t".join(map(decimals.with_points, used))
 
 
@@ -389,7 +455,7 @@ def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> I
         return
     for place in rows.used:
         name, cell = rows.name(place), cells[place]
-        if rows.empty_cells and cell.strip().lower() in NOTHING:
+        if rows.empty_cells and is_missing(cell):
             continue
         try:
             number = with_point(cell)
@@ -397,6 +463,6 @@ def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> I
             number, hint = "", "; the decimal sign is a comma in some cells and a point in others"
             hint = hint if separator != "," and _DECIMAL_COMMA.fullmatch(cell.replace(".", ",")) else ""
         else:
-            hint = "; delete the row, or fill in the value" if cell.strip().lower() in NOTHING else ""
+            hint = "; delete the row, or fill in the value" if is_missing(cell) else ""
         if not is_number(number):
             yield name, f"column {name}: expected a number, found {cell.strip()[:40]!r}{hint}"

@@ -70,8 +70,8 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     """Read a CSV file into records.
 
     The first line names the columns: fields in any order, numbers in other than SI units with their unit in
-    brackets. A tab, semicolon or comma in it is the separator. Cells may be in double quotes; an empty cell
-    leaves a field at its default. Comments go from `#` to the end of a line.
+    brackets. A tab, semicolon or comma in it is the separator, else blanks. Cells may be in double quotes; an
+    empty cell leaves a field at its default. Comments go from `#` to the end of a line.
 
     Args:
         path: path of the file, UTF-8.
@@ -88,7 +88,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     problems.check()
     records: dict[int, _Record] = {}
     first: dict[Any, int] = {}
-    for number, content in filled_lines(text.splitlines(), header.line):
+    for number, content in filled_lines(text.splitlines(), header):
         cells = [cell.strip() for cell in cells_of(content, header.separator)]
         if not any(cells):
             continue

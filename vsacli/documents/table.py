@@ -18,6 +18,7 @@ from vsacli.documents.column_mapping import AS_NAMED, ChosenColumns, ColumnMappi
 from vsacli.documents.csv_file import (
     CHUNK,
     MAX_BYTES,
+    SEPARATORS,
     Header,
     Rows,
     filled_lines,
@@ -25,6 +26,7 @@ from vsacli.documents.csv_file import (
     read_numbers,
     split_heading,
 )
+from vsacli.documents.preamble import naming_lines_to_skip
 from vsacli.documents.source import (
     MAX_DOCUMENT_BYTES,
     Source,
@@ -34,6 +36,13 @@ from vsacli.documents.source import (
     refuse_other_formats,
 )
 from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a_clock
+
+AT_TOP = Header(1, SEPARATORS[-1], ())
+"""Header in the first line."""
+
+SAME_STAMP = 1e-4
+"""Largest difference of equal stamps, in intervals of a signal: a joint at 1 rad/s moves by 1e-6 rad within
+it if there are 100 rows in a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,29 +54,33 @@ class Table:
         values: finite values, (rows, columns), with at least one row if there is a column; NaN in empty
             cells, if these are allowed.
         source: file that was read.
-        header_line: line number of the header in the file, from 1; 0 if there is none.
+        header: header of the file.
         others: names of columns that were not read because they are unknown.
         ignored: names of columns that the mapping leaves out.
         first_stamp: first time, which was subtracted, if times were too large for floating point or clock
             texts.
         kept: indices (rows,) of the rows in the file; None if all rows are kept.
         rated: whether the file has no times, and they were computed from the rate of the mapping.
+        hollow: names of columns that were left out since they hold no number.
+        joined: number of rows that were joined to the row before them.
     """
 
     columns: tuple[str, ...]
     values: FloatArray = field(repr=False)
     source: Source
-    header_line: int = 1
+    header: Header = AT_TOP
     others: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     first_stamp: int | str | None = None
     kept: IndexArray | None = field(repr=False, default=None)
     rated: bool = False
+    hollow: tuple[str, ...] = ()
+    joined: int = 0
 
     @cached_property
     def lines(self) -> Lines:
         """Line numbers of the rows in the file."""
-        return Lines(self.source.path, self.header_line, self.kept)
+        return Lines(self.source.path, self.header, self.kept)
 
     def line_of(self, row: int) -> int:
         """Return the line number of a row counted from 0; 0 if the file no longer exists."""
@@ -75,11 +88,49 @@ class Table:
 
     def without_empty_rows(self) -> Table:
         """Return the rows with a number in any column but the time; others are of other topics of a log."""
-        signals = [index for index, name in enumerate(self.columns) if split_heading(name)[0] != TIME]
-        there = ~np.isnan(self.values[:, signals]).all(axis=1)
+        there = ~np.isnan(self.values[:, self._signals]).all(axis=1)
         if there.all() or not there.any():
             return self
         return replace(self, values=self.values[there], kept=np.flatnonzero(there))
+
+    def without_hollow_columns(self) -> Table:
+        """Return the columns that hold a number; the others become `hollow`."""
+        empty = np.isnan(self.values).all(axis=0) & (len(self.values) > 0)
+        if not empty.any():
+            return self
+        full = np.flatnonzero(~empty).tolist()
+        hollow = tuple(split_heading(self.columns[index])[0] for index in np.flatnonzero(empty).tolist())
+        return replace(
+            self, columns=tuple(self.columns[at] for at in full), values=self.values[:, full], hollow=hollow
+        )
+
+    def with_joined_rows(self) -> Table:
+        """Return the table with rows joined whose stamps are nearly equal, and that fill different columns.
+
+        Some loggers write one row for each signal of a message, a nanosecond apart. Nothing is joined if two
+        of such rows hold numbers in the same column.
+        """
+        there = ~np.isnan(self.values[:, self._signals])
+        at = next((index for index in range(len(self.columns)) if index not in self._signals), None)
+        if at is None or there.all() or not there.any():
+            return self
+        stamps = self.values[:, at]
+        intervals = np.abs(np.diff(stamps[there[:, int(np.argmax(there.sum(axis=0)))]]))
+        near = SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0
+        starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
+        filled = np.add.reduceat(there.astype(int), starts, axis=0)
+        if len(starts) == len(stamps) or filled.max() > 1:
+            return self
+        values = np.add.reduceat(np.nan_to_num(self.values), starts, axis=0)
+        values[:, self._signals] = np.where(filled > 0, values[:, self._signals], np.nan)
+        values[:, at] = stamps[starts]
+        kept = starts if self.kept is None else self.kept[starts]
+        return replace(self, values=values, kept=kept, joined=len(stamps) - len(starts))
+
+    @cached_property
+    def _signals(self) -> list[int]:
+        """Positions of the columns other than the time."""
+        return [index for index, name in enumerate(self.columns) if split_heading(name)[0] != TIME]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +139,12 @@ class Lines:
 
     Attributes:
         path: path of the file.
-        header_line: line number of the header, from 1.
+        header: header of the table.
         kept: indices (rows,) of the rows in the file; None if all rows are kept.
     """
 
     path: str
-    header_line: int
+    header: Header
     kept: IndexArray | None = None
 
     def of(self, row: int) -> int:
@@ -105,7 +156,7 @@ class Lines:
     def _numbers(self) -> IndexArray:
         try:
             with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
-                numbers = [number for number, _ in filled_lines(file, self.header_line)]
+                numbers = [number for number, _ in filled_lines(file, self.header)]
         except OSError:
             numbers = []
         return np.array(numbers, dtype=np.intp)
@@ -120,15 +171,15 @@ def read_table(
 ) -> Table:
     """Read a CSV file, at about the cost in time and memory of `numpy.loadtxt`.
 
-    The first line names the columns, quoted or not; a tab, semicolon or comma in it is the separator. With
-    separators other than the comma, numbers may have decimal commas. Comments go from `#` to the end of a
-    line. Lines without other content are skipped, also before the header.
+    The first line names the columns, quoted or not; a tab, semicolon or comma in it is the separator, else
+    blanks are. With separators other than the comma, numbers may have decimal commas. Comments go from `#` to
+    the end of a line. Lines without other content are skipped, also before the header.
 
     Args:
         path: path of the file; UTF-8, with or without a byte order mark.
         mapping: names of foreign columns, and columns to leave out.
         known: names of columns to read, if present; all if None.
-        empty_cells: whether cells may be empty, or hold `nan`, where a column has no sample.
+        empty_cells: whether cells may be empty, or hold `nan`, `NA` or the like.
 
     Raises:
         InputError: with file and line of every problem.
@@ -136,9 +187,15 @@ def read_table(
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with recognizing_other_formats(name):
+        with recognizing_other_formats(name), naming_lines_to_skip(name, mapping.skip_rows):
             with open(place_of(name), "rb") as content:
-                header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
+                header = header_of(
+                    content,
+                    name,
+                    strict=not mapping,
+                    numbered=mapping.numbers,
+                    skipped=mapping.skip_rows,
+                )
                 digest, text = _survey(content, name)
             chosen = mapping.applied(header, known, name)
             headings, values, first_stamp = _values(name, header, chosen, empty_cells)
@@ -155,7 +212,7 @@ def read_table(
         headings,
         values,
         source,
-        header.line,
+        header,
         chosen.others,
         chosen.ignored,
         first_stamp=first_stamp,

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.documents.csv_file import NOTHING, Rows, is_number, read_integers
+from vsacli.documents.csv_file import Rows, is_missing, is_number, read_integers
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -162,7 +162,7 @@ def shows_a_clock(times: Rows) -> bool:
         InputError: the column begins with a text that is neither a clock text nor a number.
     """
     line, cell = next(_cells(times), (0, ""))
-    if is_number(cell.replace(",", ".")) or cell.lower() in NOTHING:
+    if is_number(cell.replace(",", ".")) or is_missing(cell):
         return False
     if read_clock(cell) is None:
         message = f"column {times.name(times.used[0])}: expected {EXPECTED}, found {cell[:40]!r}"

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.documents.column_mapping import MappedColumn
-from vsacli.documents.csv_file import NOTHING, Header, Rows, is_number, read_header, split_heading
+from vsacli.documents.csv_file import Header, Rows, is_missing, is_number, read_header, split_heading
 from vsacli.documents.time_column import (
     EXPECTED,
     NAMES,
@@ -81,7 +81,7 @@ class FirstRows:
 
     def filled(self, place: int) -> list[str]:
         """Return the cells of a column that are not empty."""
-        return [row[place] for row in self.cells if row[place].strip().lower() not in NOTHING]
+        return [row[place] for row in self.cells if not is_missing(row[place])]
 
     def numbers(self, place: int) -> list[float]:
         """Return the numbers of a column; an empty list if it holds anything else."""

@@ -34,9 +34,9 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
+from vsacli.trajectory.recorded.disorder import find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.health import column_faults
-from vsacli.trajectory.recorded.problems import out_of_order
 from vsacli.trajectory.recorded.recording import NEEDED
 from vsacli.trajectory.recorded.stamps import stamp_faults
 
@@ -244,9 +244,8 @@ class _Survey:
                 if any(fault.startswith(JITTERS) for fault in faults):
                     self.rate = f"{self.time['rate']:.3g}"
             elif len(stamps) > 1:
-                row = int(np.argmin(np.diff(stamps) > 0)) + 1
-                message = out_of_order(float(f"{stamps[row - 1]:.9g}"), float(f"{stamps[row]:.9g}"), "rows")
-                self.warnings.append(f"{file}:{table.line_of(row)}: time {message}")
+                disorder = find_disorder(stamps)
+                self.warnings.append(f"{file}:{table.line_of(disorder.sample)}: time {disorder.message}")
         return stamps if rising else None
 
     def _described(self, stamps: FloatArray, unit: str, first_stamp: int | str | None) -> dict[str, Any]:

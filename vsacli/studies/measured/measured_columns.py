@@ -21,6 +21,7 @@ from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
+from vsacli.trajectory.recorded.disorder import find_disorder
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
@@ -130,12 +131,12 @@ def read_recording(
     """
     places = known_columns(jointed, wanted)
     mapping = _of_signals(mapping, places, jointed)
-    table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
+    table = read_table(path, mapping, {TIME, *places}, empty_cells=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
     stranger = _stranger(names, table.others, places, jointed.joint_names, robot)
     problems = [
-        Problem(table.source.path, table.header_line, text)
+        Problem(table.source.path, table.header.line, text)
         for text in _unusable(names, table.others, places, stranger)
     ]
     factors: dict[int, float] = {}
@@ -146,7 +147,7 @@ def read_recording(
                 factors[index] = _factor(unit, "s" if name == TIME else places[name].unit)
             except InputError as error:
                 refused.append((name, str(error)))
-    problems += [Problem(table.source.path, table.header_line, text) for text in of_columns(refused)]
+    problems += [Problem(table.source.path, table.header.line, text) for text in of_columns(refused)]
     if problems:
         raise InputError(problems)
     order = {name: number for number, name in enumerate(places)}
@@ -156,7 +157,7 @@ def read_recording(
         if name in places
     ]
     signals.sort(key=lambda signal: order[signal.column])
-    times = _elapsed(table, factors[names.index(TIME)])
+    times = _elapsed(table, factors[names.index(TIME)], mapping.rate)
     return Recording(times, tuple(signals), table.others, table, stranger)
 
 
@@ -311,17 +312,17 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 
-def _elapsed(table: Table, factor: float) -> FloatArray:
-    """Return the times since the first sample, s."""
+def _elapsed(table: Table, factor: float, rate: float | None) -> FloatArray:
+    """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
     # subtraction before scaling: stamps since 1970 lose no digits
     names = [split_heading(column)[0] for column in table.columns]
     stamps = table.values[:, names.index(TIME)]
     if len(stamps) < 2:
         rows = counted(len(stamps), "row")
         raise InputError.one(f"has {rows}; a recording needs at least 2", table.source.path)
-    back = np.flatnonzero(~(np.diff(stamps) > 0))
-    if back.size:
-        row = int(back[0]) + 1
-        message = f"time must increase, but {stamps[row]} follows {stamps[row - 1]}; sort the rows by time"
-        raise InputError.one(message, table.source.path, table.line_of(row))
-    return np.asarray((stamps - stamps[0]) * factor)
+    disorder = find_disorder(stamps * factor)
+    if disorder is None:
+        return np.asarray((stamps - stamps[0]) * factor)
+    if disorder.is_replaced_by(rate):
+        return np.arange(len(stamps)) / (rate or 1)
+    raise InputError.one(f"time {disorder.message}", table.source.path, table.line_of(disorder.sample))

@@ -160,11 +160,12 @@ class Recorded(Declaration):
     bandwidth: float | None
     columns: Mapping[str, ColumnSource] | None
     ignore: str | tuple[str | int, ...] | None
+    skip_rows: tuple[int, ...] | None
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
-        from vsacli.documents.columns_file import columns_field, ignore_field
+        from vsacli.documents.columns_file import columns_field, ignore_field, skip_rows_field
         from vsacli.trajectory.fits import METHODS
 
         doc = (
@@ -183,6 +184,7 @@ class Recorded(Declaration):
             "bandwidth": number(units.RATE, bandwidth, check=POSITIVE, default=None),
             "columns": columns_field(),
             "ignore": ignore_field(),
+            "skip_rows": skip_rows_field(),
         }
         if use.signal is POSITION:
             fields["unwrap"] = boolean(
@@ -209,7 +211,7 @@ class Recorded(Declaration):
         """Mapping of the columns of the file."""
         from vsacli.documents.column_mapping import ColumnMapping
 
-        return ColumnMapping(self.columns or {}, self.ignore or ())
+        return ColumnMapping(self.columns or {}, self.ignore or (), skip_rows=self.skip_rows or ())
 
     @classmethod
     def meaning(cls, use: Use) -> str:

@@ -11,6 +11,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
+from vsacli.trajectory.recorded.disorder import find_disorder
 from vsacli.trajectory.recorded.samples import Samples
 
 LARGEST_VALUE = 1e100
@@ -33,24 +34,16 @@ class SampleProblem:
 
 def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
     """Yield the first problem of times, (samples,), s, if any."""
-    finite, rising = np.isfinite(time), time[1:] > time[:-1]
+    finite = np.isfinite(time)
     if not finite.all():
         sample = int(np.argmin(finite))
         yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
-    elif not rising.all():
-        sample = int(np.argmin(rising)) + 1
-        yield SampleProblem("time", out_of_order(time[sample - 1], time[sample]), sample=sample)
+    elif (disorder := find_disorder(time)) is not None:
+        yield SampleProblem("time", disorder.message, sample=disorder.sample)
     elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
         yield SampleProblem(
             "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
         )
-
-
-def out_of_order(before: float, time: float, items: str = "samples") -> str:
-    """Return the problem of two successive times, s; `items` is what to sort or to delete."""
-    if time == before:
-        return f"must increase, but {time} s appears twice; delete one of the {items}"
-    return f"must increase, but {time} s follows {before} s; sort the {items} by time"
 
 
 def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +15,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.base.texts import as_name
+from vsacli.base.texts import as_name, counted
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
+from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
+from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
@@ -125,16 +127,21 @@ def read_recording(
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    table = read_table(path, mapping, known_columns(joints), empty_cells=bool(mapping)).without_empty_rows()
+    table = read_table(path, mapping, known_columns(joints), empty_cells=True)
+    table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
     file = table.source.path
     signals = NEEDED if wanted is None else tuple(wanted)
-    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header_line)
+    _check_hollow(table, signals)
+    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header.line)
     _check_filled(table)
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
         wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR)
     time = _si(table, layout.time)
+    disorder = find_disorder(time)
+    if disorder is not None and disorder.is_replaced_by(mapping.rate):
+        time, table = np.arange(len(time)) / (mapping.rate or 1), replace(table, rated=True)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     turns = list(_unwrapped(records, joints)) if unwrap else []
 
@@ -146,7 +153,7 @@ def read_recording(
         *unit_doubts(records, _without_unit(table, layout, joints)),
     ]
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
-    clauses = (*turns, *_understood(table), *_unused(layout, signals))
+    clauses = (*turns, *_understood(table, disorder), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
     source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated
     del table  # frees as much memory as the samples need, before they are fitted
@@ -158,23 +165,50 @@ def read_recording(
     return Recording(times, profiles, warnings, notes, source, lines, first_stamp, rated)
 
 
+def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
+    """Raise an error if a column of required values holds no number; derivatives may be left out."""
+    values = {signal.names[0] for signal in signals}
+    needed = [
+        name for name in table.hollow if name.rpartition(".")[2].rstrip("0123456789") in {TIME, *values}
+    ]
+    if needed:
+        message = f"column {needed[0]!r} holds no number; give another column for it"
+        raise InputError.one(message, table.source.path, table.header.line)
+
+
 def _check_filled(table: Table) -> None:
     """Raise an error for empty cells in rows with numbers, since all signals use the same rows."""
     empty = np.isnan(table.values)
-    if empty.any():
-        row, column = (int(place[0]) for place in np.nonzero(empty))
-        count = int(np.count_nonzero(empty[:, column]))
+    if not empty.any():
+        return
+    row, column = (int(place[0]) for place in np.nonzero(empty))
+    count = int(np.count_nonzero(empty[:, column]))
+    if empty.any(axis=1).all():
+        other = table.columns[int(np.flatnonzero(~empty[row])[-1])]
         message = (
-            f"column {table.columns[column]!r} has no number here, where others have one ({count} such rows);"
-            " a trajectory takes all columns of a file from the same rows: leave out rows or columns"
+            f"columns {table.columns[column]!r} and {other!r} have no numbers in the same rows, as signals"
+            " with stamps of their own; interpolate them at common times, then read that file"
         )
-        raise InputError.one(message, table.source.path, table.line_of(row))
+    else:
+        message = (
+            f"column {table.columns[column]!r} has no number here, where others have one"
+            f" ({counted(count, 'such row')}); delete {'the row' if count == 1 else 'these rows'}, or fill in"
+            " the values"
+        )
+    raise InputError.one(message, table.source.path, table.line_of(row))
 
 
-def _understood(table: Table) -> Iterator[str]:
+def _understood(table: Table, disorder: Disorder | None) -> Iterator[str]:
+    if table.hollow:
+        holds = "it holds" if len(table.hollow) == 1 else "they hold"
+        yield f"left out, as {holds} no number: {', '.join(table.hollow)}"
+    if disorder is not None:
+        yield f"rate stands in place of the stamps, since {disorder.cause}"
+    if table.joined:
+        yield f"{counted(table.joined, 'row')} of nearly the same time as the row before joined with it"
     if table.first_stamp is not None:
         yield f"times count from its first stamp, {table.first_stamp}"
-    if table.kept is not None:
+    elif table.kept is not None:
         yield f"only the {len(table.kept)} rows are read in which these columns have numbers"
     if table.ignored:
         shown = ", ".join(name or "a column without a name" for name in table.ignored[:MOST_NAMED])
