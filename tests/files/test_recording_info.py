@@ -67,7 +67,7 @@ def test_what_is_there(tmp_path: Path) -> None:
     assert described["time"]["rate"] == pytest.approx(100, rel=0.05)
     columns = columns_of(described)
     holds = [columns[number]["holds"] for number in range(1, 13)]
-    assert "# rate: 99.2  # stamps jitter" in described["trajectory"]
+    assert "# rate: 100  # stamps jitter" in described["trajectory"]
     assert holds == [
         "numbers",
         "numbers",

@@ -251,7 +251,8 @@ SENTENCES = {
     "mcap": "is a bag of ROS 2; make a CSV file of it, with PlotJuggler or, while ros2 bag play plays it, by "
     "ros2 topic echo --csv /joint_states > {csv}, then see {look}",
     "parquet": "is a Parquet file; make a CSV file of it, as to_csv of pandas does, then see {look}",
-    "npy": "is an array of NumPy; make a CSV file of it, as numpy.savetxt does, then see {look}",
+    "npy": "is an array of NumPy; make a CSV file of it, numpy.savetxt('{csv}', numpy.load('{file}'), "
+    "delimiter=','), then see {look}",
     "xlsx": "is a spreadsheet; save it as CSV, then see {look}",
 }
 """Description of each foreign format, with advice."""

@@ -51,6 +51,9 @@ REST = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
 UNITS_IN_NAMES = ("s", "sec", "secs", "ms", "msec", "us", "usec", "ns", "nsec", "nanosec")
 """Units that may end a column name."""
 
+STEPS = "steps"
+"""Beginning of the reason for a unit that only the size of the intervals suggests."""
+
 SINCE_1970 = {1e8: "s", 1e11: "ms", 1e14: "us", 1e17: "ns"}
 """Unit of stamps that count from 1970, by the smallest such stamp (in 1973)."""
 
@@ -137,12 +140,14 @@ def unit_of_steps(step: float) -> str | None:
 
 def guessed_unit(stamps: Sequence[float]) -> tuple[str | None, str]:
     """Return the likely unit of stamps without a declared one (None: seconds), and the reason, a clause."""
+    if len(stamps) < 2:
+        return None, ""
     since = [unit for least, unit in SINCE_1970.items() if stamps[0] >= least]
     if since:
         return (None if since[-1] == "s" else since[-1]), f"counts {since[-1]} since 1970"
     step = float(np.median(np.diff(np.array(stamps))))
     unit = unit_of_steps(step) if step > USUAL_STEPS[1] else None
-    return unit, f"steps of {step:.4g} are hardly seconds" if unit else ""
+    return unit, f"{STEPS} of {step:.4g} are hardly seconds" if unit else ""
 
 
 def are_seconds_and_nanoseconds(seconds: Sequence[float], rest: Sequence[float], least: float) -> bool:

@@ -14,8 +14,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.json_records import json_value
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.signals import orders_of_derivation
+from vsacli.base.signals import COMMANDED, orders_of_derivation
 from vsacli.base.storage import unfinished
+from vsacli.base.texts import for_yaml
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.engine.cache import MOST_BYTES, Cache, CacheError, open_cache
@@ -28,7 +29,7 @@ from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.results.store.study_table import StoredStudy
 from vsacli.robot.file import load_robot
 from vsacli.studies.sweeps import StudySummary
-from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.file import FORMAT, load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -187,11 +188,16 @@ def _described_table(
     from vsacli.files.recordings import describe_recording, is_trajectory
 
     robot = None if robot_path is None else load_robot(robot_path)
-    if is_trajectory(path, robot or placeholder_robot(path).robot):
-        if rate is not None:
-            raise InputError.one("has times in column 'time'; leave --rate out", path)
-        return _described_trajectory(path, robot_path)
-    return describe_recording(path, robot, progress, rate)
+    if not is_trajectory(path, robot or placeholder_robot(path).robot):
+        return describe_recording(path, robot, progress, rate)
+    if rate is not None:
+        raise InputError.one("has times in column 'time'; leave --rate out", path)
+    described = _described_trajectory(path, robot_path)
+    file = for_yaml(Path(path).name)
+    signals = ["position", *(key for key in COMMANDED if key in described["joints"][0])]
+    sources = [f"{key}: {{type: csv, file: {file}}}" for key in signals]
+    described["trajectory"] = "\n".join([f"format: {FORMAT}", "name: recorded", *sources])
+    return described
 
 
 def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:

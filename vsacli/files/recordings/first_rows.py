@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
@@ -17,11 +18,14 @@ import numpy as np
 from vsacli.base.errors import InputError
 from vsacli.documents.column_mapping import MappedColumn
 from vsacli.documents.csv_file import Header, Rows, is_missing, is_number, read_header, split_heading
+from vsacli.documents.preamble import find_surroundings
 from vsacli.documents.time_column import (
     EXPECTED,
     NAMES,
     REST,
     SECONDS,
+    STEPS,
+    UNIT_WORDS_OF_TIMES,
     UNITS_IN_NAMES,
     Clock,
     are_seconds_and_nanoseconds,
@@ -56,6 +60,17 @@ RISING_SHARE = 0.9
 GUESSED = "guessed"
 """Beginning of the reason if a column is taken for times although its name does not indicate it."""
 
+UNITS_IN_ROWS = {
+    **dict.fromkeys(("second", "seconds", "sec"), "s"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **UNIT_WORDS_OF_TIMES,
+}
+"""Units by the lower-case words with which rows of units mention them; other cells are units as they are."""
+
+_LIST = re.compile(r"[(\[]\s*(.+?)[,.]?\s*[)\]]")
+_BETWEEN_VALUES = re.compile(r"[,;]\s*|[.]?\s+")
+
 EVEN = 0.5
 """Largest relative deviation from the median of nearly all intervals, for columns guessed to be times."""
 
@@ -68,11 +83,15 @@ class FirstRows:
         path: path of the file.
         header: header of the file.
         cells: texts, (rows, columns), with decimal points.
+        skip_rows: numbers of lines that are neither header nor rows.
+        units: units of the columns in a row of their own; empty texts where there is none.
     """
 
     path: str
     header: Header
     cells: Sequence[Sequence[str]]
+    skip_rows: tuple[int, ...] = ()
+    units: Sequence[str] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -103,6 +122,18 @@ class FirstRows:
         """Return whether the numbers of a column increase by one from row to row."""
         values = self.numbers(place)
         return len(values) > 1 and all(after - before == 1 for before, after in pairwise(values))
+
+    def unit(self, place: int) -> str | None:
+        """Return the unit of a column, in brackets after its name or in a row of units; None without one."""
+        written = split_heading(self.columns[place])[1]
+        below = self.units[place].strip("[]() ") if self.units else ""
+        return written if written is not None or not below else UNITS_IN_ROWS.get(below.lower(), below)
+
+    def list_length(self, place: int) -> int:
+        """Return the number of values in each cell of a column of lists; 0 if it holds anything else."""
+        lists = [_LIST.fullmatch(cell.strip()) for cell in self.filled(place)]
+        lengths = {len(_BETWEEN_VALUES.split(found[1])) if found else 0 for found in lists}
+        return lengths.pop() if len(lengths) == 1 else 0
 
     def text(self, place: int) -> str:
         """Return the text common to all rows of a column; "" for numbers, or for several texts."""
@@ -140,13 +171,14 @@ def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
         InputError: the file does not begin like a table, or a row does not fit the header.
     """
     name = os.fspath(path)
-    header = read_header(name, numbered=(1,))
+    lines, _, units = find_surroundings(name)
+    header = read_header(name, numbered=(1,), skipped=lines)
     point = "," if header.separator == "," else "."
     rows = islice(Rows(name, header, (), empty_cells=True).texts(), FIRST_ROWS)
     cells = [[cell.replace(",", point) for cell in row] for _, row in rows]
     if not cells:
         raise InputError.one("has a header but no rows of values", name)
-    return FirstRows(name, header, cells)
+    return FirstRows(name, header, cells, lines, units)
 
 
 class TimeColumn(NamedTuple):
@@ -158,6 +190,7 @@ class TimeColumn(NamedTuple):
         reason: reason for the choice, a clause.
         nanoseconds: position of its column of nanoseconds, if there is one.
         clock: whether the stamps are clock texts.
+        unit_guessed: whether the unit was derived from the size of the steps.
     """
 
     place: int
@@ -165,6 +198,19 @@ class TimeColumn(NamedTuple):
     reason: str
     nanoseconds: int | None = None
     clock: bool = False
+    unit_guessed: bool = False
+
+    @property
+    def numbered(self) -> MappedColumn:
+        """The entry of the column by its number, with its unit."""
+        if self.nanoseconds is not None:
+            return MappedColumn(column=self.place + 1, nanoseconds=self.nanoseconds + 1)
+        return MappedColumn(column=self.place + 1, unit=self.unit_of_stamps)
+
+    @property
+    def unit_of_stamps(self) -> str:
+        """The unit of the stamps."""
+        return "ns" if self.nanoseconds is not None else self.source.unit or "s"
 
     @property
     def guessed(self) -> bool:
@@ -172,30 +218,31 @@ class TimeColumn(NamedTuple):
         return self.reason.startswith(GUESSED)
 
 
-def time_column(rows: FirstRows) -> TimeColumn | None:
-    """Return the column of stamps, if there is one: by its name, clock texts, or even intervals."""
+def time_columns(rows: FirstRows) -> Iterator[TimeColumn]:
+    """Yield columns that may be stamps, best first: by their names, clock texts, or even intervals."""
     pair = _seconds_and_nanoseconds(rows)
     if pair is not None:
         seconds, rest = map(rows.called, pair)
         source = MappedColumn(column=seconds, nanoseconds=rest)
-        return TimeColumn(pair[0], source, "seconds and nanoseconds", pair[1])
+        yield TimeColumn(pair[0], source, "seconds and nanoseconds", pair[1])
     called, every = _called(rows), range(len(rows.columns))
-    clocks = (place for place in every if rows.clocks(place))
-    rising = [place for place in (*called, *clocks) if rows.rises(place)]
-    if rising:
-        return _described(rows, rising[0], "")
+    named = dict.fromkeys((*called, *(place for place in every if rows.clocks(place))))
+    stamps = [place for place in named if rows.numbers(place) or rows.clocks(place)]
+    moving = [place for place in stamps if len(set(rows.filled(place))) > 1 and not rows.is_index(place)]
+    yield from (_described(rows, place, "") for place in sorted(moving, key=lambda at: not rows.rises(at)))
     guess = None if called else next(filter(lambda place: _like_stamps(rows, place), rows.of_numbers), None)
-    return None if guess is None else _described(rows, guess, f"{GUESSED}: it increases in nearly even steps")
+    if guess is not None:
+        yield _described(rows, guess, f"{GUESSED}: it increases in nearly even steps")
 
 
 def unread_times(rows: FirstRows) -> Iterator[str]:
     """Yield the problems of columns named as times if none of them can be read as such."""
-    if time_column(rows) is not None:
+    if next(time_columns(rows), None) is not None:
         return
     for place in _called(rows):
         name, filled = rows.columns[place], rows.filled(place)
         if rows.numbers(place) or rows.clocks(place):
-            yield f"column {name!r} is called a time, but does not increase from row to row"
+            yield f"column {name!r} is called a time, but is the same in all rows"
         elif filled:
             unread = (cell for cell in filled if not is_number(cell) and read_clock(cell) is None)
             text = next(unread, filled[0])  # numbers and clock texts mixed
@@ -206,9 +253,12 @@ def _described(rows: FirstRows, place: int, reason: str) -> TimeColumn:
     column = rows.called(place)
     if rows.clocks(place):
         return TimeColumn(place, MappedColumn(column=column), "as a clock shows it", clock=True)
-    own = split_heading(rows.columns[place])[1] or MappedColumn(column=column).doubt(rows.columns[place])
+    own = rows.unit(place) or MappedColumn(column=column).doubt(rows.columns[place])
     unit, why = guessed_unit(rows.numbers(place)) if own is None else (own, "")
-    return TimeColumn(place, MappedColumn(column=column, unit=unit), "; ".join(filter(None, (reason, why))))
+    by_steps = unit is not None and STEPS in why
+    why = f"unit {GUESSED}: {why}" if by_steps else why
+    reasons = "; ".join(filter(None, (reason, why)))
+    return TimeColumn(place, MappedColumn(column=column, unit=unit), reasons, unit_guessed=by_steps)
 
 
 def _called(rows: FirstRows) -> list[int]:

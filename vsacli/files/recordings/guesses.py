@@ -14,14 +14,19 @@ from vsacli.documents.fields import IDENTIFIER
 from vsacli.files.recordings.first_rows import FirstRows, TimeColumn
 from vsacli.files.recordings.names import (
     AXES,
+    COMMANDED,
+    ERROR,
     GENERIC,
     MOTOR_WORDS,
     OF_MOTORS,
+    PLAIN,
     POSES,
     QUANTITIES,
+    ROLES,
     WORDS,
     JointNames,
     motor_of,
+    role_of,
     words_of,
 )
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
@@ -32,13 +37,11 @@ TAKEN = ("q", "stiffness")
 VARIABLES_OF_MOTORS = ("theta_1", "theta_2", "tau_motor_1", "tau_motor_2")
 """Quantities that are proposed in a mapping for `compare` and `identify` if the names say of which motor."""
 
+COMMAND = "a command, not a measurement"
+"""Reason of a column that is proposed for lack of a measured one."""
+
 ARRAYS = ("q", "dq", "tau_motor_1")
 """Content of the arrays of `sensor_msgs/JointState`: position, velocity, effort."""
-
-OTHER_THAN_MEASURED = (
-    *("desired", "command", "commanded", "target", "reference", "ref", "goal", "error", "setpoint"),
-)
-"""Words in names of columns that are not measurements of a joint."""
 
 _BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
 """Regular expression of a joint name that is recognized without a robot."""
@@ -88,6 +91,7 @@ class _Column(NamedTuple):
         entry: index in an array.
         bare: whether the name has no word for a quantity.
         of_motor: whether the name says of which motor it is.
+        role: role of the column, a key of `ROLES`; its words are in neither `before` nor `words`.
     """
 
     place: int
@@ -97,6 +101,13 @@ class _Column(NamedTuple):
     entry: int | None = None
     bare: bool = False
     of_motor: bool = False
+    role: str = PLAIN
+
+    @property
+    def signal(self) -> tuple[object, ...]:
+        """The same for all variants of a signal, such as raw, filtered and commanded positions of a joint."""
+        words = (word for word in self.words if word not in GENERIC)
+        return self.quantity, self.entry, self.bare, self.of_motor, *words
 
     @property
     def family(self) -> tuple[str, ...]:
@@ -126,33 +137,42 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     found: dict[str, Guess] = {}
     if joint_names:
         columns = [_of_motor(column, JointNames(joint_names)) for column in columns]
+    best = {column.signal: column.role for column in reversed(columns)}
+    columns = [column for column in columns if column.role == best[column.signal]]
     for quantity in dict.fromkeys((*QUANTITIES, *VARIABLES_OF_MOTORS)):
         if quantity == "theta":
             continue
         of_it = [column for column in columns if column.quantity == quantity]
-        joints = _of_robot(of_it, labels, JointNames(joint_names)) if joint_names else _named(of_it, labels)
-        for column, joint in joints:
+        measured = [column for column in of_it if column.role != COMMANDED]
+        names = JointNames(joint_names)
+        assigned = list(_of_robot(measured, labels, names) if joint_names else _named(measured, labels))
+        if not assigned:  # by name or order, none of the joints has a measurement
+            assigned = list(_of_robot(of_it, labels, names) if joint_names else _named(of_it, labels))
+        for column, joint in assigned:
             source, doubt = _source(rows, column)
-            reasons = "; ".join(filter(None, (joint.reason, doubt)))
+            command = COMMAND if column.role == COMMANDED else ""
+            reasons = "; ".join(filter(None, (joint.reason, command, doubt)))
             guess = Guess(column.place, joint.name, quantity, source, reasons, joint.sure, column.of_motor)
             found.setdefault(guess.name, guess)
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
 
 def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
-    """Return columns of joints by their names: with a quantity first, then measured before other ones."""
+    """Return columns of joints by their names: with a quantity first, then in the order of the roles."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
-    columns.sort(key=lambda column: (column.bare, any(word in OTHER_THAN_MEASURED for word in column.words)))
+    columns = [column for column in columns if column.role != ERROR]
+    columns.sort(key=lambda column: (column.bare, list(ROLES).index(column.role)))
     columns.sort(key=lambda column: any(word in MOTOR_WORDS for word in column.words))
     return columns
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
     """Yield the meaning of a column by its name; a name without a word for a quantity may mean a position."""
-    name = split_heading(rows.columns[place])[0]
-    if _STIFFNESS.fullmatch(name) and min(rows.numbers(place)) > 0:
-        yield _Column(place, "stiffness", words=words_of(name)[1:])
+    heading = split_heading(rows.columns[place])[0]
+    role, name = role_of(heading)
+    if _STIFFNESS.fullmatch(name.strip("_ ")) and min(rows.numbers(place)) > 0:
+        yield _Column(place, "stiffness", words=words_of(name)[1:], role=role)
         return
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
@@ -162,10 +182,10 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
                 name[: match.start()],
                 (*words_of(name[: match.start()]), *words_of(name[match.end() :])),
             )
-            yield _Column(place, quantity, before, words, int(entry[1]) if entry else None)
+            yield _Column(place, quantity, before, words, int(entry[1]) if entry else None, role=role)
             return
-    if name:
-        yield _Column(place, "q", name, words_of(name), bare=True)
+    if heading:
+        yield _Column(place, "q", heading, words_of(heading), bare=True, role=role)
 
 
 def _of_motor(column: _Column, joints: JointNames) -> _Column:
@@ -177,7 +197,7 @@ def _of_motor(column: _Column, joints: JointNames) -> _Column:
     if found is None:
         return column
     motor, words = found
-    return _Column(column.place, f"{variable}_{motor}", column.before, words, of_motor=True)
+    return _Column(column.place, f"{variable}_{motor}", column.before, words, of_motor=True, role=column.role)
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:
@@ -287,7 +307,7 @@ def _is_no_joint(column: _Column) -> bool:
 def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:
     """Return the mapping of a column, and a remark if its unit is uncertain."""
     heading = rows.columns[column.place]
-    own = split_heading(heading)[1]
+    own = rows.unit(column.place)
     source = MappedColumn(column=rows.called(column.place), unit=own)
     spoken = source.doubt(heading)
     if spoken is not None:

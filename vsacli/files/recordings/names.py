@@ -9,13 +9,35 @@ from typing import NamedTuple
 WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
 QUANTITIES = {
-    "q": ("position", "positions", "pos", "q", "angle", "angles", "enc", "encoder", "encoders"),
-    "dq": ("velocity", "velocities", "vel", "dq", "qd", "speed"),
+    "q": ("position", "positions", "pos", "q", "qpos", "angle", "angles", "enc", "encoder", "encoders"),
+    "dq": ("velocity", "velocities", "vel", "dq", "qd", "qdot", "qvel", "speed"),
     "tau_motor_1": ("effort", "efforts", "torque", "torques", "tau", "trq"),
     "stiffness": ("stiffness",),
     "theta": ("theta", "thetas"),
 }
 """Words for each quantity of a joint; `theta` alone may be of a joint or a motor, and is not used."""
+
+MEASURED, PLAIN, FILTERED, RAW, COMMANDED, ERROR = "measured", "", "filtered", "raw", "commanded", "error"
+
+ROLES = {
+    MEASURED: (
+        *("act", "actual", "meas", "measured", "measurement", "real", "state", "states"),
+        *("ist", "feedback", "fbk", "observed"),
+    ),
+    PLAIN: (),
+    FILTERED: ("filt", "filtered", "filter", "lowpass", "lp", "smooth", "smoothed"),
+    RAW: ("raw", "unfiltered"),
+    COMMANDED: (
+        *("des", "desired", "cmd", "cmds", "cmptd", "command", "commands", "commanded", "ref", "reference"),
+        *("set", "setpoint", "setpoints", "target", "targets", "goal", "con", "ctrl", "soll", "sp"),
+        *("plan", "planned", "computed"),
+    ),
+    ERROR: ("err", "error", "errors", "diff", "deviation"),
+}
+"""Words that say what a column shows of its quantity. The first role that a joint has is proposed; a name
+with words of several roles has the last one. To support a further word, add it here."""
+
+_ROLE_WORDS = frozenset(word for words in ROLES.values() for word in words)
 
 OF_MOTORS = {"q": "theta", "theta": "theta", "tau_motor_1": "tau_motor"}
 """Variables of motors by the quantity in a name that says which motor it is of."""
@@ -28,36 +50,12 @@ MOTORS = {"1": 1, "2": 2, "a": 1, "b": 2}
 
 QUANTITY_WORDS = frozenset(word for words in QUANTITIES.values() for word in words)
 
+_Q, _R = ("|".join(sorted(words, key=len, reverse=True)) for words in (QUANTITY_WORDS, _ROLE_WORDS))
+_TOGETHER = re.compile(rf"(?<![a-z])(?:({_Q})({_R})|({_R})({_Q}))(?![a-z])", re.IGNORECASE)
+
 GENERIC = (
-    *(
-        "field",
-        "joint",
-        "joints",
-        "axis",
-        "state",
-        "states",
-        "data",
-        "measured",
-        "actual",
-        "current",
-        "feedback",
-    ),
-    *(
-        "name",
-        "msg",
-        "robot",
-        "arm",
-        "motor",
-        "link",
-        "deg",
-        "degree",
-        "degrees",
-        "rad",
-        "mm",
-        "m",
-        "nm",
-        "n",
-    ),
+    *("field", "joint", "joints", "axis", "data", "current", "name", "msg", "robot", "arm", "motor", "link"),
+    *("deg", "degree", "degrees", "rad", "mm", "m", "nm", "n"),
 )
 """Words in column names that do not help to identify the joint."""
 
@@ -74,6 +72,17 @@ POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "or
 def words_of(name: str) -> tuple[str, ...]:
     """Return the words and numbers of a name in lower case, equal for `joint_01`, `Joint1` and `joint-1`."""
     return tuple(word.lower().lstrip("0") or "0" for word in WORDS.findall(name))
+
+
+def role_of(name: str) -> tuple[str, str]:
+    """Return the role of a column by its name, and the name without the words that say so.
+
+    A word and that for a quantity may be written together, as in `qdes` and `actpos1`.
+    """
+    apart = _TOGETHER.sub(lambda match: "_".join(filter(None, match.groups())), name)
+    words = words_of(apart)
+    role = next((role for role in reversed(ROLES) if set(words).intersection(ROLES[role])), PLAIN)
+    return role, WORDS.sub(lambda word: "" if word[0].lower() in _ROLE_WORDS else word[0], apart)
 
 
 def motor_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, ...]] | None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,32 +15,36 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.signals import STIFFNESS
-from vsacli.base.texts import for_yaml
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.base.simulation_variables import measured
+from vsacli.base.texts import for_yaml, joined
+from vsacli.base.variables import VARIABLES
 from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
 from vsacli.documents.columns_file import FORMAT, checked_rate
 from vsacli.documents.csv_file import read_header, split_heading
 from vsacli.documents.expression import conversion_factor
+from vsacli.documents.preamble import find_surroundings
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import (
     FirstRows,
     TimeColumn,
     read_first_rows,
-    time_column,
+    time_columns,
     unread_times,
 )
 from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
+from vsacli.files.recordings.names import COMMANDED, ERROR, role_of
 from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
-from vsacli.trajectory.recorded.disorder import find_disorder
+from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.health import column_faults
-from vsacli.trajectory.recorded.recording import NEEDED
-from vsacli.trajectory.recorded.stamps import stamp_faults
+from vsacli.trajectory.recorded.recording import NEEDED, read_columns
+from vsacli.trajectory.recorded.stamps import mean_rate, stamp_faults
 
 TOGETHER = 16
 """Columns read at a time: a million rows of them take 128 MB, however many columns the table has."""
@@ -51,6 +57,26 @@ JITTERS = "jitters"
 
 FEWEST_ROWS = 10
 """Minimum number of values of a column to be checked for faults."""
+
+_OWN_NAME = re.compile(rf"(.+\.)?({'|'.join([TIME, *VARIABLES])})({measured('')}|_shaft)?\d*(_[12])?")
+"""Names by which commands read a column although no mapping names it."""
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """The stamps of a recording, over the rows in which its joints have numbers.
+
+    Attributes:
+        column: column of the stamps.
+        table: table of the stamps, for lines and the first stamp.
+        stamps: stamps, (rows,), s.
+        disorder: failure of the stamps to increase; None if they can be used.
+    """
+
+    column: TimeColumn
+    table: Table
+    stamps: FloatArray
+    disorder: Disorder | None
 
 
 def describe_recording(
@@ -72,25 +98,21 @@ def describe_recording(
     """
     rows = read_first_rows(path)
     joint_names = robot.joint_names if robot else ()
-    time = time_column(rows)
+    clock = _choose_clock(rows, joint_names)
+    time = clock.column if clock and clock.disorder is None else None
     if rate is not None:
         rate = checked_rate(rate)
-    if time is not None and rate is not None:
-        if not time.guessed:
+        if time is not None and not time.guessed:
             name = rows.columns[time.place] or time.place + 1
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
-    found = guesses(rows, time, joint_names)
-    surveyed = _Survey(rows, time, found, progress, rate)
-    taken = [guess for guess in found if guess.quantity in TAKEN]
-    stamps = {time.place, time.nanoseconds} - {None} if time else set()
-
-    def lines(proposed: Sequence[Guess]) -> list[str]:
-        used = stamps | {guess.place for guess in proposed if is_proposed(guess)}
-        return list(mapping_lines(time, proposed, joint_names, len(used) < len(rows.columns), rate))
-
-    of_trajectory = lines([guess for guess in found if not guess.of_motor])
-    stated = [] if rate is None else [f"rate: {rate:g}"]
+    likely = rate or (clock.disorder.rate if clock and clock.disorder else None)
+    found = guesses(rows, clock.column if clock else None, joint_names)
+    surveyed = _Survey(rows, time, found, progress, likely)
+    if clock is not None and rate is None:
+        surveyed.describe_clock(clock)
+    proposal = _Proposal(rows, time, found, likely, guessed=rate is None)
+    refusal = proposal.refusal(robot)
     return {
         "kind": "recording",
         "name": Path(path).name,
@@ -98,48 +120,142 @@ def describe_recording(
         "time": surveyed.time,
         "columns": surveyed.columns,
         "warnings": surveyed.warnings,
-        "mapping": "\n".join([f"format: {FORMAT}", *stated, *lines(found)]),
-        "trajectory": "\n".join(
-            _trajectory(
-                Path(path).name, of_trajectory, taken, robot, stated or _proposed_rate(time, surveyed.rate)
-            )
-        ),
+        "refusal": refusal,
+        "mapping": "\n".join(proposal.columns_file(joint_names)),
+        "trajectory": "\n".join(proposal.trajectory(robot, refusal, surveyed.rate)),
     }
 
 
-def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
-    """Return a comment on the rate in the proposed trajectory if it is required or useful."""
-    if time is None:
-        return ["# rate: ...  # rows per second: no column holds times"]
-    if jittering:
-        return [f"# rate: {jittering}  # stamps jitter; this makes the steps of the torques equal"]
-    return []
+def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
+    """Return the first column of stamps that increase where the joints have numbers; else the first."""
+    clocks: list[_Clock] = []
+    for column in time_columns(rows):
+        found = [guess for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN]
+        columns = {str(guess.place): MappedColumn(column=guess.place + 1, unit=AS_WRITTEN) for guess in found}
+        mapping = ColumnMapping({TIME: column.numbered, **columns}, REST, skip_rows=rows.skip_rows)
+        table = read_table(rows.path, mapping, set(mapping.columns), empty_cells=True)
+        table = table.without_empty_rows().with_joined_rows()
+        stamps = _seconds(table)
+        clocks.append(_Clock(column, table, stamps, find_disorder(stamps)))
+        if clocks[-1].disorder is None:
+            return clocks[-1]
+    return next(iter(clocks), None)
 
 
-def _trajectory(
-    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: Sequence[str]
-) -> Iterator[str]:
-    """Yield a trajectory file with the positions of the recording."""
-    yield f"format: {trajectory_file.FORMAT}"
-    yield "name: recorded"
-    yield from rate
-    yield "position:"
-    yield "  type: csv"
-    yield f"  file: {for_yaml(file)}"
-    yield from (f"  {line}" for line in mapping)
-    if any(guess.quantity == STIFFNESS.key for guess in taken):
-        yield f"stiffness: {{type: csv, file: {for_yaml(file)}}}"
-        return
-    stiffnesses = {}
-    if robot is not None:
-        from vsacli.files.templates import first_stiffnesses
+def _seconds(table: Table) -> FloatArray:
+    at = next(i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME)
+    unit = split_heading(table.columns[at])[1] or "s"
+    return np.asarray(table.values[:, at] * conversion_factor(unit, "s"))
 
-        stiffnesses = first_stiffnesses(robot)
-    if stiffnesses:
-        values = ", ".join(f"{name}: {value:g}" for name, value in stiffnesses.items())
-        yield f"stiffness: {{type: constant, value: {{{values}}}}}  # to begin with; choose yours"
-    elif robot is None:
-        yield "# stiffness: {type: constant, value: ...}  # N m/rad, of joints of variable stiffness"
+
+class _Proposal:
+    """A mapping of the columns of a recording, as text and as the reader takes it.
+
+    Args:
+        rows: first rows of the table.
+        time: column of stamps; None if a rate stands in their place, or nothing does.
+        found: likely meanings of the columns.
+        rate: rows per second, if there is no column of stamps.
+        guessed: whether this rate was derived from unusable stamps.
+    """
+
+    def __init__(
+        self,
+        rows: FirstRows,
+        time: TimeColumn | None,
+        found: Sequence[Guess],
+        rate: float | None,
+        *,
+        guessed: bool,
+    ) -> None:
+        self._rows, self._time, self._found = rows, time, found
+        self._rate = None if time is not None else rate
+        self._guessed = guessed
+
+    def _left_out(self, taken: Sequence[Guess]) -> str | tuple[str | int, ...]:
+        """Return the columns to ignore: all others, one by one if commands know some by their names."""
+        stamps = (self._time.place, self._time.nanoseconds) if self._time else ()
+        used = {*stamps, *(guess.place for guess in taken if is_proposed(guess))}
+        unused = [place for place in range(len(self._rows.columns)) if place not in used]
+        names = [split_heading(self._rows.columns[place])[0] for place in unused]
+        if not any(map(_OWN_NAME.fullmatch, names)):
+            return REST if unused else ()
+        return tuple(self._rows.called(place) for place in unused)
+
+    def _lines(self, taken: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[str]:
+        yield from mapping_lines(
+            self._time, taken, joint_names, self._left_out(taken), self._rate, self._rows.skip_rows
+        )
+
+    def columns_file(self, joint_names: Sequence[str]) -> Iterator[str]:
+        """Yield a file for `--columns`."""
+        yield f"format: {FORMAT}"
+        yield from self._rates()
+        yield from self._lines(self._found, joint_names)
+
+    def _rates(self) -> Iterator[str]:
+        if self._rate is not None:
+            yield f"rate: {self._rate:g}" + (
+                "  # guessed from the stamps, which do not increase" * self._guessed
+            )
+
+    def trajectory(self, robot: Robot | None, refusal: str, jittering: float | None) -> Iterator[str]:
+        """Yield a trajectory file with the positions of the recording."""
+        joint_names, file = robot.joint_names if robot else (), for_yaml(Path(self._rows.path).name)
+        yield from [f"# not complete: {refusal}"] if refusal else []
+        yield f"format: {trajectory_file.FORMAT}"
+        yield "name: recorded"
+        yield from self._rates()
+        if self._rate is None and self._time is None:
+            yield "# rate: ...  # rows per second: no column holds times"
+        elif jittering is not None:
+            yield f"# rate: {jittering:g}  # stamps jitter; this makes the steps of the torques equal"
+        yield "position:"
+        yield "  type: csv"
+        yield f"  file: {file}"
+        yield from (f"  {line}" for line in self._lines(self._of_trajectory, joint_names))
+        if any(guess.quantity == STIFFNESS.key for guess in self._of_trajectory):
+            yield f"stiffness: {{type: csv, file: {file}}}"
+            return
+        stiffnesses = {}
+        if robot is not None:
+            from vsacli.files.templates import first_stiffnesses
+
+            stiffnesses = first_stiffnesses(robot)
+        if stiffnesses:
+            values = ", ".join(f"{name}: {value:g}" for name, value in stiffnesses.items())
+            yield f"stiffness: {{type: constant, value: {{{values}}}}}  # to begin with; choose yours"
+        elif robot is None:
+            yield "# stiffness: {type: constant, value: ...}  # N m/rad, of joints of variable stiffness"
+
+    @property
+    def _of_trajectory(self) -> list[Guess]:
+        return [guess for guess in self._found if not guess.of_motor]
+
+    def refusal(self, robot: Robot | None) -> str:
+        """Return why a run with this robot would refuse the trajectory, a clause; empty if it would not."""
+        if self._time is None and self._rate is None:
+            return "no column holds times; give the rate of the rows with --rate HZ"
+        if robot is None:
+            return ""
+        taken = [guess for guess in self._of_trajectory if guess.quantity in TAKEN]
+        names = {guess.name for guess in taken}
+        missing = [joint for joint in robot.joint_names if f"{joint}.{POSITION.names[0]}" not in names]
+        if missing:
+            return f"no column is recognized as the position of {joined(missing)}; write it below"
+        columns = {guess.name: guess.source for guess in taken}
+        if self._time is not None:
+            columns[TIME] = self._time.source
+        mapping = ColumnMapping(columns, self._left_out(taken), self._rate, self._rows.skip_rows)
+        signals = [
+            POSITION,
+            *([STIFFNESS] if any(guess.quantity == STIFFNESS.key for guess in taken) else []),
+        ]
+        try:
+            _, _, disorder = read_columns(self._rows.path, CommandedJoints.of(robot), signals, mapping)
+        except InputError as error:
+            return str(error.problems[0])
+        return "" if disorder is None else f"time {disorder.message}"
 
 
 class _Survey:
@@ -150,7 +266,7 @@ class _Survey:
         time: findings on the stamps; None without stamps.
         columns: findings on each column.
         warnings: faults of stamps and signals.
-        rate: rate in few digits, 1/s; empty unless stamps jitter.
+        rate: rate in few digits, 1/s; None unless stamps jitter.
     """
 
     def __init__(
@@ -161,13 +277,13 @@ class _Survey:
         progress: Progress,
         rate: float | None,
     ) -> None:
-        self._rows, self._time, self._stated = rows, time, rate
+        self._rows, self._time, self._stated = rows, time, None if time else rate
         self._guesses = {guess.place: guess for guess in found}
         self.rows = 0
         self.time: dict[str, Any] | None = None
-        file = Path(rows.path).name
-        self.warnings = [f"{file}: {sentence}" for sentence in unread_times(rows)]
-        self.rate = ""
+        self._file = Path(rows.path).name
+        self.warnings = [f"{self._file}: {clause}" for clause in (*unread_times(rows), *_lists(rows))]
+        self.rate: float | None = None
         stamps = () if time is None else (time.place, time.nanoseconds)
         numbers = [place for place in rows.of_numbers if place not in stamps]
         numbers.sort(key=lambda place: place not in self._guesses)
@@ -182,6 +298,8 @@ class _Survey:
     def _unread(self, place: int) -> dict[str, Any]:
         filled = self._rows.filled(place)
         kind = "index" if self._rows.is_index(place) else "text" if filled else "nothing"
+        if kind == "text" and self._rows.list_length(place):
+            kind = "list"
         if self._time is not None and place in (self._time.place, self._time.nanoseconds):
             kind = "time"
         return {
@@ -197,18 +315,14 @@ class _Survey:
     def _read(self, places: Sequence[int]) -> Table:
         columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
         if self._time is not None:
-            rest = self._time.nanoseconds
-            unit = self._time.source.unit or ("s" if rest is None else None)
-            at = None if rest is None else rest + 1
-            columns[TIME] = MappedColumn(column=self._time.place + 1, unit=unit, nanoseconds=at)
-        mapping = ColumnMapping(columns, REST, self._stated)
+            columns[TIME] = self._time.numbered
+        mapping = ColumnMapping(columns, REST, self._stated, self._rows.skip_rows)
         return read_table(self._rows.path, mapping, set(columns), empty_cells=True)
 
     def _look(self, places: Sequence[int], table: Table) -> None:
         self.rows = len(table.values)
         headings = [split_heading(heading)[0] for heading in table.columns]
-        shown = next((place for place in places if place in self._guesses), None)
-        stamps = self._stamps(table, None if shown is None else headings.index(str(shown)))
+        stamps = _seconds(table) if TIME in headings else None
         for place in places:
             values = table.values[:, headings.index(str(place))]
             there = np.isfinite(values)
@@ -222,58 +336,58 @@ class _Survey:
             if stamps is not None and np.count_nonzero(there) >= FEWEST_ROWS and not _counts(values[there]):
                 self._judge(place, stamps[there], values[there], table, np.flatnonzero(there))
 
-    def _stamps(self, table: Table, signal: int | None) -> FloatArray | None:
-        """Return the times of the rows, s; None if they do not increase.
-
-        At the first call they are described, over the rows in which a signal has numbers, since others are of
-        another topic.
-        """
-        at = next((i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME), None)
-        if at is None:
-            return None
-        unit = split_heading(table.columns[at])[1] or "s"
-        stamps = table.values[:, at] * conversion_factor(unit, "s")
-        rising = bool(np.all(np.diff(stamps) > 0))
-        if self.time is None:
-            own = stamps if signal is None else stamps[np.isfinite(table.values[:, signal])]
-            self.time = self._described(own, unit, table.first_stamp)
-            file = Path(self._rows.path).name
-            if rising and len(own) > 1:
-                faults = [fault.message for fault in stamp_faults(own)]
-                self.warnings += [f"{file}: time {fault}" for fault in faults]
-                if any(fault.startswith(JITTERS) for fault in faults):
-                    self.rate = f"{self.time['rate']:.3g}"
-            elif len(stamps) > 1:
-                disorder = find_disorder(stamps)
-                self.warnings.append(f"{file}:{table.line_of(disorder.sample)}: time {disorder.message}")
-        return stamps if rising else None
-
-    def _described(self, stamps: FloatArray, unit: str, first_stamp: int | str | None) -> dict[str, Any]:
-        time = self._time
+    def describe_clock(self, clock: _Clock) -> None:
+        """Describe the stamps, and put their faults before those of the signals."""
+        stamps, disorder = clock.stamps, clock.disorder
         steps = np.diff(stamps) if len(stamps) > 1 else np.array([math.nan])
+        rate = 1 / float(np.median(steps)) if np.median(steps) > 0 else math.nan
         duration = float(stamps[-1] - stamps[0])
-        return {
-            "column": None if time is None else self._rows.columns[time.place] or time.place + 1,
-            "unit": "clock" if time is not None and time.clock else unit,
-            "first": float(stamps[0]) if first_stamp is None else first_stamp,
+        if disorder is not None:
+            rate = math.nan if disorder.rate is None else disorder.rate
+            duration = (len(stamps) - 1) / rate
+        column, first = clock.column, clock.table.first_stamp
+        self.time = {
+            "column": self._rows.columns[column.place] or column.place + 1,
+            "unit": "clock" if column.clock else column.unit_of_stamps,
+            "unit_guessed": column.unit_guessed,
+            "first": float(stamps[0]) if first is None else first,
             "duration": duration,
-            "rate": 1 / float(np.median(steps)) if np.median(steps) > 0 else math.nan,
+            "rate": rate,
             "step": {
                 "min": float(steps.min()),
                 "median": float(np.median(steps)),
                 "max": float(steps.max()),
             },
         }
+        if disorder is not None:
+            line = clock.table.line_of(disorder.sample)
+            self.warnings.insert(0, f"{self._file}:{line}: time {disorder.message}")
+        elif len(stamps) > 1:
+            faults = [fault.message for fault in stamp_faults(stamps)]
+            self.warnings[:0] = [f"{self._file}: time {fault}" for fault in faults]
+            if any(fault.startswith(JITTERS) for fault in faults):
+                self.rate = mean_rate(stamps)
 
     def _judge(
         self, place: int, stamps: FloatArray, values: FloatArray, table: Table, rows: IndexArray
     ) -> None:
+        """Add the faults of a column, unless it holds commands or errors, or its stamps do not increase."""
+        if role_of(self._rows.columns[place])[0] in (COMMANDED, ERROR) or not np.all(np.diff(stamps) > 0):
+            return
         guess = self._guesses.get(place)
         angle = guess is not None and guess.quantity == "q"
         name = self._rows.columns[place] or f"column {place + 1}"
         for first, sentence in column_faults(stamps, elapsed_times(stamps), values, angle=angle):
             line = table.line_of(int(rows[first]))
-            self.warnings.append(f"{Path(self._rows.path).name}:{line}: {name} {sentence}")
+            self.warnings.append(f"{self._file}:{line}: {name} {sentence}")
+
+
+def _lists(rows: FirstRows) -> Iterator[str]:
+    """Yield that columns hold several values in each cell."""
+    for place, name in enumerate(rows.columns):
+        if count := rows.list_length(place):
+            advice = f"split it into {count} columns, one for each"
+            yield f"column {name or place + 1!r} holds lists of {count} values in its cells; {advice}"
 
 
 def _counts(values: FloatArray) -> bool:
@@ -287,4 +401,4 @@ def is_trajectory(path: str, robot: Robot) -> bool:
         column_layout(read_header(path).columns, CommandedJoints.of(robot), NEEDED, path)
     except InputError:
         return False
-    return True
+    return not find_surroundings(path).lines

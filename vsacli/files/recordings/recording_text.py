@@ -35,7 +35,10 @@ def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
     yield from (f"warning: {warning}" for warning in recording["warnings"])
     yield ""
     guessed = ", some of which are guessed" if GUESSED in recording["trajectory"] else ""
-    yield f"trajectory file for this recording; check the columns{guessed}:"
+    if recording["refusal"]:
+        yield f"no complete trajectory file for this recording: {recording['refusal']}"
+    else:
+        yield f"trajectory file for this recording; check the columns{guessed}:"
     yield ""
     yield from recording["trajectory"].splitlines()
 
@@ -46,7 +49,8 @@ def _timing(time: Mapping[str, Any] | None) -> str:
     step = time["step"]
     steps = f" (steps of {step_text(step['min'])} to {step_text(step['max'])})" if step["min"] > 0 else ""
     rate = "" if math.isnan(time["rate"]) else f", {time['rate']:.4g} Hz{steps}"
-    return f", {time['duration']:.6g} s{rate}"
+    duration = "" if math.isnan(time["duration"]) else f", {time['duration']:.6g} s"
+    return f"{duration}{rate}"
 
 
 def _columns(recording: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
@@ -55,10 +59,11 @@ def _columns(recording: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
         holds = column["holds"]
         if holds == "numbers" and column["rows"] < rows:
             holds = f"numbers in {column['rows']} rows"
-        elif holds == "text":
-            holds = f"text: {column['first'][:20]}"
+        elif holds in ("text", "list"):
+            holds = f"{holds}: {column['first'][:20]}"
         elif holds == "time":
-            holds = "time" if time is None else f"time, {time['unit']}"
+            guessed = " (guessed)" if time and time["unit_guessed"] else ""
+            holds = "time" if time is None else f"time, {time['unit']}{guessed}"
         yield (
             column["name"] or "-",
             str(column["number"]),
@@ -71,26 +76,33 @@ def mapping_lines(
     time: TimeColumn | None,
     guesses: Sequence[Guess],
     joint_names: Sequence[str],
-    leaves_out: bool,
+    ignored: str | tuple[str | int, ...],
     rate: float | None = None,
+    skip_rows: Sequence[int] = (),
 ) -> Iterator[str]:
-    """Yield the keys `columns` and `ignore`.
+    """Yield the keys `columns`, `ignore` and `skip_rows`.
 
     Args:
         time: column of stamps, if there is one.
         guesses: likely meanings of the columns.
         joint_names: joints of the robot, empty if unknown.
-        leaves_out: whether there are further columns.
+        ignored: `REST`, or further columns; empty if there are none.
         rate: rows per second, in place of times.
+        skip_rows: numbers of lines that are neither header nor rows.
     """
     times = [] if rate is not None else _time(time)
     lines = [*times, *_unknown(guesses, joint_names), *map(_entry, guesses)]
     width = max((len(entry) for entry, _ in lines), default=0)
-    yield "columns:"
+    if any(not entry.startswith("#") for entry, _ in lines):
+        yield "columns:"
+    elif lines:
+        yield "# columns:"
     for entry, comment in lines:
         yield f"  {entry:<{width}}  # {comment}" if comment else f"  {entry}"
-    if leaves_out:
-        yield f"ignore: {REST}"
+    if ignored:
+        yield f"ignore: {ignored if ignored == REST else '[' + ', '.join(map(_word, ignored)) + ']'}"
+    if skip_rows:
+        yield f"skip_rows: {list(skip_rows)}"
 
 
 def _time(time: TimeColumn | None) -> Iterator[tuple[str, str]]:

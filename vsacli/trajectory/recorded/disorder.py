@@ -18,8 +18,8 @@ TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of 32-bit counters, s."""
 
 WRAP_STEPS, WRAP_SHARE = 20.0, 0.05
-"""Largest deviation of a fall from 2**32 ticks, in median intervals, as rows may be missing where it wraps; and
-as a share of it."""
+"""Largest deviation of a fall from 2**32 ticks, in median intervals, as rows may be missing where it wraps;
+and as a share of it."""
 
 RESTART_SHARE = 0.5
 """Smallest fall that is a restart, as a share of the time since the last one; a late stamp falls by less."""
@@ -67,8 +67,8 @@ class Disorder(NamedTuple):
 
 
 def find_disorder(stamps: FloatArray) -> Disorder | None:
-    """Return the failure of stamps, (samples,), s, to increase; None if they do."""
-    steps = np.diff(stamps)
+    """Return the failure of stamps, (samples,), s, to increase; None if they do, or are not finite."""
+    steps = np.diff(stamps) if np.isfinite(stamps).all() else np.ones(1)
     if np.all(steps > 0):
         return None
     return next(filter(None, _patterns(stamps, steps)))

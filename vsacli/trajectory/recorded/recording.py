@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -127,21 +127,15 @@ def read_recording(
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    table = read_table(path, mapping, known_columns(joints), empty_cells=True)
-    table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
+    table, layout, disorder = read_columns(path, joints, wanted, mapping)
     file = table.source.path
     signals = NEEDED if wanted is None else tuple(wanted)
-    _check_hollow(table, signals)
-    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header.line)
-    _check_filled(table)
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
         wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR)
-    time = _si(table, layout.time)
-    disorder = find_disorder(time)
-    if disorder is not None and disorder.is_replaced_by(mapping.rate):
-        time, table = np.arange(len(time)) / (mapping.rate or 1), replace(table, rated=True)
+    replaced = disorder is not None and disorder.is_replaced_by(mapping.rate)
+    time = np.arange(len(table.values)) / (mapping.rate or 1) if replaced else _si(table, layout.time)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     turns = list(_unwrapped(records, joints)) if unwrap else []
 
@@ -155,7 +149,7 @@ def read_recording(
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
     clauses = (*turns, *_understood(table, disorder), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
-    source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated
+    source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated or replaced
     del table  # frees as much memory as the samples need, before they are fitted
     profiles = tuple(
         SampledProfile.of(each, wanted[each.signal], resampled=resampled and not rated, progress=progress)
@@ -163,6 +157,27 @@ def read_recording(
     )
     times = RecordedTimes(time, rounding_notes(time))
     return Recording(times, profiles, warnings, notes, source, lines, first_stamp, rated)
+
+
+def read_columns(
+    path: str | os.PathLike[str],
+    joints: CommandedJoints,
+    wanted: Collection[Signal] | None,
+    mapping: ColumnMapping,
+) -> tuple[Table, ColumnLayout, Disorder | None]:
+    """Return the rows of a recording, the places of its signals, and the failure of its stamps, if any.
+
+    Raises:
+        InputError: a column is missing or has another unit, or rows have numbers in only some columns.
+    """
+    table = read_table(path, mapping, known_columns(joints), empty_cells=True)
+    table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
+    file = table.source.path
+    signals = NEEDED if wanted is None else tuple(wanted)
+    _check_hollow(table, signals)
+    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header.line)
+    _check_filled(table)
+    return table, layout, find_disorder(_si(table, layout.time))
 
 
 def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
@@ -208,12 +223,15 @@ def _understood(table: Table, disorder: Disorder | None) -> Iterator[str]:
         yield f"{counted(table.joined, 'row')} of nearly the same time as the row before joined with it"
     if table.first_stamp is not None:
         yield f"times count from its first stamp, {table.first_stamp}"
-    elif table.kept is not None:
+    if table.kept is not None and not table.joined:
         yield f"only the {len(table.kept)} rows are read in which these columns have numbers"
     if table.ignored:
-        shown = ", ".join(name or "a column without a name" for name in table.ignored[:MOST_NAMED])
-        more = len(table.ignored) - MOST_NAMED
-        yield f"ignored: {shown}{f' and {more} more' if more > 0 else ''}"
+        names = [name for name in table.ignored if name]
+        if nameless := len(table.ignored) - len(names):
+            several = f"{nameless} columns without names"
+            names.append("a column without a name" if nameless == 1 else several)
+        more = len(names) - MOST_NAMED
+        yield f"ignored: {', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}"
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:

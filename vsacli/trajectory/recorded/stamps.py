@@ -9,6 +9,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
+from vsacli.trajectory.recorded.disorder import rounded_rate
 from vsacli.trajectory.recorded.even_stamps import resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
@@ -40,14 +41,19 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
         )
     jitter = _jitter(stamps, steps, usual)
     if jitter > JITTER_SHARE:
-        mean = float(np.mean(steps[steps <= GAP_STEPS * usual]))
-        rate = float(f"{1 / mean:.3g}")
+        rate = mean_rate(stamps)
         yield SampleProblem(
             "time",
-            f"jitters: steps of about {step_text(mean)} change by {100 * jitter:.2g} % from one to the next."
-            " Where stamps are late, not samples, this is noise of the motion. For torques at equal steps, as"
-            f" drives need them, set rate: {rate:g} in a trajectory file",
+            f"jitters: steps of about {step_text(1 / rate)} change by {100 * jitter:.2g} % from one to the"
+            " next. Where stamps are late, not samples, this is noise of the motion. For torques at equal"
+            f" steps, as drives need them, set rate: {rate:g} in a trajectory file",
         )
+
+
+def mean_rate(stamps: FloatArray) -> float:
+    """Return the mean rate of the rows, 1/s, without gaps, in the digits that it is known to."""
+    steps = np.diff(stamps)
+    return rounded_rate(1 / float(np.mean(steps[steps <= GAP_STEPS * np.median(steps)])))
 
 
 def step_text(step: float) -> str:
