@@ -89,7 +89,10 @@ def test_identify(vsacli: Command, tmp_path: Path) -> None:
     ("content", "sentence"),
     [
         ("columns: {time: t}\n", "columns.yaml:1: missing key 'format'"),
-        ("format: vsacli-columns/1\n", "columns.yaml:1: says nothing: give columns, ignore, skip_rows or rate"),
+        (
+            "format: vsacli-columns/1\n",
+            "columns.yaml:1: says nothing: give columns, ignore, skip_rows or rate",
+        ),
         (
             "format: vsacli-columns/1\nignore: all\n",
             "columns.yaml:2: ignore: expected rest or a list of",

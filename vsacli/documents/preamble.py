@@ -10,7 +10,15 @@ from typing import NamedTuple
 from vsacli.base.errors import InputError
 from vsacli.base.storage import place_of
 from vsacli.base.texts import counted
-from vsacli.documents.csv_file import SEPARATORS, Header, cells_of, filled_lines, is_number, separator_of
+from vsacli.documents.csv_file import (
+    SEPARATORS,
+    Header,
+    cells_of,
+    filled_lines,
+    is_missing,
+    is_number,
+    separator_of,
+)
 from vsacli.documents.time_column import read_clock
 
 SEARCHED = 100_000
@@ -68,7 +76,10 @@ def _texts_below(lines: Sequence[str], top: int) -> list[tuple[str, ...]] | None
         return None
     values = [sum(_is_value(cell, separator) for cell in row) for row in rows]
     first = next((at for at in range(top + 1, len(rows)) if values[at]), len(rows))
-    enough = len(rows) - first >= FEWEST_ROWS and all(values[first:]) and first - top <= 1 + MOST_TEXTS
+    full = all(
+        count or all(map(is_missing, row)) for row, count in zip(rows[first:], values[first:], strict=True)
+    )
+    enough = full and len(rows) - first >= FEWEST_ROWS and first - top <= 1 + MOST_TEXTS
     rows_above = any(len(row) == width <= 2 * count for row, count in zip(rows[:top], values, strict=False))
     return rows[top + 1 : first] if enough and not rows_above else None
 

@@ -79,17 +79,18 @@ def read_source(
 
 
 def is_table(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is a CSV table, by its name; standard input, by its first line.
+    """Return whether a file is a CSV table, by its name; standard input and texts, by their first line.
 
     Raises:
-        InputError: standard input cannot be read.
+        InputError: standard input or a text cannot be read.
     """
     name = os.fspath(path)
-    if name != STANDARD:
+    if name != STANDARD and not name.lower().endswith(ENDINGS_OF_TEXTS):
         return name.lower().endswith(".csv")
     with _refusing(name), open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
-        first = next((line for line in file if line.strip() and not line.startswith("#")), ":")
-    return ":" not in first  # a document begins with a key
+        lines = iter(lambda: file.readline(BEGINNING_BYTES), "")
+        first = next((line for line in lines if line.strip() and not line.startswith("#")), ":")
+    return _BEGINNING_OF_DOCUMENTS.match(first) is None
 
 
 def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
@@ -211,6 +212,11 @@ class Problems:
             dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem)
         )
 
+
+ENDINGS_OF_TEXTS = (".txt", ".dat", ".tsv", ".log")
+"""Endings of files that may be tables or documents."""
+
+_BEGINNING_OF_DOCUMENTS = re.compile(r"\s*([{<\0\ufffd]|---|[\w\"'-]*\s*:(\s|$))")
 
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 """First bytes of texts in UTF-16, whose error says that UTF-8 is expected."""

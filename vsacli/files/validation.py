@@ -11,6 +11,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import counted, listed
 from vsacli.control.poles import FORMAT, PolesFile, load_gains
 from vsacli.documents.columns_file import load_columns
+from vsacli.documents.csv_file import read_header
 from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognize
@@ -195,9 +196,9 @@ def _misfit(path: str, robots: int, best: str) -> Iterator[Problem]:
 
 
 def _table(path: str, robots: Robots) -> Checked:
-    table = read_table(path)
-    if set(table.columns) != SPRING_COLUMNS:
+    if set(read_header(path).columns) != SPRING_COLUMNS:
         return _trajectory(path, robots)
+    table = read_table(path)
     spring = MeasuredSpring(file=table)
     warnings = [Problem(path, 0, warning) for warning in spring.warnings]
     return _usable(path, f"spring of {counted(len(table.values), 'row')}", warnings)

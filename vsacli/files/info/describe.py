@@ -20,6 +20,7 @@ from vsacli.base.texts import for_yaml
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.engine.cache import MOST_BYTES, Cache, CacheError, open_cache
+from vsacli.documents.columns_file import FORMAT as COLUMNS
 from vsacli.documents.paths import find
 from vsacli.documents.source import refuse_other_formats
 from vsacli.files.file_kinds import FileKind, recognize
@@ -192,11 +193,15 @@ def _described_table(
         return describe_recording(path, robot, progress, rate)
     if rate is not None:
         raise InputError.one("has times in column 'time'; leave --rate out", path)
-    described = _described_trajectory(path, robot_path)
+    try:
+        described = _described_trajectory(path, robot_path)
+    except InputError:  # the recording's faults are described
+        return describe_recording(path, robot, progress, rate)
     file = for_yaml(Path(path).name)
     signals = ["position", *(key for key in COMMANDED if key in described["joints"][0])]
     sources = [f"{key}: {{type: csv, file: {file}}}" for key in signals]
     described["trajectory"] = "\n".join([f"format: {FORMAT}", "name: recorded", *sources])
+    described["mapping"] = f"format: {COLUMNS}\ncolumns: {{time: time}}"
     return described
 
 

@@ -65,6 +65,7 @@ UNITS_IN_ROWS = {
     **dict.fromkeys(("radian", "radians"), "rad"),
     **dict.fromkeys(("degree", "degrees"), "deg"),
     **UNIT_WORDS_OF_TIMES,
+    **dict.fromkeys(("", "-", "1", "none", "n/a")),
 }
 """Units by the lower-case words with which rows of units mention them; other cells are units as they are."""
 
@@ -127,7 +128,7 @@ class FirstRows:
         """Return the unit of a column, in brackets after its name or in a row of units; None without one."""
         written = split_heading(self.columns[place])[1]
         below = self.units[place].strip("[]() ") if self.units else ""
-        return written if written is not None or not below else UNITS_IN_ROWS.get(below.lower(), below)
+        return UNITS_IN_ROWS.get(below.lower(), below) if written is None else written
 
     def list_length(self, place: int) -> int:
         """Return the number of values in each cell of a column of lists; 0 if it holds anything else."""

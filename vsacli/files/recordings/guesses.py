@@ -107,7 +107,7 @@ class _Column(NamedTuple):
     def signal(self) -> tuple[object, ...]:
         """The same for all variants of a signal, such as raw, filtered and commanded positions of a joint."""
         words = (word for word in self.words if word not in GENERIC)
-        return self.quantity, self.entry, self.bare, self.of_motor, *words
+        return self.quantity, self.bare, self.of_motor, *words
 
     @property
     def family(self) -> tuple[str, ...]:
