@@ -47,7 +47,7 @@ MAX_KINDS = 10
 """Maximum number of kinds of problems to report."""
 MAX_ALIKE = 1000
 """Number of problems of one kind after which reading stops."""
-MISSING = frozenset(("", *"nan +nan -nan nan(ind) -nan(ind) na n/a null none".split()))
+MISSING = frozenset(("", *["nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none"]))
 """Cells without a number, in lower case, as C compilers, spreadsheets and statistics programs write them."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")

@@ -88,9 +88,10 @@ def is_table(path: str | os.PathLike[str]) -> bool:
     if name != STANDARD and not name.lower().endswith(ENDINGS_OF_TEXTS):
         return name.lower().endswith(".csv")
     with _refusing(name), open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
-        lines = iter(lambda: file.readline(BEGINNING_BYTES), "")
-        first = next((line for line in lines if line.strip() and not line.startswith("#")), ":")
-    return _BEGINNING_OF_DOCUMENTS.match(first) is None
+        lines = (line for line in iter(lambda: file.readline(BEGINNING_BYTES), "") if line.strip())
+        first = next((line for line in lines if not line.startswith("#")), ":")
+        row = first if name == STANDARD else first + next(lines, "")
+    return _BEGINNING_OF_DOCUMENTS.match(first) is None and (name == STANDARD or bool(_DIGIT.search(row)))
 
 
 def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
@@ -216,6 +217,7 @@ class Problems:
 ENDINGS_OF_TEXTS = (".txt", ".dat", ".tsv", ".log")
 """Endings of files that may be tables or documents."""
 
+_DIGIT = re.compile(r"\d")
 _BEGINNING_OF_DOCUMENTS = re.compile(r"\s*([{<\0\ufffd]|---|[\w\"'-]*\s*:(\s|$))")
 
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
