@@ -21,18 +21,9 @@ from vsacli.documents.csv_file import (
 )
 from vsacli.documents.time_column import read_clock
 
-SEARCHED = 100_000
-"""Number of characters searched for a header; all lines below it among these must be rows."""
-
-MOST_LINES, MOST_ABOVE = 300, 100
-"""Most lines searched, and most lines of a preamble among them."""
-
-FEWEST_ROWS = 3
-"""Fewest rows of a table below a preamble or a row of units; fewer could be either."""
-
-MOST_TEXTS = 3
-"""Most rows of units and remarks below a header."""
-
+SEARCHED, MOST_LINES = 100_000, 300  # characters and lines searched; all lines below a header are to be rows
+MOST_ABOVE, MOST_TEXTS = 100, 3  # lines of a preamble; rows of units and remarks below a header
+FEWEST_ROWS = 3  # fewer could be either
 NO_HEADER = Header(0, SEPARATORS[-1], ())
 
 

@@ -116,7 +116,10 @@ class Table:
             return self
         stamps = self.values[:, at]
         intervals = np.abs(np.diff(stamps[there[:, int(np.argmax(there.sum(axis=0)))]]))
-        near = SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0
+        rounding = 2 * float(
+            np.spacing(np.abs(stamps).max())
+        )  # floating-point seconds since 1970 have 7 digits
+        near = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
         starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
         filled = np.add.reduceat(there.astype(int), starts, axis=0)
         if len(starts) == len(stamps) or filled.max() > 1:

@@ -106,7 +106,8 @@ def describe_recording(
             name = rows.columns[time.place] or time.place + 1
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
-    likely = rate or (clock.disorder.rate if clock and clock.disorder else None)
+    derived = clock.disorder.rate if clock and clock.disorder else None
+    likely = rate or (None if derived is None or math.isnan(derived) else derived)
     found = guesses(rows, clock.column if clock else None, joint_names)
     surveyed = _Survey(rows, time, found, progress, likely)
     if clock is not None and rate is None:

@@ -17,10 +17,10 @@ from vsacli.base.simulation_variables import COMMANDS, measured
 from vsacli.base.texts import counted
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
-from vsacli.documents.csv_file import of_columns, split_heading
-from vsacli.documents.expression import conversion_factor
+from vsacli.documents.csv_file import split_heading
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
+from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import find_disorder
 
 USUAL = ("q", "tau_motor")
@@ -135,21 +135,11 @@ def read_recording(
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
     stranger = _stranger(names, table.others, places, jointed.joint_names, robot)
-    problems = [
-        Problem(table.source.path, table.header.line, text)
-        for text in _unusable(names, table.others, places, stranger)
-    ]
-    factors: dict[int, float] = {}
-    refused: list[tuple[str, str]] = []
-    for index, (name, unit) in enumerate(headings):
-        if name == TIME or name in places:
-            try:
-                factors[index] = _factor(unit, "s" if name == TIME else places[name].unit)
-            except InputError as error:
-                refused.append((name, str(error)))
-    problems += [Problem(table.source.path, table.header.line, text) for text in of_columns(refused)]
+    problems = list(_unusable(names, table.others, places, stranger))
+    units = {TIME: "s", **{name: place.unit for name, place in places.items()}}
+    factors = unit_factors(headings, units, problems)
     if problems:
-        raise InputError(problems)
+        raise InputError(Problem(table.source.path, table.header.line, text) for text in problems)
     order = {name: number for number, name in enumerate(places)}
     signals = [
         Measured(name, places[name], _scaled(table.values[:, index], factors[index] * places[name].gear))
@@ -211,13 +201,13 @@ def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterat
             motor = number if of_motors else None
             ending = f"_{number}" if of_motors else ""
             place = Place(variable.name, joint, motor, unit, rank=rank)
-            yield f"{jointed.joint_names[joint]}.{name}{ending}", place
-            yield f"{name}{joint + 1}{ending}", place
+            named = {"joint": jointed.joint_names[joint], "number": joint + 1, "ending": ending}
+            yield from ((pattern.format(name=name, **named), place) for pattern in NAMINGS)
             ratio = float(jointed.gear_ratio[joint, number - 1])
             if variable.geared and np.isfinite(ratio):  # a shaft turns, whatever the joint does
                 on_shaft = variable.quantity.unit("revolute")
                 shaft = place._replace(unit=on_shaft, gear=ratio**-variable.geared)
-                yield f"{jointed.joint_names[joint]}.{name}_shaft{ending}", shaft
+                yield NAMINGS[0].format(name=f"{name}_shaft", **named), shaft
 
 
 COMMAND_ENDING = tuple(f".{name}" for name in COMMANDS.values())
@@ -301,10 +291,6 @@ def _no_column(strangers: Sequence[str], places: Mapping[str, Place]) -> str:
     return (
         f"expected columns such as {', '.join([TIME, *usual])}{hint}; if they have other names, use --columns"
     )
-
-
-def _factor(unit: str | None, expected: str) -> float:
-    return 1.0 if unit is None else conversion_factor(unit, expected)
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from vsacli.base.errors import InputError, Problem
@@ -22,7 +22,8 @@ from vsacli.trajectory.recorded.header_problems import Header, probable
 Naming = dict[str, dict[int, str]]
 """Names of the columns of each quantity, by index of the joint or wrench axis."""
 
-_PATTERNS = ("{joint}.{name}", "{name}{number}")
+NAMINGS = ("{joint}.{name}{ending}", "{name}{number}{ending}")
+"""Patterns of column names: by joint, and by the joint's number; motors have an ending, `_1` or `_2`."""
 
 _WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
@@ -64,7 +65,7 @@ def known_columns(joints: CommandedJoints) -> set[str]:
 
 def _of_every_joint(joints: CommandedJoints) -> list[Naming]:
     """Return both namings of columns, as if every signal commanded all joints."""
-    return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
+    return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in NAMINGS]
 
 
 def _known(namings: Sequence[Naming]) -> set[str]:
@@ -97,7 +98,7 @@ def column_layout(
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
     of_every_joint = _of_every_joint(joints)
-    namings = [_columns(pattern, joints) for pattern in _PATTERNS]
+    namings = [_columns(pattern, joints) for pattern in NAMINGS]
     used = [naming for naming in namings if any(column in names for column in _all(naming))]
     naming = used[0] if used else namings[0]
     expected = [TIME, *_all(naming), *(_all(_WRENCH_NAMING) if WRENCH in wanted else ())]
@@ -123,8 +124,8 @@ def column_layout(
         problems += found.of_strangers()
     else:
         problems += found.of_gaps(naming, {signal.names[0] for signal in wanted})
-    units = [unit for _, unit in headings]
-    columns = dict(_measured(names, units, naming, joints, problems))
+    factors = unit_factors(headings, _units(naming, joints), problems)
+    columns = {names[place]: Column(place, names[place], factor) for place, factor in factors.items()}
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     of_signals = {
@@ -158,7 +159,7 @@ def _layout(
 def _columns(pattern: str, joints: CommandedJoints) -> Naming:
     return {
         name: {
-            index: pattern.format(name=name, joint=joint, number=index + 1)
+            index: pattern.format(name=name, joint=joint, number=index + 1, ending="")
             for index, joint in joints.taking(signal).items()
         }
         for signal in (POSITION, *COMMANDED.values())
@@ -178,29 +179,36 @@ def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
     return none_known and any(probable(name, signals) is None for name in columns)
 
 
-def _measured(
-    names: Sequence[str],
-    units: Sequence[str | None],
-    naming: Naming,
-    joints: CommandedJoints,
-    problems: list[str],
-) -> Iterator[tuple[str, Column]]:
-    """Yield names and columns that are used; add units that cannot be converted to `problems`."""
+def _units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:
+    """Return the units of columns by name."""
     types = tuple(joints.types.values())
-    expected = {TIME: VARIABLES[TIME].quantity.unit("")}
-    for quantity, columns in naming.items():
-        for index, column in columns.items():
-            expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, types)
+    return {TIME: VARIABLES[TIME].quantity.unit("")} | {
+        column: _unit(VARIABLES[quantity].quantity, quantity, index, types)
+        for quantity, columns in naming.items()
+        for index, column in columns.items()
+    }
+
+
+def unit_factors(
+    headings: Sequence[tuple[str, str | None]], units: Mapping[str, str], problems: list[str]
+) -> dict[int, float]:
+    """Return the factors from known columns to their units, by position in a header.
+
+    Args:
+        headings: names of columns, each with its own unit, or None for that of the table.
+        units: units by known names.
+        problems: list to which units that cannot be converted are added.
+    """
+    factors: dict[int, float] = {}
     refused: list[tuple[str, str]] = []
-    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
-        if name in expected:
+    for place, (name, unit) in enumerate(headings):
+        if name in units:
             try:
-                factor = 1.0 if unit is None else conversion_factor(unit, expected[name])
+                factors[place] = 1.0 if unit is None else conversion_factor(unit, units[name])
             except InputError as error:
                 refused.append((name, str(error)))
-            else:
-                yield name, Column(place, name, factor)
     problems.extend(of_columns(refused))
+    return factors
 
 
 def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:

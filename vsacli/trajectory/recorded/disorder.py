@@ -6,6 +6,7 @@ the motion, and deleting rows with equal stamps would thin it, so that neither i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -14,31 +15,12 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.texts import counted
 
-TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units of 32-bit counters, s."""
-
-WRAP_STEPS, WRAP_SHARE = 20.0, 0.05
-"""Largest deviation of a fall from 2**32 ticks, in median intervals, as rows may be missing where it wraps;
-and as a share of it."""
-
-RESTART_SHARE = 0.5
-"""Smallest fall that is a restart, as a share of the time since the last one; a late stamp falls by less."""
-
-MOST_RESTARTS = 0.01
-"""Largest share of rows at which a recording begins again."""
-
-REPEATED_SHARE = 0.3
-"""Smallest share of repeated stamps, after the first one, that have too few digits or come in bursts."""
-
-GRAIN = 0.2
-"""Largest deviation of steps between such stamps from multiples of the smallest one, in smallest steps."""
-
-ENOUGH_STEPS = 20
-"""Fewest intervals that give the rate of the rows."""
-
-SAME_RATE = 0.05
-"""Largest relative difference of a stated rate from that of the rows, if it stands in place of the stamps; a
-trajectory that is to be resampled may have any other."""
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of 32-bit counters, s
+WRAP_STEPS = 20.0  # rows may be missing where a counter wraps
+RESTART_SHARE = 0.5  # of the time since the last start; a late stamp falls by less
+REPEATED_SHARE = 0.3  # of the rows after the first repeated stamp, if stamps have too few digits
+ENOUGH_STEPS = 20  # intervals that give a rate
+SAME_RATE = 0.05  # a rate farther from that of the rows is for resampling, not in place of stamps
 
 
 class Disorder(NamedTuple):
@@ -48,7 +30,7 @@ class Disorder(NamedTuple):
         sample: index of the first sample that is not later than the one before it.
         cause: pattern of the failure, a clause.
         remedy: advice, a clause.
-        rate: rate of the rows, 1/s; None if it is unknown, or does not help.
+        rate: rate of the rows, 1/s; NaN if it is unknown, None if no rate helps.
     """
 
     sample: int
@@ -63,7 +45,7 @@ class Disorder(NamedTuple):
 
     def is_replaced_by(self, rate: float | None) -> bool:
         """Return whether a stated rate, 1/s, is that of the rows, so that the stamps are not needed."""
-        return rate is not None and self.rate is not None and abs(rate / self.rate - 1) <= SAME_RATE
+        return rate is not None and self.rate is not None and not abs(rate / self.rate - 1) > SAME_RATE
 
 
 def find_disorder(stamps: FloatArray) -> Disorder | None:
@@ -86,9 +68,8 @@ def _patterns(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None
     before, after = (f"{value:.9g} s" for value in stamps[first - 1 : first + 1].tolist())
     cause = f"{before} appears twice" if before == after else f"{after} follows {before}"
     cause += f" ({len(failures)} such rows)" if len(failures) > 1 else ""
-    rate = rounded_rate(1 / usual) if usual > 0 else None
-    shown = "HZ" if rate is None else f"{rate:g}"
-    remedy = f"correct these stamps, or set rate: {shown} in their place if the rows are equally spaced"
+    rate = rounded_rate(1 / usual) if usual > 0 else math.nan
+    remedy = f"correct these stamps, or set {_rate_text(rate)} in their place if the rows are equally spaced"
     yield Disorder(first, cause, remedy, rate)
 
 
@@ -97,7 +78,7 @@ def _wrap(stamps: FloatArray, steps: FloatArray, usual: float) -> Disorder | Non
     falls = steps < 0
     for unit, size in TICKS.items():
         whole = 2.0**32 * size
-        if np.all(np.abs(steps[falls] + whole) <= min(WRAP_STEPS * usual, WRAP_SHARE * whole)):
+        if np.all(np.abs(steps[falls] + whole) <= min(WRAP_STEPS * usual, 0.05 * whole)):
             rate = rounded_rate(len(steps) / float(steps.sum() + whole * falls.sum()))
             first = int(np.argmax(falls)) + 1
             cause = f"falls by 2**32 {unit} after {stamps[first - 1]:.9g} s, as a 32-bit counter that wraps"
@@ -111,7 +92,7 @@ def _restart(stamps: FloatArray, steps: FloatArray, failures: FloatArray) -> Dis
     starts = np.append(0, failures[:-1] + 1)
     ranges = stamps[failures] - stamps[starts]
     far = np.all(-steps[failures] >= RESTART_SHARE * ranges) and np.all(failures - starts >= ENOUGH_STEPS)
-    if not far or len(failures) > max(1, MOST_RESTARTS * len(steps)):
+    if not far:
         return None
     first = int(failures[0]) + 1
     times = "" if len(failures) == 1 else f", and {counted(len(failures) - 1, 'time')} more"
@@ -126,21 +107,29 @@ def _repeats(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | No
     if not rises.size or repeated < REPEATED_SHARE * len(coarse):
         return None
     grain = float(rises.min())
-    if np.any(np.abs(rises / grain - np.round(rises / grain)) > GRAIN):
+    if np.any(np.abs(rises / grain - np.round(rises / grain)) > 0.2):  # no multiples of one step
         return None
-    last = int(np.flatnonzero(steps > 0)[-1]) + 1  # first row with the last stamp
+    first, last = (np.flatnonzero(steps > 0)[[0, -1]] + 1).tolist()  # rows where a stamp begins
     fine = steps[: max(0, start - 1)]
-    mean = float(fine.mean()) if len(fine) >= ENOUGH_STEPS else float(stamps[last] - stamps[0]) / last
-    rate = rounded_rate(1 / mean)
+    if len(fine) >= ENOUGH_STEPS:
+        rate = rounded_rate(1 / float(fine.mean()))
+    else:
+        rate = (
+            rounded_rate((last - first) / float(stamps[last] - stamps[first])) if last > first else math.nan
+        )
     cause = (
         f"{counted(repeated, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: stamps with too"
         f" few digits, in steps of {grain:.3g} s"
     )
-    return Disorder(
-        start + 1, cause, f"the rows are in order: set rate: {rate:g} in place of the stamps", rate
-    )
+    remedy = f"the rows are in order: set {_rate_text(rate)} in place of the stamps"
+    return Disorder(start + 1, cause, remedy, rate)
+
+
+def _rate_text(rate: float) -> str:
+    return "rate: (Hz), that of the rows," if math.isnan(rate) else f"rate: {rate:g}"
 
 
 def rounded_rate(rate: float) -> float:
-    """Return a rate, 1/s, with the three digits that stamps determine."""
-    return float(f"{rate:.3g}")
+    """Return a rate, 1/s, with the fewest digits that it needs; with four if these do not suffice."""
+    rounded = [float(f"{rate:.{digits}g}") for digits in (3, 4, 5, 6)]
+    return next((each for each in rounded if abs(each - rate) <= 1e-5 * rate), rounded[1])

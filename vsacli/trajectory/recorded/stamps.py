@@ -9,7 +9,6 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
-from vsacli.trajectory.recorded.disorder import rounded_rate
 from vsacli.trajectory.recorded.even_stamps import resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
@@ -53,7 +52,7 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
 def mean_rate(stamps: FloatArray) -> float:
     """Return the mean rate of the rows, 1/s, without gaps, in the digits that it is known to."""
     steps = np.diff(stamps)
-    return rounded_rate(1 / float(np.mean(steps[steps <= GAP_STEPS * np.median(steps)])))
+    return float(f"{1 / np.mean(steps[steps <= GAP_STEPS * np.median(steps)]):.3g}")
 
 
 def step_text(step: float) -> str:
