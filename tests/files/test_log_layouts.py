@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,11 +23,14 @@ Command = Callable[..., Outcome]
 ROBOT = REPOSITORY / "robots" / "planar_2r.yaml"
 ROWS = 120
 TIME = np.arange(ROWS) / 100
-MOTION = {"shoulder_position": 0.4 * np.sin(2 * TIME), "elbow_position": 0.5 - 0.2 * np.cos(3 * TIME)}
+MOTION: dict[str, Any] = {
+    "shoulder_position": 0.4 * np.sin(2 * TIME),
+    "elbow_position": 0.5 - 0.2 * np.cos(3 * TIME),
+}
 STAMPS = [f"{stamp:.3f}" for stamp in TIME]
 
 
-def table(stamps: object = None, name: str = "time", separator: str = ",", **columns: object) -> list[str]:
+def table(stamps: Any = None, name: str = "time", separator: str = ",", **columns: Any) -> list[str]:
     """The lines of a log with stamps and the positions of both joints, or other columns."""
     values = {name: STAMPS if stamps is None else stamps, **(columns or MOTION)}
     cells = [
@@ -43,10 +47,11 @@ def run_proposal(vsacli: Command, lines: list[str], folder: Path, file: str = "l
     assert "not complete" not in printed.out
     (folder / "recorded.yaml").write_text(printed.out)
     trajectory = load_trajectory(folder / "recorded.yaml", load_robot(ROBOT))
+    motion = trajectory.block(0, trajectory.samples)
     np.testing.assert_allclose(
-        trajectory.times.time - trajectory.times.time[0], TIME[: trajectory.samples], atol=1e-8
-    )
-    return trajectory.block(0, trajectory.samples).q
+        motion.time - motion.time[0], TIME[: len(motion.time)], atol=1e-8
+    )  # nine digits
+    return motion.q
 
 
 def assert_motion(q: np.ndarray) -> None:
@@ -111,7 +116,7 @@ def test_missing_values_are_missing_whatever_says_so(vsacli: Command, tmp_path: 
 
 
 def test_columns_without_numbers_are_left_out(vsacli: Command, tmp_path: Path) -> None:
-    columns = {
+    columns: dict[str, Any] = {
         f"{joint}.q": values for joint, values in zip(("shoulder", "elbow"), MOTION.values(), strict=True)
     }
     columns |= {f"{joint}.stiffness": [2e4] * ROWS for joint in ("shoulder", "elbow")}
@@ -212,7 +217,7 @@ def test_the_clock_that_is_usable_is_proposed(vsacli: Command, tmp_path: Path) -
     """Stamps of sensors come before those of loggers, unless rows repeat them."""
     stamps = 16 * 10**17 + 10**7 * np.arange(ROWS)
     repeated = np.where(np.arange(ROWS) % 40 == 7, np.roll(stamps, 1), stamps)
-    columns = {"header.stamp": list(map(str, repeated)), **MOTION}
+    columns: dict[str, Any] = {"header.stamp": list(map(str, repeated)), **MOTION}
     assert_motion(run_proposal(vsacli, table(list(map(str, stamps)), "%time", **columns), tmp_path))
     assert 'time: {column: "%time"' in (tmp_path / "recorded.yaml").read_text()
 
@@ -249,7 +254,9 @@ def test_measured_columns_come_before_commands(tmp_path: Path, measured: str, co
 def test_variants_of_a_signal_are_one_joint_and_commands_no_measurements(tmp_path: Path) -> None:
     held = np.where(np.arange(ROWS) > 60, 0.3, MOTION["shoulder_position"])
     kinds = ("position", "position_raw", "position_filtered", "position_desired", "position_error")
-    columns = {f"{kind}_{number}": MOTION["elbow_position"] for kind in kinds for number in (1, 2)}
+    columns: dict[str, Any] = {
+        f"{kind}_{number}": MOTION["elbow_position"] for kind in kinds for number in (1, 2)
+    }
     (tmp_path / "log.csv").write_text("\n".join(table(**columns, VelocityCmptd1=held)))
     found = describe_recording(tmp_path / "log.csv")
     entries = [" ".join(line.split()) for line in found["mapping"].splitlines() if ".q:" in line]
@@ -278,7 +285,7 @@ def test_numbered_columns_of_the_format_for_named_joints(vsacli: Command, tmp_pa
 
 
 def test_columns_that_have_the_names_of_the_format_are_a_trajectory(vsacli: Command, tmp_path: Path) -> None:
-    columns = {
+    columns: dict[str, Any] = {
         f"{joint}.q": values for joint, values in zip(("shoulder", "elbow"), MOTION.values(), strict=True)
     }
     columns |= {f"{joint}.stiffness": [2e4] * ROWS for joint in ("shoulder", "elbow")}

@@ -17,7 +17,7 @@ from vsacli import load_robot, load_trajectory
 from vsacli.files import templates
 from vsacli.files.info import render
 from vsacli.files.recordings import describe_recording
-from vsacli.files.recordings.names import JointNames, words_of
+from vsacli.trajectory.recorded.header_words import JointNames, words_of
 
 Command = Callable[..., Outcome]
 

@@ -81,17 +81,9 @@ class Header(NamedTuple):
     skipped: frozenset[int] = frozenset()
 
     @property
-    def above(self) -> int:
-        """Number of lines above the first one that may be a row."""
-        line = self.line
-        while line + 1 in self.skipped:
-            line += 1
-        return line
-
-    @property
     def interrupted(self) -> bool:
-        """Whether lines are skipped between rows."""
-        return any(line > self.above for line in self.skipped)
+        """Whether lines below the header are skipped, so that each line must be parsed."""
+        return any(line > self.line for line in self.skipped)
 
 
 def split_heading(text: str) -> tuple[str, str | None]:
@@ -327,7 +319,7 @@ def _loaded(
                 else header.separator,
                 comments=COMMENT,
                 encoding="latin-1",  # decodes any comment; numbers are ASCII
-                skiprows=header.above if cleaned is None else 0,
+                skiprows=header.line if cleaned is None else 0,
                 usecols=used if cleaned is None else None,
                 ndmin=2,
             )
@@ -347,7 +339,7 @@ def _is_regular(rows: Rows) -> bool:
         return False
     rest = b""
     with open(place_of(rows.path), "rb") as file:
-        for _ in range(rows.header.above):
+        for _ in range(rows.header.line):
             file.readline()
         while chunk := file.read(CHUNK):
             text, _, rest = (rest + chunk).rpartition(b"\n")

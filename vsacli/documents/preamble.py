@@ -18,8 +18,9 @@ from vsacli.documents.csv_file import (
     is_missing,
     is_number,
     separator_of,
+    split_heading,
 )
-from vsacli.documents.time_column import read_clock
+from vsacli.documents.time_column import NAMES, read_clock
 
 SEARCHED, MOST_LINES = 100_000, 300  # characters and lines searched; all lines below a header are to be rows
 MOST_ABOVE, MOST_TEXTS = 100, 3  # lines of a preamble; rows of units and remarks below a header
@@ -72,7 +73,13 @@ def _texts_below(lines: Sequence[str], top: int) -> list[tuple[str, ...]] | None
     )
     enough = full and len(rows) - first >= FEWEST_ROWS and first - top <= 1 + MOST_TEXTS
     rows_above = any(len(row) == width <= 2 * count for row, count in zip(rows[:top], values, strict=False))
-    return rows[top + 1 : first] if enough and not rows_above else None
+    late = any(map(_names_times, rows[top + 1 : first])) and not _names_times(rows[top])
+    return rows[top + 1 : first] if enough and not rows_above and not late else None
+
+
+def _names_times(row: Sequence[str]) -> bool:
+    """Return whether a row is a header, since one of its cells is a name of times."""
+    return any(split_heading(cell)[0].strip().lower() in NAMES for cell in row)
 
 
 def _is_value(cell: str, separator: str) -> bool:

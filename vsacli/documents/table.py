@@ -40,8 +40,8 @@ from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a
 AT_TOP = Header(1, SEPARATORS[-1], ())
 """Header in the first line."""
 
-SAME_STAMP = 1e-4
-"""Largest difference of equal stamps, in intervals of a signal: a joint at 1 rad/s moves by 1e-6 rad within
+SAME_STAMP = 1e-3
+"""Largest difference of equal stamps, in intervals of a signal: a joint at 1 rad/s moves by 1e-5 rad within
 it if there are 100 rows in a second."""
 
 
@@ -116,9 +116,8 @@ class Table:
             return self
         stamps = self.values[:, at]
         intervals = np.abs(np.diff(stamps[there[:, int(np.argmax(there.sum(axis=0)))]]))
-        rounding = 2 * float(
-            np.spacing(np.abs(stamps).max())
-        )  # floating-point seconds since 1970 have 7 digits
+        # seconds since 1970 have 7 decimals in floating point
+        rounding = 2 * float(np.spacing(np.abs(stamps).max()))
         near = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
         starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
         filled = np.add.reduceat(there.astype(int), starts, axis=0)

@@ -33,7 +33,7 @@ from vsacli.documents.time_column import (
     guessed_unit,
     read_clock,
 )
-from vsacli.files.recordings.names import QUANTITY_WORDS, WORDS, words_of
+from vsacli.trajectory.recorded.header_words import QUANTITY_WORDS, WORDS, words_of
 
 FIRST_ROWS = 500
 """Number of rows read, enough to distinguish numbers from texts, and stamps from counters."""

@@ -12,7 +12,7 @@ from vsacli.documents.column_mapping import MappedColumn
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.files.recordings.first_rows import FirstRows, TimeColumn
-from vsacli.files.recordings.names import (
+from vsacli.trajectory.recorded.header_words import (
     AXES,
     COMMANDED,
     ERROR,

@@ -34,7 +34,6 @@ from vsacli.files.recordings.first_rows import (
     unread_times,
 )
 from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
-from vsacli.files.recordings.names import COMMANDED, ERROR, role_of
 from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
@@ -42,6 +41,7 @@ from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
 from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
+from vsacli.trajectory.recorded.header_words import COMMANDED, ERROR, role_of
 from vsacli.trajectory.recorded.health import column_faults
 from vsacli.trajectory.recorded.recording import NEEDED, read_columns
 from vsacli.trajectory.recorded.stamps import mean_rate, stamp_faults

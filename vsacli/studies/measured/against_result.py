@@ -13,9 +13,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import COMMANDS, measured
 from vsacli.base.texts import counted
-from vsacli.base.variables import VARIABLES, Variable
+from vsacli.base.variables import Variable
 from vsacli.documents.columns_file import load_columns
-from vsacli.documents.csv_file import split_heading
 from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
@@ -25,12 +24,12 @@ from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square
 from vsacli.studies.measured.measured_columns import (
     Measured,
     Recording,
-    known_columns,
     preferred,
     read_recording,
     stand_ins,
 )
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, interpolated
+from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 
 POSITIONS = ("q", "theta")
 """Variables preferred for the alignment: positions were commanded, while torques depend on the model."""
@@ -86,7 +85,7 @@ def compare(
         *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, ratios),
         *wrong_model(signals, ratios),
-        *_left_out(result, recorded, behind),
+        *_left_out(recorded, behind),
     )
     return Comparison(
         result=str(result.path),
@@ -278,9 +277,8 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
     ]
 
 
-def _left_out(result: StoredResult, recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
-    commands = known_columns(result, ((COMMANDS[name], 0, VARIABLES[name]) for name in COMMANDS))
-    commanded = [column for column in recorded.others if split_heading(column)[0] in commands]
+def _left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+    commanded = [column for column in recorded.others if role_of(column)[0] == COMMANDED]
     unknown = [column for column in recorded.others if column not in commanded]
     if behind:
         yield f"not compared, as other columns say what the robot did: {', '.join(behind)}"

@@ -13,7 +13,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.renamed import successor
-from vsacli.base.simulation_variables import COMMANDS, measured
+from vsacli.base.simulation_variables import measured
 from vsacli.base.texts import counted
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
@@ -22,6 +22,7 @@ from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import find_disorder
+from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
@@ -210,9 +211,6 @@ def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterat
                 yield NAMINGS[0].format(name=f"{name}_shaft", **named), shaft
 
 
-COMMAND_ENDING = tuple(f".{name}" for name in COMMANDS.values())
-"""Endings of columns of commands, which are near the names of measured values, but not mistyped."""
-
 MOST_NAMED = 7
 """Largest number of joints of a robot that a message lists."""
 
@@ -281,7 +279,7 @@ def _unusable(
 
 def _no_column(strangers: Sequence[str], places: Mapping[str, Place]) -> str:
     """Return that no column of a recording is known, with the nearest or some possible names."""
-    plain = [name for name, _ in map(split_heading, strangers) if not name.endswith(COMMAND_ENDING)]
+    plain = [name for name, _ in map(split_heading, strangers) if role_of(name)[0] != COMMANDED]
     near = {name: new for name in plain if (new := nearest(name, places))}
     first: dict[str, str] = {}
     for name, place in places.items():

@@ -1,4 +1,4 @@
-"""Stamps that do not increase: the pattern by which they fail, and the remedy.
+"""Stamps that do not increase: the pattern by which they fail, and what to do.
 
 The rows of a log are nearly always in the order of the motion. Sorting them by wrong stamps would scramble
 the motion, and deleting rows with equal stamps would thin it, so that neither is ever advised.
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.texts import counted
 
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of 32-bit counters, s
@@ -29,19 +29,19 @@ class Disorder(NamedTuple):
     Attributes:
         sample: index of the first sample that is not later than the one before it.
         cause: pattern of the failure, a clause.
-        remedy: advice, a clause.
+        advice: advice, a clause.
         rate: rate of the rows, 1/s; NaN if it is unknown, None if no rate helps.
     """
 
     sample: int
     cause: str
-    remedy: str
+    advice: str
     rate: float | None = None
 
     @property
     def message(self) -> str:
         """The problem of the stamps, a sentence without its subject."""
-        return f"must increase, but {self.cause}; {self.remedy}"
+        return f"must increase, but {self.cause}; {self.advice}"
 
     def is_replaced_by(self, rate: float | None) -> bool:
         """Return whether a stated rate, 1/s, is that of the rows, so that the stamps are not needed."""
@@ -69,8 +69,8 @@ def _patterns(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None
     cause = f"{before} appears twice" if before == after else f"{after} follows {before}"
     cause += f" ({len(failures)} such rows)" if len(failures) > 1 else ""
     rate = rounded_rate(1 / usual) if usual > 0 else math.nan
-    remedy = f"correct these stamps, or set {_rate_text(rate)} in their place if the rows are equally spaced"
-    yield Disorder(first, cause, remedy, rate)
+    advice = f"correct these stamps, or set {_rate_text(rate)} in their place if the rows are equally spaced"
+    yield Disorder(first, cause, advice, rate)
 
 
 def _wrap(stamps: FloatArray, steps: FloatArray, usual: float) -> Disorder | None:
@@ -82,12 +82,12 @@ def _wrap(stamps: FloatArray, steps: FloatArray, usual: float) -> Disorder | Non
             rate = rounded_rate(len(steps) / float(steps.sum() + whole * falls.sum()))
             first = int(np.argmax(falls)) + 1
             cause = f"falls by 2**32 {unit} after {stamps[first - 1]:.9g} s, as a 32-bit counter that wraps"
-            remedy = f"set rate: {rate:g} in place of the stamps, or add {whole:.10g} s from this row on"
-            return Disorder(first, cause, remedy, rate)
+            advice = f"set rate: {rate:g} in place of the stamps, or add {whole:.10g} s from this row on"
+            return Disorder(first, cause, advice, rate)
     return None
 
 
-def _restart(stamps: FloatArray, steps: FloatArray, failures: FloatArray) -> Disorder | None:
+def _restart(stamps: FloatArray, steps: FloatArray, failures: IndexArray) -> Disorder | None:
     """Return that the recording begins again, if stamps fall rarely, and by about their whole range."""
     starts = np.append(0, failures[:-1] + 1)
     ranges = stamps[failures] - stamps[starts]
@@ -121,8 +121,8 @@ def _repeats(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | No
         f"{counted(repeated, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: stamps with too"
         f" few digits, in steps of {grain:.3g} s"
     )
-    remedy = f"the rows are in order: set {_rate_text(rate)} in place of the stamps"
-    return Disorder(start + 1, cause, remedy, rate)
+    advice = f"the rows are in order: set {_rate_text(rate)} in place of the stamps"
+    return Disorder(start + 1, cause, advice, rate)
 
 
 def _rate_text(rate: float) -> str:
