@@ -120,7 +120,7 @@ def test_columns_without_numbers_are_left_out(vsacli: Command, tmp_path: Path) -
         f"{joint}.q": values for joint, values in zip(("shoulder", "elbow"), MOTION.values(), strict=True)
     }
     columns |= {f"{joint}.stiffness": [2e4] * ROWS for joint in ("shoulder", "elbow")}
-    hollow = {f"{joint}.dq": ["nan"] * ROWS for joint in ("shoulder", "elbow")}
+    hollow: dict[str, Any] = {f"{joint}.dq": ["nan"] * ROWS for joint in ("shoulder", "elbow")}
     (tmp_path / "log.csv").write_text("\n".join(table(**columns, **hollow)))
     done = vsacli("check-feasibility", ROBOT, "log.csv")
     assert "left out, as they hold no number: shoulder.dq, elbow.dq" in done.out
