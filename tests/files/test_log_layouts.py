@@ -150,6 +150,14 @@ def test_joints_with_times_of_their_own_are_named(vsacli: Command, tmp_path: Pat
     assert "have no numbers in the same rows, as signals with stamps of their own" in out
 
 
+def test_a_log_that_is_too_short_is_not_complete(vsacli: Command, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("\n".join(table()[:6]))
+    out = vsacli("info", "log.csv", "--robot", ROBOT).out
+    assert (
+        "no complete trajectory file for this recording: log.csv: q has 5 samples; a trajectory needs" in out
+    )
+
+
 def test_lists_in_cells_are_named(vsacli: Command, tmp_path: Path) -> None:
     cells = [f'"({one:.6f}, {other:.6f})"' for one, other in zip(*MOTION.values(), strict=True)]
     (tmp_path / "log.csv").write_text("\n".join(table(position=cells)))

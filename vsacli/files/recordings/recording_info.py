@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.simulation_variables import measured
@@ -43,7 +43,7 @@ from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.header_words import COMMANDED, ERROR, role_of
 from vsacli.trajectory.recorded.health import column_faults
-from vsacli.trajectory.recorded.recording import NEEDED, read_columns
+from vsacli.trajectory.recorded.recording import NEEDED, read_samples
 from vsacli.trajectory.recorded.stamps import mean_rate, stamp_faults
 
 TOGETHER = 16
@@ -253,10 +253,11 @@ class _Proposal:
             *([STIFFNESS] if any(guess.quantity == STIFFNESS.key for guess in taken) else []),
         ]
         try:
-            _, _, disorder = read_columns(self._rows.path, CommandedJoints.of(robot), signals, mapping)
+            read_samples(self._rows.path, CommandedJoints.of(robot), signals, mapping)
         except InputError as error:
-            return str(error.problems[0])
-        return "" if disorder is None else f"time {disorder.message}"
+            problem = error.problems[0]
+            return str(Problem(Path(problem.file).name, problem.line, problem.message))
+        return ""
 
 
 class _Survey:

@@ -8,6 +8,7 @@ import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -127,29 +128,19 @@ def read_recording(
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    table, layout, disorder = read_columns(path, joints, wanted, mapping)
-    file = table.source.path
-    signals = NEEDED if wanted is None else tuple(wanted)
-    if wanted is None:
-        devices = (signal for signal in COMMANDED.values() if signal.device is not None)
-        signals += tuple(each for each in devices if layout.quantities.get(each.key))
-        wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR)
-    replaced = disorder is not None and disorder.is_replaced_by(mapping.rate)
-    time = np.arange(len(table.values)) / (mapping.rate or 1) if replaced else _si(table, layout.time)
-    records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
+    table, layout, time, records, replaced = read_samples(path, joints, wanted, mapping)
+    file, signals = table.source.path, [record.signal for record in records]
+    wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR) if wanted is None else wanted
     turns = list(_unwrapped(records, joints)) if unwrap else []
-
-    problems = [*time_problems(time), *sample_problems(records)]
-    if problems:
-        raise InputError(_located(problem, table, layout) for problem in problems)
     found = [
         *health(time, records, list(joints.types.values())),
         *unit_doubts(records, _without_unit(table, layout, joints)),
     ]
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
-    clauses = (*turns, *_understood(table, disorder), *_unused(layout, signals))
+    clauses = (*turns, *_understood(table, replaced), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
-    source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated or replaced
+    source, lines, first_stamp = table.source, table.lines, table.first_stamp
+    rated = table.rated or replaced is not None
     del table  # frees as much memory as the samples need, before they are fitted
     profiles = tuple(
         SampledProfile.of(each, wanted[each.signal], resampled=resampled and not rated, progress=progress)
@@ -159,25 +150,56 @@ def read_recording(
     return Recording(times, profiles, warnings, notes, source, lines, first_stamp, rated)
 
 
-def read_columns(
+class _ReadSamples(NamedTuple):
+    """The samples of a recording, before they are fitted.
+
+    Attributes:
+        table: rows with numbers.
+        layout: columns of the signals.
+        time: times of the samples, (samples,), s.
+        records: samples of each signal.
+        replaced: failure of the stamps to increase, if the rate of the rows stands in their place.
+    """
+
+    table: Table
+    layout: ColumnLayout
+    time: FloatArray
+    records: list[Samples]
+    replaced: Disorder | None
+
+
+def read_samples(
     path: str | os.PathLike[str],
     joints: CommandedJoints,
     wanted: Collection[Signal] | None,
     mapping: ColumnMapping,
-) -> tuple[Table, ColumnLayout, Disorder | None]:
-    """Return the rows of a recording, the places of its signals, and the failure of its stamps, if any.
+) -> _ReadSamples:
+    """Read the samples of signals, or raise the problems for which a run refuses them; see `read_recording`.
 
     Raises:
-        InputError: a column is missing or has another unit, or rows have numbers in only some columns.
+        InputError: the file has problems; lists each with its line.
     """
     table = read_table(path, mapping, known_columns(joints), empty_cells=True)
     table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
-    file = table.source.path
     signals = NEEDED if wanted is None else tuple(wanted)
     _check_hollow(table, signals)
-    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header.line)
+    headings = (*table.columns, *table.others)
+    layout = column_layout(headings, joints, signals, table.source.path, table.header.line)
     _check_filled(table)
-    return table, layout, find_disorder(_si(table, layout.time))
+    if wanted is None:
+        devices = (signal for signal in COMMANDED.values() if signal.device is not None)
+        signals += tuple(each for each in devices if layout.quantities.get(each.key))
+    time = _si(table, layout.time)
+    replaced = find_disorder(time)
+    if replaced is not None and replaced.is_replaced_by(mapping.rate):
+        time = np.arange(len(time)) / (mapping.rate or 1)
+    else:
+        replaced = None
+    records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
+    problems = [*time_problems(time), *sample_problems(records)]
+    if problems:
+        raise InputError(_located(problem, table, layout) for problem in problems)
+    return _ReadSamples(table, layout, time, records, replaced)
 
 
 def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
