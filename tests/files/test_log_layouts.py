@@ -81,6 +81,30 @@ def test_a_row_of_units_is_skipped_and_used(vsacli: Command, tmp_path: Path) -> 
     assert "skip_rows: [2]" in (tmp_path / "recorded.yaml").read_text()
 
 
+def test_skipped_rows_are_skipped_by_compare(vsacli: Command, tmp_path: Path) -> None:
+    lines = table()
+    run_proposal(vsacli, lines, tmp_path)
+    vsacli("invdyn", ROBOT, "recorded.yaml", "-o", "r.h5")
+    compared = vsacli(
+        "compare", "r.h5", "log.csv", "--columns", mapping_of(vsacli, tmp_path), "--time-offset", "0"
+    )
+    lines.insert(1, "s,rad,rad")
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    columns = mapping_of(vsacli, tmp_path)
+    assert "skip_rows: [2]" in (tmp_path / columns).read_text()
+    assert (
+        vsacli("compare", "r.h5", "log.csv", "--columns", columns, "--time-offset", "0").out == compared.out
+    )
+    assert '"skip_rows"' in vsacli("schema", "columns").out
+
+
+def mapping_of(vsacli: Command, folder: Path) -> str:
+    (folder / "columns.yaml").write_text(
+        vsacli("info", "log.csv", "--robot", ROBOT, "--field", "mapping").out
+    )
+    return "columns.yaml"
+
+
 def test_a_preamble_is_skipped(vsacli: Command, tmp_path: Path) -> None:
     lines = ["Recorder,3.1", "Rate,100 Hz", "", *table()]
     assert_motion(run_proposal(vsacli, lines, tmp_path))

@@ -5,7 +5,6 @@ The column of stamps is identified first, with its unit.
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -29,7 +28,6 @@ from vsacli.documents.time_column import (
     UNITS_IN_NAMES,
     Clock,
     are_seconds_and_nanoseconds,
-    elapsed,
     guessed_unit,
     read_clock,
 )
@@ -54,8 +52,8 @@ INDICES = (
 )
 """Names of columns that count rows."""
 
-RISING_SHARE = 0.9
-"""Smallest share of positive differences between stamps; in a faulty log some are not positive."""
+EVEN_SHARE = 0.9
+"""Smallest share of nearly even intervals of a column guessed to be times; a faulty log has others."""
 
 GUESSED = "guessed"
 """Beginning of the reason if a column is taken for times although its name does not indicate it."""
@@ -151,19 +149,6 @@ class FirstRows:
         """Positions of the columns that hold numbers."""
         return [place for place in range(len(self.columns)) if self.numbers(place)]
 
-    def rises(self, place: int) -> bool:
-        """Return whether a column of at least two numbers or times nearly always increases."""
-        cells = self.filled(place)
-        clocks = self.clocks(place)
-        if clocks:
-            return len(clocks) > 1 and bool(np.mean(np.diff(elapsed(clocks)) > 0) > RISING_SHARE)
-        try:
-            values: Sequence[float] = [int(cell) for cell in cells]  # floats merge nanoseconds since 1970
-        except ValueError:
-            values = self.numbers(place) or [math.nan]
-        steps = [after > before for before, after in pairwise(values)]
-        return sum(steps) > RISING_SHARE * len(steps)
-
 
 def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
     """Return the first rows of a CSV file with any column names.
@@ -230,7 +215,7 @@ def time_columns(rows: FirstRows) -> Iterator[TimeColumn]:
     named = dict.fromkeys((*called, *(place for place in every if rows.clocks(place))))
     stamps = [place for place in named if rows.numbers(place) or rows.clocks(place)]
     moving = [place for place in stamps if len(set(rows.filled(place))) > 1 and not rows.is_index(place)]
-    yield from (_described(rows, place, "") for place in sorted(moving, key=lambda at: not rows.rises(at)))
+    yield from (_described(rows, place, "") for place in moving)
     guess = None if called else next(filter(lambda place: _like_stamps(rows, place), rows.of_numbers), None)
     if guess is not None:
         yield _described(rows, guess, f"{GUESSED}: it increases in nearly even steps")
@@ -280,11 +265,11 @@ def _called(rows: FirstRows) -> list[int]:
 def _like_stamps(rows: FirstRows, place: int) -> bool:
     """Return whether a column, not named as a quantity, rises nearly evenly and does not count rows."""
     words = words_of(split_heading(rows.columns[place])[0])
-    if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place) or not rows.rises(place):
+    if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place):
         return False
     steps = np.diff(rows.numbers(place))
-    usual = float(np.median(steps))
-    return usual > 0 and bool(np.mean(np.abs(steps - usual) <= EVEN * usual) > RISING_SHARE)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    return usual > 0 and bool(np.mean(np.abs(steps - usual) <= EVEN * usual) > EVEN_SHARE)
 
 
 def _seconds_and_nanoseconds(rows: FirstRows) -> tuple[int, int] | None:

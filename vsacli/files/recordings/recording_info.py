@@ -128,7 +128,7 @@ def describe_recording(
 
 
 def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
-    """Return the first column of stamps that increase where the joints have numbers; else the first."""
+    """Return the first column of stamps that increase where the joints have numbers, or nearly do."""
     clocks: list[_Clock] = []
     for column in time_columns(rows):
         found = [guess for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN]
@@ -140,7 +140,7 @@ def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
         clocks.append(_Clock(column, table, stamps, find_disorder(stamps)))
         if clocks[-1].disorder is None:
             return clocks[-1]
-    return next(iter(clocks), None)
+    return min(clocks, key=lambda clock: np.count_nonzero(~(np.diff(clock.stamps) > 0)), default=None)
 
 
 def _seconds(table: Table) -> FloatArray:
