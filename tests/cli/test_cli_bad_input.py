@@ -81,7 +81,7 @@ TABLES = {
         (ROWS[4], "0.4,0,0\n"),
         ["6: expected 7 values, one for each column of the header, found 3"],
     ),
-    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1': expected a number, found 'nan'"]),
+    "NaN": (("0.4,0", "0.4,nan"), ["6: column 'q1' has no number here, where others have one"]),
     "text": (("0.4,0", "0.4,up"), ["6: column 'q1': expected a number, found 'up'"]),
     "negative stiffness": ((ROWS[4], "0.4,0,0,0,9,-9,9\n"), ["6: stiffness2 must be positive, not -9"]),
     "unknown column": (

@@ -81,6 +81,13 @@ def test_a_row_of_units_is_skipped_and_used(vsacli: Command, tmp_path: Path) -> 
     assert "skip_rows: [2]" in (tmp_path / "recorded.yaml").read_text()
 
 
+def test_a_first_row_of_missing_numbers_is_no_row_of_units(vsacli: Command, tmp_path: Path) -> None:
+    lines = table()
+    lines.insert(1, "NA,NA,NA")
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert "skip_rows" not in vsacli("info", "log.csv", "--robot", ROBOT).out
+
+
 def test_skipped_rows_are_skipped_by_compare(vsacli: Command, tmp_path: Path) -> None:
     lines = table()
     run_proposal(vsacli, lines, tmp_path)

@@ -134,9 +134,9 @@ def header_of(
     """
     file = TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
     number, line, comment = 0, "\n", 0
-    while (line == "\n" or line.startswith(COMMENT) or (line and number in skipped)) and len(
-        line
-    ) < MAX_HEADER:
+    while len(line) < MAX_HEADER and (
+        line == "\n" or line.startswith(COMMENT) or (line and number in skipped)
+    ):
         comment = number if line.startswith(COMMENT) else comment
         number, line = number + 1, file.readline(MAX_HEADER)
     file.detach()

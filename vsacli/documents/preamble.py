@@ -46,7 +46,7 @@ def find_surroundings(path: str | os.PathLike[str]) -> Surroundings:
     """Return the lines that a reader must skip; none if the header is in the first line, or is not found."""
     try:
         with open(place_of(path), encoding="utf-8-sig", errors="replace") as file:
-            beginning = file.read(SEARCHED).splitlines()[:MOST_LINES]
+            beginning = file.read(SEARCHED).split("\n")[:MOST_LINES]
     except OSError:
         return Surroundings()
     lines = list(filled_lines(beginning, NO_HEADER))
@@ -67,11 +67,9 @@ def _texts_below(lines: Sequence[str], top: int) -> list[tuple[str, ...]] | None
     if width < 2 or any(len(row) != width for row in rows[top:]):
         return None
     values = [sum(_is_value(cell, separator) for cell in row) for row in rows]
-    first = next((at for at in range(top + 1, len(rows)) if values[at]), len(rows))
-    full = all(
-        count or all(map(is_missing, row)) for row, count in zip(rows[first:], values[first:], strict=True)
-    )
-    enough = full and len(rows) - first >= FEWEST_ROWS and first - top <= 1 + MOST_TEXTS
+    is_row = [count > 0 or all(map(is_missing, row)) for row, count in zip(rows, values, strict=True)]
+    first = next((at for at in range(top + 1, len(rows)) if is_row[at]), len(rows))
+    enough = len(rows) - first >= FEWEST_ROWS and all(is_row[first:]) and first - top <= 1 + MOST_TEXTS
     rows_above = any(len(row) == width <= 2 * count for row, count in zip(rows[:top], values, strict=False))
     late = any(map(_names_times, rows[top + 1 : first])) and not _names_times(rows[top])
     return rows[top + 1 : first] if enough and not rows_above and not late else None
