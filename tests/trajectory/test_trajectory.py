@@ -246,8 +246,8 @@ def test_from_samples_names_everything_that_does_not_fit():
     with pytest.raises(InputError) as caught:
         Trajectory.from_samples(time, q, stiffness)
     assert str(caught.value).splitlines() == [
-        "time[3] must increase, but 0.2 s appears twice; correct these stamps, or set rate: 10 in their place "
-        "if the rows are equally spaced",
+        "time[3] must increase, but 0.2 s appears twice; correct these stamps, or set rate: 10 in their "
+        "place if the rows are equally spaced",
         "q[4, 1] must be finite, not nan (t = 0.400 s)",
         "stiffness[1, 0] must be positive, not -3 (t = 0.100 s)",
     ]
