@@ -233,7 +233,10 @@ def test_a_recording_that_begins_again_is_to_be_cut(vsacli: Command, tmp_path: P
     out = vsacli("info", "log.csv", "--robot", ROBOT).out
     assert words in out
     assert "log.csv:62: time must increase" in out
-    assert "no complete trajectory file" in out
+    assert "no complete trajectory file for this recording: time must increase" in out
+    assert "rate:" not in out
+    stated = vsacli("info", "log.csv", "--robot", ROBOT, "--rate", "100").out
+    assert words in stated  # a rate does not make one motion of two
     assert "-0." not in out.split("\n", maxsplit=1)[0]
 
 

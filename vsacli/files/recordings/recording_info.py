@@ -106,13 +106,14 @@ def describe_recording(
             name = rows.columns[time.place] or time.place + 1
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
-    derived = clock.disorder.rate if clock and clock.disorder else None
+    disorder = clock.disorder if clock else None
+    derived = disorder.rate if disorder else None
     likely = rate or (None if derived is None or math.isnan(derived) else derived)
     found = guesses(rows, clock.column if clock else None, joint_names)
     surveyed = _Survey(rows, time, found, progress, likely)
-    if clock is not None and rate is None:
+    if clock is not None and (rate is None or (disorder and not disorder.is_replaced_by(rate))):
         surveyed.describe_clock(clock)
-    proposal = _Proposal(rows, time, found, likely, guessed=rate is None)
+    proposal = _Proposal(rows, time, found, likely, None if rate else disorder)
     refusal = proposal.refusal(robot)
     return {
         "kind": "recording",
@@ -157,7 +158,8 @@ class _Proposal:
         time: column of stamps; None if a rate stands in their place, or nothing does.
         found: likely meanings of the columns.
         rate: rows per second, if there is no column of stamps.
-        guessed: whether this rate was derived from unusable stamps.
+        disorder: failure of the stamps to increase, from which this rate follows; None if they do, or if the
+            rate is stated.
     """
 
     def __init__(
@@ -166,12 +168,11 @@ class _Proposal:
         time: TimeColumn | None,
         found: Sequence[Guess],
         rate: float | None,
-        *,
-        guessed: bool,
+        disorder: Disorder | None,
     ) -> None:
         self._rows, self._time, self._found = rows, time, found
         self._rate = None if time is not None else rate
-        self._guessed = guessed
+        self._disorder = disorder
 
     def _left_out(self, taken: Sequence[Guess]) -> str | tuple[str | int, ...]:
         """Return the columns to ignore: all others, one by one if commands know some by their names."""
@@ -197,7 +198,7 @@ class _Proposal:
     def _rates(self) -> Iterator[str]:
         if self._rate is not None:
             yield f"rate: {self._rate:g}" + (
-                "  # guessed from the stamps, which do not increase" * self._guessed
+                "  # guessed from the stamps, which do not increase" * bool(self._disorder)
             )
 
     def trajectory(self, robot: Robot | None, refusal: str, jittering: float | None) -> Iterator[str]:
@@ -207,7 +208,7 @@ class _Proposal:
         yield f"format: {trajectory_file.FORMAT}"
         yield "name: recorded"
         yield from self._rates()
-        if self._rate is None and self._time is None:
+        if self._rate is None and self._time is None and not self._disorder:
             yield "# rate: ...  # rows per second: no column holds times"
         elif jittering is not None:
             yield f"# rate: {jittering:g}  # stamps jitter; this makes the steps of the torques equal"
@@ -236,6 +237,8 @@ class _Proposal:
     def refusal(self, robot: Robot | None) -> str:
         """Return why a run with this robot would refuse the trajectory, a clause; empty if it would not."""
         if self._time is None and self._rate is None:
+            if self._disorder:
+                return f"time {self._disorder.message}"
             return "no column holds times; give the rate of the rows with --rate HZ"
         if robot is None:
             return ""

@@ -107,7 +107,7 @@ def mapping_lines(
 
 def _time(time: TimeColumn | None) -> Iterator[tuple[str, str]]:
     if time is None:
-        yield f"# {TIME}: ...", "no column holds times; say which does, or the rate of the rows"
+        yield f"# {TIME}: ...", "no column holds usable times; say which does, or the rate of the rows"
     else:
         yield f"{TIME}: {_written(time.source)}", time.reason
 
