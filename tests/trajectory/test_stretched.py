@@ -8,7 +8,7 @@ from samples.fixes import pendulum
 
 from vsacli import load_trajectory
 from vsacli.base.errors import InputError
-from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -120,3 +120,24 @@ def test_impossible_slow_downs_are_refused_with_their_line(tmp_path, factor, pro
     )
     with pytest.raises(InputError, match=rf"slower.yaml:\d: .*{problem}"):
         load_trajectory(tmp_path / "slower.yaml", pendulum())
+
+
+DERIVED = {
+    "stretched": lambda trajectory: trajectory.stretched(FACTOR),
+    "changed": lambda trajectory: trajectory.changed(lambda _, profile: profile, trajectory.times),
+    "sampled": lambda trajectory: trajectory.sampled(RecordedTimes(np.linspace(2, 3, 5))),
+    "from zero": lambda trajectory: trajectory.from_zero(),
+}
+
+
+@pytest.mark.parametrize("derive", DERIVED.values(), ids=DERIVED)
+def test_a_derived_trajectory_keeps_what_is_said_of_its_recording(derive):
+    time = np.linspace(2, 3, 101)
+    q = np.sin(4 * time)
+    q[50:56] = q[50]
+    trajectory = Trajectory.from_samples(time, q[:, None], np.full((101, 1), 900.0))
+    told = trajectory.commanding(DAMPING, (1.0,), "no damping is commanded")
+    assert "frozen" in " ".join(told.warnings)
+    derived = derive(told)
+    assert (derived.warnings, derived.notes) == (told.warnings, told.notes)
+    assert "no damping is commanded" in derived.notes

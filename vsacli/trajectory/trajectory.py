@@ -40,9 +40,6 @@ class Trajectory:
         commanded: profiles of signals by their keys in `COMMANDED`, e.g. `stiffness`; NaN if not commanded.
         wrench: profile of the wrench of the environment; None without one.
         name: name for reports and for the result file.
-        located_warnings: warnings about times and profiles, with the line of a value in the file if known.
-        warnings: texts of `located_warnings`.
-        notes: notes on the interpretation of times and profiles, where that is not obvious.
         sources: files that the trajectory was read from.
     """
 
@@ -71,15 +68,27 @@ class Trajectory:
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
-        profiles = [profile for _, profile in self.profiles()]
-        messages = (*warnings, *(each for profile in profiles for each in profile.warnings))
-        self.located_warnings = tuple(
-            each if isinstance(each, Problem) else Problem("", 0, each) for each in messages
-        )
-        self.warnings = tuple(map(str, self.located_warnings))
-        self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))
+        self._source_warnings, self._source_notes = tuple(warnings), tuple(notes)
         self.sources = tuple(sources)
         self._check()
+
+    @property
+    def located_warnings(self) -> tuple[Problem, ...]:
+        """Warnings about times and profiles, with the line of a value in the file if known."""
+        of_profiles = (each for _, profile in self.profiles() for each in profile.warnings)
+        messages = (*self._source_warnings, *of_profiles)
+        return tuple(each if isinstance(each, Problem) else Problem("", 0, each) for each in messages)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of `located_warnings`."""
+        return tuple(map(str, self.located_warnings))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on the interpretation of times and profiles, where that is not obvious."""
+        of_profiles = (each for _, profile in self.profiles() for each in profile.notes)
+        return (*self._source_notes, *self.times.notes, *of_profiles)
 
     def __repr__(self) -> str:
         first, last = self.times.span
@@ -194,7 +203,7 @@ class Trajectory:
         same = copy(self)
         constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
         same.commanded = {**self.commanded, signal.key: constant}
-        same.notes = (*self.notes, note)
+        same._source_notes = (*self._source_notes, note)
         return same
 
     @property
@@ -268,33 +277,29 @@ class Trajectory:
     def changed(self, change: Callable[[Signal, Profile], Profile], times: Times) -> Trajectory:
         """Return the trajectory with `change` applied to each profile, and with other sample times.
 
+        Warnings and notes of the recording or file are kept; those of profiles and times are their own.
+
         Raises:
             InputError: profiles and sample times no longer have the same span.
         """
-        wrench = self.wrench
-        return Trajectory(
-            times,
-            change(POSITION, self.position),
-            {key: change(COMMANDED[key], profile) for key, profile in self.commanded.items()},
-            wrench=wrench and replace(wrench, profile=change(WRENCH, wrench.profile)),
-            name=self.name,
-            sources=self.sources,
-        )
+        derived = self._derived(change, times)
+        derived._check()
+        return derived
 
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
-        same = copy(self)
-        same.times = times
-        same.position = Continued(self.position)
-        same.commanded = {key: Continued(profile) for key, profile in self.commanded.items()}
-        same.wrench = self.wrench and replace(self.wrench, profile=Continued(self.wrench.profile))
-        return same
+        return self._derived(lambda _, profile: Continued(profile), times)
 
     def from_zero(self) -> Trajectory:
         """Return the trajectory with time zero at its first sample, where times are rounded least."""
-        same = copy(self)
-        same.times = self.times.from_zero()
-        return same
+        return self._derived(lambda _, profile: profile, self.times.from_zero())
+
+    def _derived(self, change: Callable[[Signal, Profile], Profile], times: Times) -> Trajectory:
+        derived, wrench = copy(self), self.wrench
+        derived.times, derived.position = times, change(POSITION, self.position)
+        derived.commanded = {key: change(COMMANDED[key], each) for key, each in self.commanded.items()}
+        derived.wrench = wrench and replace(wrench, profile=change(WRENCH, wrench.profile))
+        return derived
 
     @property
     def known_between(self) -> bool:

@@ -81,13 +81,9 @@ def _at_steps(
 
 
 def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajectory:
-    return Trajectory(
-        times,
-        trajectory.position,
-        {**trajectory.commanded, STIFFNESS.key: stiffness},
-        wrench=trajectory.wrench,
-        name=as_name(f"{trajectory.name}-fixed"),
-    )
+    fixed = trajectory.changed(lambda signal, profile: stiffness if signal is STIFFNESS else profile, times)
+    fixed.name, fixed.sources = as_name(f"{trajectory.name}-fixed"), ()
+    return fixed
 
 
 def rate_of(trajectory: Trajectory) -> float | None:
