@@ -247,7 +247,7 @@ def draw(seed: int) -> Recording:
     motion = str(rng.choice(list(SHAPES), p=[share for share, _ in SHAPES.values()]))
     noise = Noise(str(rng.choice(NOISES)), _logarithmic(rng, *LEVELS), float(rng.uniform(0.5, 0.98)))
     decimals = int(rng.choice([6, 7, 16]))
-    exact = _series(rng, motion, period, rate, highest)
+    exact = fourier_series(rng, motion, period, rate, highest)
     size = rng.uniform(0.2, 1.5) / np.ptp(np.fft.irfft(exact, period))
     exact *= min(size, PEAK_SPEED / np.abs(np.diff(np.fft.irfft(exact, period))).max() / rate)
     position = _signal(rng, exact, gain, noise, rate, decimals)
@@ -262,7 +262,9 @@ def _logarithmic(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _series(rng: np.random.Generator, motion: str, period: int, rate: int, highest: float) -> np.ndarray:
+def fourier_series(
+    rng: np.random.Generator, motion: str, period: int, rate: int, highest: float
+) -> np.ndarray:
     """Return the Fourier coefficients of a motion, sampled finely enough that none is aliased."""
     finer = max(1, round(1000 / rate))
     time = np.arange(finer * period) / (finer * rate)
@@ -306,7 +308,7 @@ def _stiffness(
     period, depth = len(position.values), rng.uniform(0.1, 0.4) * recorded
     lowest = needed * rng.uniform(1.1, 1.6)
     motion = str(rng.choice(["slow sines", "rest to rest, pauses", "random"]))
-    exact = _series(rng, motion, period, rate, min(2.0, highest))
+    exact = fourier_series(rng, motion, period, rate, min(2.0, highest))
     shape = np.fft.irfft(exact, period)
     mean = lowest / (1 - depth)
     exact *= depth * mean / np.abs(shape).max()

@@ -10,6 +10,7 @@ from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.trajectory import Trajectory
 
 TIME = np.arange(4001) / 1000
 RATES = np.array([3.0, 5.0])
@@ -114,14 +115,40 @@ def test_a_stiffness_and_a_component_without_one():
     )
 
 
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_single_samples_that_are_off_are_named(order):
-    given = [columns(k) for k in range(1, 5)]
-    given[order - 1][[1500, 2200], 1] += 2 * RATES[1] ** order
-    (found,) = complaints(*given)
-    name = ("dq", "ddq", "d3q", "d4q")[order - 1]
-    start = (
-        f"{name} of elbow is off 2 times, first at t = 1.500 s, amid samples that follow from q: it differs"
+@pytest.mark.parametrize("order", [1, slow(2), 4])
+def test_single_false_derivatives_are_left_out_and_said(order):
+    true = [columns(k) for k in range(5)]
+    given = [rows.copy() for rows in true]
+    given[order][[1500, 2200], 1] += 2 * RATES[1] ** order
+    trajectory = Trajectory.from_samples(
+        TIME, given[0], **dict(zip(POSITION.names[1:], given[1:], strict=True))
     )
-    assert found.startswith(start)
-    assert found.endswith("delete such rows")
+    (warning,) = trajectory.warnings
+    assert re.search(
+        rf"^{POSITION.names[order]}\[1500, 1\] is off 2 times, first at t = 1.500 s, by up to .* left out",
+        warning,
+    )
+    used = getattr(trajectory.block(0, len(TIME)), POSITION.names[order])
+    # a polynomial of degree 4 through six samples on either side, 6 ms of a sine of 5 rad/s
+    np.testing.assert_allclose(used, true[order], atol=1e-6 * RATES[1] ** order)
+
+
+def test_false_velocities_near_the_ends_and_false_positions_are_left_out():
+    q, dq = columns(0), columns(1)
+    dq[3, 0] = dq[-1, 1] = dq[2000, 0] = 0
+    q[1000, 0] += 0.01
+    trajectory = Trajectory.from_samples(TIME, q, dq=dq)
+    assert sum("left out" in warning for warning in trajectory.warnings) == 3
+    motion = trajectory.block(0, len(TIME))
+    np.testing.assert_allclose(motion.dq, columns(1), atol=1e-4)  # extrapolated by a cubic at the end
+    np.testing.assert_allclose(motion.q, columns(0), atol=1e-8)
+
+
+@pytest.mark.parametrize("difference", [np.gradient, lambda q, t: np.append(np.diff(q) / np.diff(t), 0.0)])
+def test_velocities_from_the_steps_of_an_encoder_stay(difference):
+    time = np.arange(8001) / 4000
+    q = np.round(0.3 * np.sin(2 * time) / 1.5e-3) * 1.5e-3
+    dq = difference(q, time)
+    dq[-1] = dq[-2]
+    trajectory = Trajectory.from_samples(time, q[:, None], dq=dq[:, None])
+    np.testing.assert_array_equal(trajectory.block(0, len(time)).dq[:, 0], dq)

@@ -12,7 +12,7 @@ from samples.clean_records import MOTIONS, SENSORS, clean_records
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate, resolution, rounding_notes
-from vsacli.trajectory.recorded.health import health, unit_doubts
+from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.samples import Samples
 
@@ -27,7 +27,7 @@ def record(time: FloatArray, *rows: FloatArray, signal=POSITION) -> Samples:
 
 
 def found(time: FloatArray, *rows: FloatArray, signal=POSITION) -> list[SampleProblem]:
-    return list(health(time, [record(time, *rows, signal=signal)]))
+    return check_health(time, [record(time, *rows, signal=signal)]).problems
 
 
 def messages(time: FloatArray, *rows: FloatArray, signal=POSITION) -> list[str]:

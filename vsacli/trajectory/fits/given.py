@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import time_text
 from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.selection import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, SMALLEST_SHARE
@@ -17,15 +17,6 @@ SHARE = 0.05
 
 DEVIATIONS = 10.0
 """Number of standard deviations by which the derivative of the fit itself may be wrong."""
-
-OUTLYING = 0.5
-"""Share of the fit's largest derivative, inside, by which an outlier of the given samples is off.
-
-Its neighbors are off by less than an eighth of it; the response of a spline to a jump is off on both sides.
-"""
-
-MOST_OUTLIERS = 10
-"""Most outliers; more are none, since differences of an encoder's steps look like outliers all the time."""
 
 FACTORS = {
     180 / math.pi: "degrees instead of radians?",
@@ -70,16 +61,9 @@ def mismatches(
             found = given[:, inside]
             differ, stamps = _differ(found, rows, order, fit), start + time[inside]
             for component, label in enumerate(labels):
-                columns = found[component], rows[order, component]
-                off = _outliers(*columns)
-                if off.size:
-                    times = f"at t = {time_text(stamps[off[0]])}"
-                    times = times if len(off) == 1 else f"{len(off)} times, first {times}"
-                    what = f"is off {times}, amid samples that follow from {names[0]}"
-                    yield f"{names[order]} of {label} {what}: {_amounts(stamps, *columns)}; delete such rows"
-                elif differ[component]:
-                    what = f"{names[order]} of {label} does not follow from {names[0]}"
-                    yield f"{what}: {_extent(stamps, *columns)}"
+                if differ[component]:
+                    amounts = _extent(stamps, found[component], rows[order, component])
+                    yield f"{names[order]} of {label} does not follow from {names[0]}: {amounts}"
 
 
 def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolArray:
@@ -121,17 +105,6 @@ def _amounts(time: FloatArray, given: FloatArray, expected: FloatArray) -> str:
     worst = int(difference.argmax())
     amounts = f"{given[worst]:.4g} instead of {expected[worst]:.4g}"
     return f"it differs by up to {difference[worst]:.3g} ({amounts} at t = {time_text(time[worst])})"
-
-
-def _outliers(given: FloatArray, expected: FloatArray) -> IndexArray:
-    """Return the indices of samples that are far off while their neighbors are not, if there are few."""
-    error = np.abs(given - expected)
-    far = np.flatnonzero(error > OUTLYING * np.abs(expected).max())
-    if not 0 < len(far) <= MOST_OUTLIERS:
-        return far[:0]
-    beside = np.pad(error, 1)
-    alone: IndexArray = far[np.maximum(beside[far], beside[far + 2]) < error[far] / 8]
-    return alone
 
 
 def _factor(given: FloatArray, expected: FloatArray) -> float | None:

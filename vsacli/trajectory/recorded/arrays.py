@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import METHODS, FitChoice
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
-from vsacli.trajectory.recorded.health import health
+from vsacli.trajectory.recorded.health import check_health
 from vsacli.trajectory.recorded.problems import sample_problems, time_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
@@ -38,7 +38,8 @@ def profiles_of_arrays(
     problems = [*time_problems(times), *sample_problems(records)]
     if problems:
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
-    warnings = tuple(map(str, health(times, records)))
+    records, faults = check_health(times, records)
+    warnings = tuple(map(str, faults))
     profiles = {record.signal.key: SampledProfile.of(record, FitChoice(fit)) for record in records}
     return RecordedTimes(times, rounding_notes(times)), profiles, warnings
 

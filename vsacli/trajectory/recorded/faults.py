@@ -17,6 +17,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.recorded.quantization import ORDER, Quantization
 from vsacli.trajectory.recorded.thresholds import (
     ABRUPT_SHARE,
+    DIFFERENCED,
     END_SAMPLES,
     END_SHARE,
     FIT_DEVIATIONS,
@@ -72,7 +73,31 @@ class Faults:
         return int(np.argmax(self.sizes))
 
 
-def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
+@dataclass(frozen=True, eq=False)
+class Outliers(Faults):
+    """Samples that are far off a smooth curve through their neighbors.
+
+    Attributes:
+        curve: values of that curve, (outliers,).
+    """
+
+    curve: FloatArray
+
+    def without(self, excepted: BoolArray) -> Outliers | None:
+        """Return the outliers except some, by a mask, (outliers,); None if none are left."""
+        kept = ~excepted
+        if not kept.any():
+            return None
+        return Outliers(self.first[kept], self.last[kept], self.sizes[kept], self.curve[kept])
+
+    def replaced(self, values: FloatArray) -> FloatArray:
+        """Return a copy of the column, (samples,), with the curve instead of the outliers."""
+        smooth = values.copy()
+        smooth[self.first] = self.curve
+        return smooth
+
+
+def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Outliers | None:
     """Return samples, up to three together, that are far off a smooth curve through their neighbors."""
     size = np.abs(quantization.differences)
     centers = np.arange(len(size)) + ORDER // 2
@@ -87,7 +112,32 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
     if not found:
         return None
     where = np.array(sorted(found))
-    return Faults(where, where, np.array([found[sample] for sample in where.tolist()]))
+    errors = np.array([found[sample] for sample in where.tolist()])
+    return Outliers(where, where, np.abs(errors), values[where] - errors)
+
+
+def derivative_outliers(
+    time: FloatArray, lower: FloatArray | None, values: FloatArray, quantization: Quantization
+) -> Outliers | None:
+    """Return the outliers of a given derivative.
+
+    The derivative of an encoder's steps has peaks that are outliers of a smooth curve, and yet as recorded.
+    They are equal to a difference of neighboring samples of what was differentiated.
+
+    Args:
+        time: times, (samples,), s.
+        lower: derivative of the next lower order, (samples,); None if it is not given.
+        values: derivative, (samples,).
+        quantization: its resolution.
+    """
+    off = outliers(time, values, quantization)
+    if off is None or lower is None:
+        return off
+    at = np.clip(off.first, 1, len(time) - 2)
+    spans = [(at - 1, at), (at, at + 1), (at - 1, at + 1)]
+    slopes = [_speed(time, lower, *span) for span in spans]
+    distance = np.min([np.abs(values[off.first] - slope) for slope in slopes], axis=0)
+    return off.without(distance < DIFFERENCED * off.sizes)
 
 
 class _Event(NamedTuple):
@@ -111,14 +161,14 @@ def _events(centers: IndexArray, size: FloatArray) -> list[_Event]:
 
 
 def _at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
-    """Yield the first or last sample if the next ones predict it far worse than they do each other."""
+    """Yield the first or last sample, and its error, if the next ones predict it worse than each other."""
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
         near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
-        error, *others = np.abs(near @ END_WEIGHTS)
+        error, *others = near @ END_WEIGHTS
         least = float(_noticeable(quantization, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
-        if error > max(END_SHARE * max(others), least):
+        if abs(error) > max(END_SHARE * np.abs(others).max(), least):
             yield end, float(error)
 
 
@@ -143,7 +193,7 @@ def _isolated(
         sure = max(FIT_DEVIATIONS * rest, least) * np.sqrt(1 + leverage)
         if np.all(np.abs(residual) >= sure, where=~kept):
             samples = first + np.flatnonzero(~kept)
-            found = list(zip(samples.tolist(), np.abs(residual[~kept]).tolist(), strict=True))
+            found = list(zip(samples.tolist(), residual[~kept].tolist(), strict=True))
     unconfirmed = {0, len(values) - 1}  # the ends have neighbors on one side only
     return [] if unconfirmed & dict(found).keys() else found
 

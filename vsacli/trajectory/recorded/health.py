@@ -1,18 +1,29 @@
 """The health of a recording, checked before it is fitted: faults of sensors and log files.
 
-A warning summarizes a kind of fault in a column: number, first time, largest size, and advice.
+A warning summarizes a kind of fault in a column: number, first time, largest size, and advice. Outliers are
+left out: a smooth curve through their neighbors replaces them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity, WrenchQuantity, time_text
-from vsacli.trajectory.recorded.faults import Faults, frozen, held, outliers, saturated, wraps
+from vsacli.trajectory.recorded.faults import (
+    Faults,
+    Outliers,
+    derivative_outliers,
+    frozen,
+    held,
+    outliers,
+    saturated,
+    wraps,
+)
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.quantization import ORDER, Quantization
 from vsacli.trajectory.recorded.samples import Samples
@@ -20,10 +31,20 @@ from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import GAP_STEPS, LARGEST_ANGLE, LARGEST_TRAVEL
 
 
-def health(
-    stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()
-) -> Iterator[SampleProblem]:
-    """Yield probable faults of a usable recording.
+class CheckedSignals(NamedTuple):
+    """Recorded signals without outliers.
+
+    Attributes:
+        records: signals with a smooth curve through the neighbors of outliers in their place.
+        problems: probable faults of the recording.
+    """
+
+    records: list[Samples]
+    problems: list[SampleProblem]
+
+
+def check_health(stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()) -> CheckedSignals:
+    """Find probable faults of a usable recording, and leave outliers out.
 
     Args:
         stamps: recorded stamps, (samples,), s.
@@ -31,14 +52,28 @@ def health(
         types: joint types, "revolute" or "prismatic", for units; empty if unknown.
     """
     if len(stamps) <= ORDER:
-        return
-    yield from stamp_faults(stamps)
+        return CheckedSignals(list(records), [])
+    checked = CheckedSignals([], list(stamp_faults(stamps)))
     for record in records:
-        for component in np.flatnonzero(record.given).tolist():
-            unit = _unit(record.signal.quantities[0], component, types)
-            values, angle = record.values[component], record.signal is POSITION
-            for first, sentence in column_faults(stamps, record.time, values, unit, angle=angle):
-                yield SampleProblem(record.signal.names[0], sentence, component, first)
+        columns = {name: rows.copy() for name, rows in record.columns.items()}
+        names = record.signal.names
+        for quantity, name, lower in zip(record.signal.quantities, names, (None, *names), strict=False):
+            for component in np.flatnonzero(record.given).tolist() if name in columns else ():
+                row, unit = columns[name][component], _unit(quantity, component, types)
+                if lower is None:
+                    angle = record.signal is POSITION
+                    off, sentences = _check_values(stamps, record.time, row, unit, LEFT_OUT, angle=angle)
+                else:
+                    below = columns.get(lower)
+                    below = None if below is None else below[component]
+                    off, sentences = _check_derivative(stamps, record.time, below, row, unit)
+                if off is not None:
+                    row[:] = off.replaced(row)
+                checked.problems.extend(
+                    SampleProblem(name, sentence, component, first) for first, sentence in sentences
+                )
+        checked.records.append(record.with_columns(columns))
+    return checked
 
 
 def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
@@ -58,6 +93,14 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
                 yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
 
 
+LEFT_OUT = "left out, with the curve in its place", "left out, with the curve in their place"
+USED = (
+    "derivatives follow such outliers; delete the row",
+    "derivatives follow such outliers; delete these rows",
+)
+"""Ends of sentences on one outlier or several, by whether the reader leaves them out."""
+
+
 def column_faults(
     stamps: FloatArray, time: FloatArray, values: FloatArray, unit: str = "", *, angle: bool = False
 ) -> Iterator[tuple[int, str]]:
@@ -70,22 +113,68 @@ def column_faults(
         unit: unit of its values, after a space.
         angle: whether the values may be wrapped angles.
     """
+    yield from _check_values(stamps, time, values, unit, USED, angle=angle)[1]
+
+
+_ColumnCheck = tuple[Outliers | None, list[tuple[int, str]]]
+"""Outliers of a column, and the first sample of each kind of fault with a sentence."""
+
+
+def _check_values(
+    stamps: FloatArray,
+    time: FloatArray,
+    values: FloatArray,
+    unit: str,
+    ends: tuple[str, str],
+    *,
+    angle: bool,
+) -> _ColumnCheck:
+    """Check a column of values, see `column_faults`; `ends` are the ends of sentences on outliers."""
     if np.ptp(values) == 0:
-        return
+        return None, []
     quantization = Quantization.of(time, values)
     if (rows := held(values, quantization)) > 1:
-        yield (
-            0,
-            f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}",
-        )
-        return
-    if off := outliers(time, values, quantization):
+        slow = f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}"
+        return None, [(0, slow)]
+    off = outliers(time, values, quantization)
+    smooth = values if off is None else off.replaced(values)
+    return off, [
+        *_outlier_sentences(off, stamps, unit, ends),
+        *_stretch_faults(stamps, time, smooth, quantization, unit, angle=angle),
+    ]
+
+
+def _check_derivative(
+    stamps: FloatArray, time: FloatArray, lower: FloatArray | None, values: FloatArray, unit: str
+) -> _ColumnCheck:
+    """Check a column of a given derivative, which may rest, saturate or be held while the values move."""
+    if np.ptp(values) == 0:
+        return None, []
+    off = derivative_outliers(time, lower, values, Quantization.of(time, values))
+    return off, list(_outlier_sentences(off, stamps, unit, LEFT_OUT))
+
+
+def _outlier_sentences(
+    off: Outliers | None, stamps: FloatArray, unit: str, ends: tuple[str, str]
+) -> Iterator[tuple[int, str]]:
+    if off is not None:
         extent = _extent(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
         yield (
             off.at,
             f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
-            f" derivatives follow such outliers; delete {'the row' if off.count == 1 else 'these rows'}",
+            f" {ends[off.count > 1]}",
         )
+
+
+def _stretch_faults(
+    stamps: FloatArray,
+    time: FloatArray,
+    values: FloatArray,
+    quantization: Quantization,
+    unit: str,
+    *,
+    angle: bool,
+) -> Iterator[tuple[int, str]]:
     if stuck := frozen(time, values, quantization):
         yield (
             stuck.at,

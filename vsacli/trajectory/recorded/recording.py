@@ -28,7 +28,7 @@ from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
 from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
-from vsacli.trajectory.recorded.health import health, unit_doubts
+from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
@@ -132,11 +132,9 @@ def read_recording(
     file, signals = table.source.path, [record.signal for record in records]
     wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR) if wanted is None else wanted
     turns = list(_unwrapped(records, joints)) if unwrap else []
-    found = [
-        *health(time, records, list(joints.types.values())),
-        *unit_doubts(records, _without_unit(table, layout, joints)),
-    ]
-    warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
+    records, faults = check_health(time, records, list(joints.types.values()))
+    faults += unit_doubts(records, _without_unit(table, layout, joints))
+    warnings = tuple(str(_located(fault, table, layout)) for fault in faults)
     clauses = (*turns, *_understood(table, replaced), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
     source, lines, first_stamp = table.source, table.lines, table.first_stamp

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -87,6 +87,11 @@ class Samples:
         """Values and given derivatives by name, (components, samples)."""
         pairs = zip(self.signal.names, (self.values, *self.derivatives), strict=True)
         return {name: rows for name, rows in pairs if rows is not None}
+
+    def with_columns(self, columns: Mapping[str, FloatArray]) -> Samples:
+        """Return the samples with other numbers in the same columns, see `columns`."""
+        value, *names = self.signal.names
+        return replace(self, values=columns[value], derivatives=tuple(map(columns.get, names)))
 
     def warnings(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
         """Yield sentences on estimated values at the samples, and on given derivatives that disagree."""

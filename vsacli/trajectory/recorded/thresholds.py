@@ -59,6 +59,10 @@ END_SAMPLES = 32
 END_SHARE = 5.0
 """Smallest prediction error of the first sample, over the largest of those, that makes it an outlier."""
 
+DIFFERENCED = 0.02
+"""Largest distance of an outlier of a derivative from a difference of samples, over its error, if it is one.
+Printed digits change it by less; that of a false value is 1."""
+
 FROZEN_STEPS = 3
 """Fewest intervals without change of a frozen sensor, if it then jumps to the present position."""
 
