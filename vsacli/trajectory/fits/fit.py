@@ -16,6 +16,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import Posterior
 from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives, of_least_squares
+from vsacli.trajectory.fits.left_over import LeftOutMotion
 from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.fits.spectrum import FollowedNoise
 from vsacli.trajectory.times import stretch
@@ -43,6 +44,8 @@ class Part:
         smooth: whether it is a smoothing spline.
         noise: filtered, and so smooth, noise that the spline follows; the deviation in `smoothing` includes
             it.
+        ringing: times after the start and before the end in which a filter rings, s.
+        left_out: motion that a fit chosen by the user leaves out; None if its residual looks like noise.
     """
 
     members: IndexArray
@@ -51,6 +54,8 @@ class Part:
     smoothing: Smoothing | None = None
     smooth: bool = False
     noise: FollowedNoise | None = None
+    ringing: tuple[float, float] = (0.0, 0.0)
+    left_out: LeftOutMotion | None = None
 
     @property
     def knots(self) -> FloatArray:
@@ -61,11 +66,13 @@ class Part:
     def unreliable(self) -> tuple[float, float]:
         """Times after the start and before the end with unreliable derivatives, s.
 
-        They are (degree + 1)/2 knot spans. Beyond, noise in the highest derivative that is needed is less
-        than 1.4 times that anywhere inside; at the ends it is up to 850 times that.
+        They are (degree + 1)/2 knot spans, or longer where a filter rings. Beyond, noise in the highest
+        derivative that is needed is less than 1.4 times that anywhere inside; at the ends it is up to 850
+        times that.
         """
-        spans = (self.spline.k + 1) // 2
-        return float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
+        spans, (start, end) = (self.spline.k + 1) // 2, self.ringing
+        first, last = float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
+        return max(first, start), max(last, end)
 
     @property
     def inside(self) -> tuple[float, float]:
@@ -100,16 +107,25 @@ class Part:
                 row += taylor[order + power - 1]
         return rows
 
+    def power(self, order: int) -> FloatArray:
+        """Return the mean square of a derivative away from the ends, (members,)."""
+        return np.asarray(np.mean(self.spline(np.linspace(*self.inside, PROBES), nu=order) ** 2, axis=0))
+
+    def further_errors(self, orders: int) -> FloatArray:
+        """Return covariances of noise that is followed and of motion left out, (members, orders, orders)."""
+        found = np.zeros((len(self.members), orders, orders))
+        if self.noise is not None and self.noise.share:
+            found += self.power(orders - 1)[:, None, None] * self.noise.covariance(orders)
+        if self.left_out is not None:
+            found += self.left_out.covariance(orders)
+        return found
+
     def posterior(self, time: FloatArray) -> Posterior | None:
-        """Return the posterior of the coefficients; None if it is unknown.
+        """Return the posterior of the coefficients for white noise of deviation 1; None if it is unknown.
 
         Args:
             time: times of the recording, (samples,), s.
         """
-        if self.smoothing is not None and not self.smoothing.resolved:
-            return None
-        if self.smooth and self.smoothing is not None:
-            return self.smoothing.posterior
         try:
             return of_least_squares(time, self.spline.t, self.spline.k)
         except np.linalg.LinAlgError:  # very uneven times
@@ -122,8 +138,13 @@ class Part:
         knots = stretch(self.spline.t, self.knots[0], factor)
         known = None if self.smoothing is None else self.smoothing.stretched(factor)
         noise = None if self.noise is None else self.noise.stretched(factor)
+        spline, ringing = (
+            BSpline(knots, self.spline.c, self.spline.k),
+            (factor * each for each in self.ringing),
+        )
+        left_out = None if self.left_out is None else self.left_out.stretched(factor)
         return replace(
-            self, spline=BSpline(knots, self.spline.c, self.spline.k), smoothing=known, noise=noise
+            self, spline=spline, smoothing=known, noise=noise, ringing=tuple(ringing), left_out=left_out
         )
 
 
@@ -202,35 +223,35 @@ class Fit:
         """
         orders = ORDERS[self.degree]
         found = np.full((self.components, orders, orders, len(time)), np.nan)
-        for part, posterior in zip(self.parts, self._posteriors, strict=True):
-            if posterior is not None:
-                basis = local_basis(part.spline.t, self.degree, time, orders)
-                units = self._units(part, posterior, time)
-                found[part.members] = units[:, :, None] * units[:, None] * of_derivatives(posterior, basis)
+        for part in self.parts:
+            known = part.smoothing
+            if known is None:
+                found[part.members] = self._of_white_noise(part, time)
+            elif known.resolved:
+                found[part.members] = known.covariance(time)
+                if not part.smooth:
+                    found[part.members] += known.disagreement[..., None]
+            found[part.members] += part.further_errors(orders)[..., None]
         return found
 
-    @cached_property
-    def _posteriors(self) -> list[Posterior | None]:
-        """Posteriors of the coefficients of each part; None if unknown."""
-        return [part.posterior(self.time) for part in self.parts]
+    def _of_white_noise(self, part: Part, time: FloatArray) -> FloatArray:
+        """Return the covariances of a part that no smoothing spline assesses; NaN if they are unknown."""
+        orders, posterior = ORDERS[self.degree], self._posterior_of(part)
+        if posterior is None:
+            return np.full((len(part.members), orders, orders, len(time)), np.nan)
+        covariance = of_derivatives(posterior, local_basis(part.spline.t, self.degree, time, orders))
+        found = self.noise[part.members, None, None, None] ** 2 * covariance
+        return np.asarray(found)
 
-    def _units(self, part: Part, posterior: Posterior, time: FloatArray) -> FloatArray:
-        """Return the factors of the posterior's deviations, (members, orders or 1, samples or 1)."""
-        known = part.smoothing
-        if part.smooth and known is not None:
-            start, end = part.knots[[0, -1]]
-            return known.units_at((time - start) / (end - start))[None]
-        units = self.noise[part.members]
-        # The derivative's size includes this error; relative is its ratio to the derivative without it.
-        share = 0.0 if known is None else known.relative / np.hypot(1.0, known.relative)
-        share = max(share, 0.0 if part.noise is None else part.noise.share)
-        if share > 0:
-            order, probes = ORDERS[self.degree] - 1, np.linspace(*part.inside, PROBES)
-            basis = local_basis(part.spline.t, self.degree, probes, order + 1)
-            found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
-            size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
-            units = units * np.maximum(1.0, share * size / found)
-        return np.asarray(units[:, None, None])
+    def _posterior_of(self, part: Part) -> Posterior | None:
+        if part not in self._posteriors:
+            self._posteriors[part] = part.posterior(self.time)
+        return self._posteriors[part]
+
+    @cached_property
+    def _posteriors(self) -> dict[Part, Posterior | None]:
+        """Posteriors of parts that were asked for."""
+        return {}
 
 
 def join(
@@ -284,58 +305,21 @@ spline spreads an impulse: if it is longer by a factor, its root mean square is 
 factor. In 110 motions of minimum jerk, d4q was off by 0.58 to 1.01 times that size."""
 
 
-class Unresolved:
-    """Uncertainty of the components of a part for which no two resolutions agree.
+def unresolved(fit: Fit, orders: int) -> Iterator[tuple[IndexArray, FloatArray]]:
+    """Yield the components for which no two resolutions agree, with a covariance that bounds their error.
 
-    Attributes:
-        members: indices of the components.
+    Yields:
+        Indices of the components, and covariances of value and derivatives, (members, orders, orders): that
+        of the difference between resolutions, and impulses of the highest derivative.
     """
-
-    def __init__(self, fit: Fit, part: Part, posterior: Posterior, known: Smoothing, orders: int) -> None:
-        """Scale a posterior.
-
-        Args:
-            fit: fit of the signal.
-            part: part of the fit.
-            posterior: posterior of the coefficients of the part's spline.
-            known: difference between resolutions, and duration over which impulses are spread.
-            orders: number of functions that are needed, value and derivatives.
-        """
-        self.members, self._orders = part.members, orders
-        self._knots, self._degree, self._posterior = part.spline.t, fit.degree, posterior
-        probes = np.linspace(*part.inside, PROBES)
-        found = np.sqrt(np.mean(self._of_posterior(probes)[-1, -1]))
-        size = np.sqrt(np.mean(part.spline(probes, nu=orders - 1) ** 2, axis=0))
-        caution = CAUTION if known.spread else SMOOTH_CAUTION
-        self._units: FloatArray = caution * known.relative * size / found
-        self._impulses: FloatArray = IMPULSES * np.sqrt(known.spread / SHORTEST_IMPULSE) * size
-
-    def covariance(self, time: FloatArray) -> FloatArray:
-        """Return covariances of value and derivatives at times, s, (members, orders, orders, samples)."""
-        found = self._units[:, None, None, None] ** 2 * self._of_posterior(time)
-        found[:, -1, -1] += self._impulses[:, None] ** 2
-        return np.asarray(found)
-
-    def _of_posterior(self, time: FloatArray) -> FloatArray:
-        basis = local_basis(self._knots, self._degree, time, self._orders)
-        return of_derivatives(self._posterior, basis)
-
-
-def unresolved(fit: Fit, orders: int) -> Iterator[Unresolved]:
-    """Yield the unresolved components of a fit."""
     for part in fit.parts:
         known = part.smoothing
         if known is not None and not known.resolved:
-            posterior = known.posterior if part.smooth else _of_least_squares(fit, part)
-            if posterior is not None:
-                yield Unresolved(fit, part, posterior, known, orders)
-
-
-def _of_least_squares(fit: Fit, part: Part) -> Posterior | None:
-    try:
-        return of_least_squares(fit.time, part.spline.t, fit.degree)
-    except np.linalg.LinAlgError:  # very uneven times
-        return None
+            caution = CAUTION if known.spread else SMOOTH_CAUTION
+            bound = caution**2 * known.disagreement + part.further_errors(orders)
+            shortest = max(SHORTEST_IMPULSE, fit.step)
+            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.power(orders - 1)
+            yield part.members, bound
 
 
 def vibrations(fit: Fit, orders: int) -> Iterator[tuple[int, FloatArray]]:

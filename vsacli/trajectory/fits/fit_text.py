@@ -16,7 +16,7 @@ from vsacli.trajectory.fits.selection import (
     LEAST_SQUARES,
     SMOOTH,
 )
-from vsacli.trajectory.fits.smoothing import Smoothing
+from vsacli.trajectory.fits.smoothing import DETERMINED, Smoothing
 from vsacli.trajectory.fits.spectrum import motion_band
 
 TOLD = 0.01
@@ -63,17 +63,21 @@ def fit_sentences(
 def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
     """Yield sentences on vibrations and undetermined derivatives, as assessed by smoothing splines."""
     for part in fit.parts:
-        known = part.smoothing
+        known, label = part.smoothing, _members([part], labels)
+        if part.left_out is not None and part.left_out.size > fit.noise[part.members].max() / 2:
+            yield (
+                f"{value} of {label} moves below {part.left_out.above:.2g} Hz beyond what the fit follows, by"
+                f" {part.left_out.size:.2g} rms, as its residual shows: leave out fit, noise and bandwidth,"
+                f" or set bandwidth: {part.left_out.above:.2g}"
+            )
         if known is None:
             continue
-        label = _members([part], labels)
         if known.lines.others:
             yield f"{value} of {label} has a vibration at {_vibration(known)}"
         if not known.resolved:
             yield (
                 f"{highest} of {label} is not determined by the record: no two resolutions of a smoothing"
-                " spline agree on it; record it with less noise, or say by bandwidth: (Hz) above which"
-                " frequency there is no motion"
+                f" spline agree on it; record it with less noise{_advised_bandwidth(part, fit)}"
             )
         elif not known.determined:
             yield (
@@ -89,7 +93,15 @@ def _advice(part: Part) -> str:
             f" filter, or set bandwidth: {part.noise.above:.2g}; if it is motion, set bandwidth:"
             f" {2 * part.noise.peak:.2g}"
         )
-    return "record it with less noise, or slower" if part.smooth else "try it with fit: smooth"
+    if part.smooth or part.smoothing is None or part.smoothing.own > DETERMINED:
+        return "record it with less noise, or slower"
+    return "try it with fit: smooth"
+
+
+def _advised_bandwidth(part: Part, fit: Fit) -> str:
+    """Return the advice to say that there is no motion beyond that of the spline; none at rest."""
+    band = _band(part, int(part.members[0]), fit)
+    return "" if band is None else f", or set bandwidth: {band:.2g} if there is no motion above that many Hz"
 
 
 def _vibration(known: Smoothing) -> str:

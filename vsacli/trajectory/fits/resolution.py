@@ -207,16 +207,26 @@ SPANS_PER_PERIOD = 4.0
 fourth derivative of a spline of degree 7 is off by less than 1 %."""
 
 
+LEFT_OVER = 2.0
+"""Largest residual over known white noise; a larger one is motion that was left out. Noise that varies along
+the recording has a median of up to 1.5 times less than its root mean square."""
+
+SETTLED = 1.15
+"""Largest residual over known white noise that is this noise alone; the noise is known to some 10 %."""
+
+
 class KnownNoise(NamedTuple):
-    """Noise and bandwidth of a component as given by the user.
+    """Noise and bandwidth of a component as given by the user, or noise as found in the samples.
 
     Attributes:
         deviation: standard deviation of a sample's noise; None to estimate it.
         bandwidth: frequency above which there is no motion, Hz; None to determine it from the recording.
+        white: whether the deviation is that of white noise found in the samples.
     """
 
     deviation: float | None = None
     bandwidth: float | None = None
+    white: bool = False
 
 
 class Resolution(NamedTuple):
@@ -224,19 +234,25 @@ class Resolution(NamedTuple):
 
     Attributes:
         model: model of the coarser one, or of the finer if noise does not explain a negligible change.
+        other: model of the other one.
         deviation: relative standard deviation of the highest derivative due to noise.
         change: relative change of this derivative from one to the other.
         unexplained: part of the change that noise does not explain, in units of the row per s^order.
         residual: root mean square residual of the model.
         given: whether it follows from a given bandwidth.
+        settled: whether the residual is known white noise alone.
+        refused: whether it leaves motion out, as its residual shows.
     """
 
     model: Model
+    other: Model
     deviation: float
     change: float
     unexplained: float
     residual: float
     given: bool = False
+    settled: bool = False
+    refused: bool = False
 
     @property
     def total(self) -> float:
@@ -246,8 +262,8 @@ class Resolution(NamedTuple):
     @property
     def accepted(self) -> bool:
         """Whether the change to the next resolution does not exceed that by noise, and both are small."""
-        confirmed = self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
-        return self.given or (confirmed and self.total < ACCEPTED)
+        confirmed = self.settled or self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
+        return self.given or (confirmed and self.total < ACCEPTED and not self.refused)
 
 
 def find_resolution(
@@ -262,7 +278,8 @@ def find_resolution(
 
     The search goes from coarse to fine, since the color of the noise does not matter above the frequency at
     which the motion falls below the noise; only a finer resolution would depend on it. It ends early where
-    all that a finer resolution could show is noise.
+    all that a finer resolution could show is noise. If white noise is known, a resolution must leave over
+    no more than this, and then needs no other to confirm it.
 
     Args:
         time: times, (samples,), s.
@@ -281,17 +298,22 @@ def find_resolution(
     tried = []
     finest: Model | None = None
     enough = np.inf
-    for coarse, finest in pairwise(_models(_moments(time, row, degree, below), known)):
-        tried.append(_compared(time, row, coarse, finest, order))
+    moments = _moments(time, row, degree, below, BINS_PER_SPAN if known.white else FEWEST_SAMPLES)
+    for coarse, finest in pairwise(_models(moments, known)):
+        tried.append(_judged(_compared(time, row, coarse, finest, order), known))
         if tried[-1].accepted:
             return tried[-1]
         if finest.bins.spans == ASKED_AT:
             enough = enough_spans(time, row)
         if finest.bins.spans >= enough:
             break
+    if finest is not None and known.white:
+        last = _judged(_compared(time, row, finest, finest, order), known)
+        if last.settled and last.accepted:
+            return last
     least = min((each.residual for each in tried), default=0.0)
     if finest is not None and least > MISSED:
-        return tried[-1]._replace(model=finest, residual=_residual(time, row, finest))
+        return tried[-1]._replace(model=finest, other=tried[-1].model, residual=_residual(time, row, finest))
     close = [each for each in tried if each.residual <= CLOSE * least]
     return min(close, key=lambda each: each.total, default=None)
 
@@ -310,11 +332,21 @@ def _given(
     return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
 
 
-def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> list[Moments]:
+def _judged(resolution: Resolution, known: KnownNoise) -> Resolution:
+    """Return the resolution judged by what it leaves over, if white noise is known."""
+    if not known.white or known.deviation is None:
+        return resolution
+    ratio = resolution.residual / known.deviation
+    return resolution._replace(settled=ratio <= SETTLED, refused=ratio > LEFT_OVER)
+
+
+def _moments(
+    time: FloatArray, row: FloatArray, degree: int, below: float, fewest_samples: int
+) -> list[Moments]:
     """Return the moments of all resolutions, from coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
-    most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
+    most = max(samples // fewest_samples, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
     slower = max(spans, 2 * below * float(time[-1] - time[0]))
     doublings = int(np.log2(min(most, MOST_SPANS, slower) // spans))
     found = [Moments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
@@ -345,7 +377,9 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
     # The finer of two splines near the same samples is the coarser plus an independent part.
     more, less = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
     unexplained = float(np.sqrt(max(0.0, change**2 - abs(more - less))))
-    return Resolution(model, deviation / size, change / size, unexplained, residual)
+    return Resolution(
+        model, coarse if model is fine else fine, deviation / size, change / size, unexplained, residual
+    )
 
 
 def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:

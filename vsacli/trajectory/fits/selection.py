@@ -16,9 +16,11 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.progress import Bar, Progress, unseen
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline
+from vsacli.trajectory.fits.left_over import LeftOutMotion, left_out_motion
 from vsacli.trajectory.fits.noise import estimated_noise, filtered_noise, typical_noise
 from vsacli.trajectory.fits.resolution import KnownNoise
-from vsacli.trajectory.fits.smoothing import smoothing_spline
+from vsacli.trajectory.fits.ringing import ringing_ends
+from vsacli.trajectory.fits.smoothing import disagreement, smoothing_spline
 from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise
 
 if TYPE_CHECKING:
@@ -72,7 +74,7 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
     if found is None:
         return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
     spline, smoothing = found
-    part = Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
+    part = _without_ringing(Part(members, spline, exact=False, smoothing=smoothing, smooth=True), record)
     return _following(part, _noise_of(record, part), record)
 
 
@@ -100,23 +102,36 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     """Return the replacement of a component of a part; None if it needs no assessment, or has none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
-    single = part.of_columns(np.array([column]))
+    single = _without_ringing(part.of_columns(np.array([column])), record)
+    unjudged = single if any(single.ringing) else None
     noise = _noise_of(record, single)
     filtered = bool(record.filtered[member]) or noise.share > SUSPECT
     if part.exact and record.spoilt[member] <= SUSPECT and not filtered and not wanted:
-        return replace(single, noise=noise) if noise.share > record.spoilt[member] else None
+        return replace(single, noise=noise) if noise.share > record.spoilt[member] else unjudged
     judge = _judge(record, member, degree)
     if judge.smoothing is None:
-        return None
-    difference = _difference(part, column, judge, record)
+        return unjudged
+    inside = _inside(judge, record)
+    differ = disagreement(single.spline, judge.spline, inside, record.order + 1)
+    size = float(np.sqrt(np.mean(judge.spline(inside, nu=record.order) ** 2)))
+    difference = float(np.sqrt(differ[-1, -1])) / size if size else 0.0
     if wanted or (not chosen and _better(judge, difference, record, filtered)):
         return judge
     # Only noise is a reason to doubt a spline through the samples.
     if judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or filtered or not part.exact:
-        relative = float(np.hypot(judge.smoothing.relative, difference))
-        known = replace(judge.smoothing, relative=relative, follows_lines=True)
+        known = replace(
+            judge.smoothing,
+            relative=float(np.hypot(judge.smoothing.relative, difference)),
+            disagreement=judge.smoothing.disagreement + differ,
+            follows_lines=True,
+        )
         return _following(replace(single, smoothing=known), noise, record)
-    return None
+    return unjudged
+
+
+def _without_ringing(part: Part, record: Record) -> Part:
+    """Return a part of one component whose unreliable ends include those at which a filter rings."""
+    return replace(part, ringing=ringing_ends(part.spline, part.inside, record.order))
 
 
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
@@ -132,7 +147,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     """Return a part of one component whose assessment includes the noise that it follows."""
     known = part.smoothing
-    if known is None or noise.relative <= known.relative:
+    if known is None or not noise.share:
         return part
     return replace(part, smoothing=known.following(noise, _size(part, record.order)), noise=noise)
 
@@ -168,16 +183,11 @@ def _better(judge: Part, difference: float, record: Record, filtered: bool) -> b
     return filtered and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
 
 
-def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
-    """Return the relative difference of the highest derivatives of a fit and a smoothing spline, inside."""
-    time, order = record.time, record.order
-    start, end = smooth.unreliable
-    inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
-    probes = inside[:: 1 + len(inside) // PROBES]
-    expected = smooth.spline(probes, nu=order)[:, 0]
-    error = part.spline(probes, nu=order)[:, column] - expected
-    power = float(np.sum(expected**2))
-    return float(np.sqrt(np.sum(error**2) / power)) if power > 0 else 0.0
+def _inside(part: Part, record: Record) -> FloatArray:
+    """Return some sample times away from the ends, s."""
+    time, (start, end) = record.time, part.inside
+    inside = time[(time >= start) & (time <= end)]
+    return inside[:: 1 + len(inside) // PROBES]
 
 
 def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
@@ -242,6 +252,20 @@ SMALLEST_SHARE = 1e-3
 be only rounding of a component at rest."""
 
 
+def _with_left_out_motion(parts: Sequence[Part], record: Record) -> list[Part]:
+    """Return parts of one component each, with the motion that those near the samples leave out."""
+    single = [part.of_columns(np.array([column])) for part in parts for column in range(len(part.members))]
+    return [part if part.exact else replace(part, left_out=_left_out(part, record)) for part in single]
+
+
+def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
+    """Return the motion that a part of one component leaves out; lines count as vibrations instead."""
+    lines = None if part.smoothing is None else part.smoothing.lines
+    if lines and (lines.hum or lines.others):
+        return None
+    return left_out_motion(record.time, record.values[part.members[0]] - part.spline(record.time)[:, 0])
+
+
 def fit_samples(
     time: FloatArray,
     values: FloatArray,
@@ -286,7 +310,7 @@ def fit_samples(
             for member in present.tolist():
                 parts.append(smooth_part(record, member, degree))
                 bar.update(len(time))
-        return join(degree, parts, time, values, estimate, given)
+        return join(degree, _with_left_out_motion(parts, record), time, values, estimate, given)
     if present.size and method == LEAST_SQUARES:
         parts += _least_squares(time, values, present, degree)
     elif present.size:
@@ -300,7 +324,10 @@ def fit_samples(
     fit = join(degree, parts, time, values, estimate, given)
     with progress(len(time) * len(present)) as bar:
         instead = list(judged(record, fit, bar, chosen=method is not None))
-    return join(degree, replaced(parts, instead), time, values, estimate, given) if instead else fit
+    parts = replaced(parts, instead) if instead else parts
+    if method is not None or bandwidth is not None or noise is not None:
+        parts = _with_left_out_motion(parts, record)
+    return join(degree, parts, time, values, estimate, given)
 
 
 def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Part:

@@ -9,10 +9,12 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.banded_qr import Posterior
-from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines
+from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives
+from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines, white_noise
 from vsacli.trajectory.fits.penalized import Model, falls, motion_power
-from vsacli.trajectory.fits.resolution import KnownNoise, Resolution, find_resolution
+from vsacli.trajectory.fits.resolution import LEFT_OVER, KnownNoise, Resolution, find_resolution
 from vsacli.trajectory.fits.spectrum import FollowedNoise
+from vsacli.trajectory.times import stretch
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -109,9 +111,14 @@ class Smoothing:
         spread: duration over which the spline spreads possible impulses of it, s; zero if it is resolved, or
             if its spectrum falls.
         lines: frequencies that stand out of the residual.
-        posterior: posterior of the coefficients.
+        knots: knots of the smoothing spline, s.
+        posterior: posterior of its coefficients.
         units: factors of the posterior's deviations of the value and each derivative, at equal steps of the
             spline's span, (orders, steps).
+        disagreement: covariance over time of value and derivatives of the difference between two resolutions,
+            or between this spline and another fit compared with it, (orders, orders).
+        own: expected error of the smoothing spline itself, like `relative`, which may be that of another fit
+            compared with it.
         follows_lines: whether the spline follows lines other than mains hum.
     """
 
@@ -120,8 +127,11 @@ class Smoothing:
     resolved: bool
     spread: float
     lines: Lines
+    knots: FloatArray
     posterior: Posterior
     units: FloatArray
+    disagreement: FloatArray
+    own: float
     follows_lines: bool = False
 
     @property
@@ -138,13 +148,8 @@ class Smoothing:
         """
         # If unresolved, the error is relative to the spline's derivative including the noise.
         relative = float(np.hypot(self.relative, noise.relative if self.resolved else noise.share))
-        factor = max(1.0, noise.share * size / max(self.deviations[-1], np.finfo(float).tiny))
-        return replace(
-            self,
-            deviations=factor * self.deviations,
-            units=factor * self.units,
-            relative=relative,
-        )
+        of_noise = size**2 * np.diag(noise.covariance(len(self.deviations)))
+        return replace(self, deviations=np.sqrt(self.deviations**2 + of_noise), relative=relative)
 
     def units_at(self, place: FloatArray) -> FloatArray:
         """Return the factors of the posterior's deviations, (orders, places).
@@ -155,6 +160,14 @@ class Smoothing:
         steps = self.units.shape[1]
         return np.array([np.interp(place * steps - 0.5, np.arange(steps), row) for row in self.units])
 
+    def covariance(self, time: FloatArray) -> FloatArray:
+        """Return the covariance of value and derivatives, (orders, orders, samples), at times, s."""
+        orders, degree = len(self.units), 2 * len(self.units) - 3
+        start, end = self.knots[[degree, -degree - 1]]
+        units = self.units_at((time - start) / (end - start))
+        basis = local_basis(self.knots, degree, time, orders)
+        return np.asarray(units[:, None] * units * of_derivatives(self.posterior, basis))
+
     def stretched(self, factor: float) -> Smoothing:
         """Return the assessment for the motion slowed down by a factor."""
         return replace(
@@ -162,6 +175,8 @@ class Smoothing:
             deviations=self.deviations / factor ** np.arange(len(self.deviations)),
             spread=factor * self.spread,
             lines=self.lines.stretched(factor),
+            knots=stretch(self.knots, self.knots[len(self.units) * 2 - 3], factor),
+            disagreement=self.disagreement / factor ** np.add.outer(*2 * [np.arange(len(self.units))]),
         )
 
 
@@ -207,18 +222,56 @@ def smoothing_spline(
     )
     units = scale * known_errors.units
     spread = 0.0 if found.accepted or falls(model, order) else model.piece
-    smoothing = Smoothing(deviations, relative, found.accepted, spread, lines, model.cautious, units)
+    probes = model.probes[model.inside]
+    smoothing = Smoothing(
+        deviations,
+        relative,
+        found.accepted,
+        spread,
+        lines,
+        spline.t,
+        model.cautious,
+        units,
+        scale**2 * disagreement(spline, found.other.spline, probes, order + 1),
+        relative,
+    )
     return BSpline(spline.t, scale * spline.c + offset, degree), smoothing
+
+
+def disagreement(
+    spline: BSpline[np.float64], other: BSpline[np.float64], time: FloatArray, orders: int
+) -> FloatArray:
+    """Return the covariance over times, s, of the difference of two splines and derivatives.
+
+    Both splines have one column; the result is (orders, orders).
+    """
+    rows = np.array([(spline(time, nu=order) - other(time, nu=order))[:, 0] for order in range(orders)])
+    return np.asarray(rows @ rows.T / len(time))
 
 
 def _found(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> Resolution | None:
-    """Return the resolution below mains hum, which a finer one would follow like a motion."""
+    """Return the resolution below mains hum, which a finer one would follow like a motion.
+
+    Where white noise hides the motion in the differences of samples, its size is known: a resolution that
+    leaves over more leaves motion out.
+    """
     found = find_resolution(time, row, degree, order, known)
     if found is None or found.given:
         return found
     spline = found.model.spline
     size = float(np.sqrt(np.mean(spline(found.model.probes, nu=order) ** 2)))
     hum = spectral_lines(time, spline(time)[:, 0], order, size).hum
-    return find_resolution(time, row, degree, order, known, min(hum)) if hum else found
+    if hum:
+        return find_resolution(time, row, degree, order, known, min(hum))
+    white = white_noise(time, row, degree + 1) if known.deviation is None else None
+    if white is None or (found.accepted and found.residual <= LEFT_OVER * white):
+        return found
+    vibrations = spectral_lines(time, row - spline(time)[:, 0], order, size)
+    if found.accepted and (vibrations.hum or vibrations.others):
+        return found  # they may be noise, which is for the user to say
+    finer = find_resolution(time, row, degree, order, KnownNoise(white, white=True))
+    if finer is not None and finer.accepted:
+        return finer
+    return found._replace(refused=found.residual > LEFT_OVER * white)

@@ -95,6 +95,18 @@ class FollowedNoise(NamedTuple):
         """Root mean square over that of the derivative without the noise."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
 
+    def covariance(self, orders: int) -> FloatArray:
+        """Return the covariance of value and derivatives, (orders, orders), over the highest one's power.
+
+        The density of the noise is flat up to its peak.
+        """
+        rate, order = 2 * np.pi * self.peak, orders - 1
+        total = np.add.outer(np.arange(orders), np.arange(orders))
+        phase = np.cos(np.pi / 2 * np.subtract.outer(np.arange(orders), np.arange(orders)))
+        return np.asarray(
+            self.share**2 * phase * (2 * order + 1) / (total + 1) * rate ** (total - 2.0 * order)
+        )
+
     def stretched(self, factor: float) -> FollowedNoise:
         """Return the noise for the motion slowed down by a factor."""
         return FollowedNoise(self.share, self.above / factor, self.peak / factor)

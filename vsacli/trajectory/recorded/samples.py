@@ -13,7 +13,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, Fit, FitChoice, fit_samples, mismatches
-from vsacli.trajectory.fits.fit import Unresolved, unresolved, vibrations
+from vsacli.trajectory.fits.fit import unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
 from vsacli.trajectory.recorded import hermite
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
@@ -257,8 +257,8 @@ class SampledProfile:
         follows a vibration that may be noise. For components that are not `stated` it is only a bound.
         """
         found = self.fit.covariance(time)
-        for each in self._unresolved:
-            found[each.members] = each.covariance(time)
+        for members, covariance in unresolved(self.fit, self.signal.orders):
+            found[members] = covariance[..., None]
         for member, covariance in vibrations(self.fit, self.signal.orders):
             found[member] += covariance[..., None]
         given = [name not in self.estimated for name in self.signal.names]
@@ -274,10 +274,6 @@ class SampledProfile:
             known = part.smoothing
             stated[part.members] = known is None or (known.resolved and not known.lines.others)
         return stated
-
-    @cached_property
-    def _unresolved(self) -> list[Unresolved]:
-        return list(unresolved(self.fit, self.signal.orders))
 
     def stretched(self, factor: float) -> SampledProfile:
         """Return the profile slowed down by a factor; its warnings still refer to the recording."""
