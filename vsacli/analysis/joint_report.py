@@ -76,12 +76,17 @@ class JointUncertainty(Stored):
         samples: Number of infeasible, and of singular samples that are not so within twice the standard
             deviation of the margin.
         limits: Worst sample of each limit that is exceeded only within the uncertainty, and not flagged.
+        start_dtheta: Standard deviation of the initial motor velocity, the larger of both motors; NaN if it
+            is unknown.
+        end_dtheta: The same of the final motor velocity.
     """
 
     variables: dict[str, Spread] = field(default_factory=dict)
     asked: tuple[str, ...] = (JUDGED,)
     samples: dict[str, int] = field(default_factory=dict)
     limits: dict[str, Finding] = field(default_factory=dict)
+    start_dtheta: float = math.nan
+    end_dtheta: float = math.nan
 
     @property
     def undetermined(self) -> tuple[Spread, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
-from vsacli.analysis.joint_report import JointDrift, JointReport
+from vsacli.analysis.joint_report import DETERMINED, JointDrift, JointReport
 from vsacli.base.texts import EXPONENT, counted, significant, together
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
 from vsacli.dynamics.energy import JointEnergy
@@ -151,7 +151,8 @@ def percent(share: float) -> str:
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
     yield from _positions("initial", joints, [joint.start_theta for joint in joints], "first")
-    yield from _moving("initial motor velocities: ", joints, [joint.start_dtheta for joint in joints])
+    deviations = [each and each.start_dtheta for each in (joint.uncertainty for joint in joints)]
+    yield from _moving("initial", joints, [joint.start_dtheta for joint in joints], deviations)
     jumps = [(max(of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
     defined = [entry for entry in jumps if not math.isnan(entry[0])]
     if defined:
@@ -166,7 +167,8 @@ def end(joints: Sequence[JointReport]) -> Iterator[str]:
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
     yield from _positions("final", joints, [joint.end_theta for joint in joints], "last")
-    yield from _moving("final motor velocities: ", joints, [joint.end_dtheta for joint in joints])
+    deviations = [each and each.end_dtheta for each in (joint.uncertainty for joint in joints)]
+    yield from _moving("final", joints, [joint.end_dtheta for joint in joints], deviations)
 
 
 def _positions(
@@ -188,20 +190,34 @@ def _positions(
 
 
 def _moving(
-    label: str, joints: Sequence[JointReport], velocities: Sequence[tuple[float, float]]
+    which: str,
+    joints: Sequence[JointReport],
+    velocities: Sequence[tuple[float, float]],
+    deviations: Sequence[float | None],
 ) -> Iterator[str]:
-    """Yield the joints whose motors do not rest at an end of the motion, with their velocities."""
+    """Yield the joints whose motors do not rest at an end of the motion, with their velocities.
+
+    The standard deviation follows if it is large; it is None if no signal was recorded.
+    """
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = {
-        number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
-        for number, (joint, dtheta) in enumerate(zip(joints, velocities, strict=True))
+        number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}{_doubt(dtheta, spread)}"
+        for number, (joint, dtheta, spread) in enumerate(zip(joints, velocities, deviations, strict=True))
         if any(
             abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
             for speed, peak in zip(dtheta, joint.peak_dtheta, strict=True)
         )
     }
     if moving:
-        yield of_joints(label, moving, [joint.name for joint in joints])
+        yield of_joints(f"{which} motor velocities: ", moving, [joint.name for joint in joints])
+
+
+def _doubt(velocities: Sequence[float], spread: float | None) -> str:
+    """Return the standard deviation of velocities if twice of it exceeds what is `DETERMINED`."""
+    largest = max(abs(velocity) for velocity in velocities if not math.isnan(velocity))
+    if spread is None or 2 * spread <= DETERMINED * largest:
+        return ""
+    return " +- unknown" if math.isnan(spread) else f" +- {spread:.2g}"
 
 
 def _signed(values: Iterable[float]) -> str:

@@ -24,6 +24,7 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
 from vsacli.base.progress import Tell, unheard
+from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, choose
@@ -192,14 +193,16 @@ class Run:
     def report(self) -> Report:
         """Return the report on the blocks so far, with the self-check of the whole run."""
         complete = self._samples == self.trajectory.samples
-        found = zip(self._energy.report(), self._between.reports(), self._uncertainties(), strict=True)
+        uncertainties = self._uncertainties()
+        found = zip(self._energy.report(), self._between.reports(), uncertainties, strict=True)
+        undetermined = any(each is not None and each.undetermined for each in uncertainties)
         return Report(
             robot=self.robot.name,
             trajectory=self.trajectory.name,
             samples=self._samples,
             duration=self.trajectory.duration,
             complete=complete,
-            warnings=(*self.robot.warnings, *self.trajectory.warnings),
+            warnings=(*self.robot.warnings, *self._of_recording(undetermined=undetermined)),
             notes=(
                 *self.trajectory.notes,
                 *self._between.notes,
@@ -214,6 +217,17 @@ class Run:
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
         )
+
+    def _of_recording(self, *, undetermined: bool) -> tuple[str, ...]:
+        """Return the trajectory's warnings. Rigid robots use no derivative beyond the second.
+
+        With them, warnings on the highest derivative become advice if a variable is undetermined.
+        """
+        warnings, estimate = self.trajectory.warnings, self.trajectory.estimates.get(POSITION)
+        if estimate is None or any(joint.actuator.sprung for joint in self.robot.joints):
+            return warnings
+        advice = estimate.advice_without_derivative()
+        return tuple(advice.get(each, each) for each in warnings if undetermined or each not in advice)
 
     def energies(self) -> Sequence[JointEnergy]:
         """Return the energy of each joint over the blocks so far, as `report` does, without a self-check."""

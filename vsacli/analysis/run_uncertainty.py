@@ -69,6 +69,7 @@ class RunUncertainty:
         self._powers: dict[str, _Powers] = {}
         self._steps = [dict.fromkeys(WITHIN, 0) for _ in robot.joints]
         self._limits: list[dict[str, Finding]] = [{} for _ in robot.joints]
+        self._velocities: list[FloatArray] = []
 
     @cached_property
     def _deviations(self) -> Uncertainty:
@@ -86,7 +87,10 @@ class RunUncertainty:
             if name in self._shown:
                 powers = self._powers.setdefault(name, _Powers(unstated))
                 powers.add(values[inside], array[inside])
-        return self._with(deviations, block)
+        block = self._with(deviations, block)
+        first, last = np.fmax.reduce(getattr(block, deviation("dtheta"))[[0, -1]], axis=-1)
+        self._velocities = [self._velocities[0] if self._velocities else first, last]
+        return block
 
     def judged(self, block: Block) -> Block:
         """Return a block of times between the samples with its deviations and limit flags."""
@@ -134,6 +138,8 @@ class RunUncertainty:
                 asked=tuple(self._asked),
                 samples=dict(self._steps[index]),
                 limits=dict(self._limits[index]),
+                start_dtheta=float(self._velocities[0][index]),
+                end_dtheta=float(self._velocities[1][index]),
             )
             for index in range(len(types))
         ]

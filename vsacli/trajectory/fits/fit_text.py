@@ -57,11 +57,11 @@ def fit_sentences(
             source = f"come from a C{fit.degree - 1} {kind} spline near the samples of {value}"
             misfit, trust = _misfit(parts, labels, fit), _trust(time, parts)
             yield f"{value}, {names}{whose} {source}: {misfit}; {trust}"
-    yield from _doubts(value, fitted[-1], labels, fit)
+    yield from _doubts(value, labels, fit)
 
 
-def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """Yield sentences on vibrations and undetermined derivatives, as assessed by smoothing splines."""
+def _doubts(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
+    """Yield sentences on motion that a fit leaves out, and on vibrations."""
     for part in fit.parts:
         known, label = part.smoothing, _members([part], labels)
         if part.left_out is not None and part.left_out.size > fit.noise[part.members].max() / 2:
@@ -70,20 +70,35 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
                 f" {part.left_out.size:.2g} rms, as its residual shows: leave out fit, noise and bandwidth,"
                 f" or set bandwidth: {part.left_out.above:.2g}"
             )
-        if known is None:
-            continue
-        if known.lines.others:
+        if known is not None and known.lines.others:
             yield f"{value} of {label} has a vibration at {_vibration(known)}"
-        if not known.resolved:
-            yield (
-                f"{highest} of {label} is not determined by the record: no two resolutions of a smoothing"
-                f" spline agree on it; record it with less noise{_advised_bandwidth(part, fit)}"
-            )
-        elif not known.determined:
-            yield (
-                f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square; {_advice(part)}"
-            )
+
+
+def undetermined(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[tuple[str, str]]:
+    """Yield components whose highest derivative is not determined, and what to do.
+
+    Args:
+        value: name of the signal.
+        highest: name of the derivative.
+        labels: labels of the components.
+        fit: fit of the signal.
+
+    Yields:
+        A sentence, and the same without the derivative, for a robot that does not use it.
+    """
+    for part in fit.parts:
+        known, label = part.smoothing, _members([part], labels)
+        if known is None or known.determined:
+            continue
+        extent, advice = "", f"record it with less noise{_advised_bandwidth(part, fit)}"
+        reason = "no two resolutions of a smoothing spline agree on it"
+        if known.resolved:
+            extent, advice = " to 10 %", _advice(part)
+            reason = f"its standard deviation is {100 * known.relative:.2g} % of its root mean square"
+        yield (
+            f"{highest} of {label} is not determined by the record{extent}: {reason}; {advice}",
+            f"{value} of {label}: {advice}",
+        )
 
 
 def _advice(part: Part) -> str:
