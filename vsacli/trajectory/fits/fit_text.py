@@ -128,7 +128,7 @@ def _vibration(known: Smoothing) -> str:
 
 
 def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
-    """Yield notes on the interpretation of noise: components not assessed, hum, images, filtered noise.
+    """Yield notes on the interpretation of noise: ends that ring, hum, images, filtered noise.
 
     Args:
         value: name of the signal.
@@ -143,6 +143,12 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
         )
     for part in fit.parts:
         known = part.smoothing
+        ends = zip(("first", "last"), part.ringing, strict=True)
+        if rings := " and the ".join(f"{which} {time:.2g} s" for which, time in ends if time):
+            yield (
+                f"{value} of {_members([part], labels)} rings in the {rings}, as if a filter had started or"
+                " stopped there: left out of the verdict"
+            )
         if known is not None and known.lines.hum:
             hum = ", ".join(f"{frequency:.4g}" for frequency in known.lines.hum[:LISTED_LINES])
             yield f"mains hum of {hum} Hz in {value} of {_members([part], labels)} is taken for noise"
