@@ -12,7 +12,7 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.run import Run
 from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
 from vsacli.trajectory.fits.left_over import left_out_motion
-from vsacli.trajectory.fits.noise import white_noise
+from vsacli.trajectory.fits.noise import white_noise_level
 from vsacli.trajectory.fits.ringing import ringing_ends
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -29,9 +29,9 @@ def pendulum():
 
 def test_rounding_is_white_noise_of_known_size_in_a_fast_motion(pendulum):
     # the median of differences varies by some 10 %, and motion adds to it
-    assert white_noise(TIME, pendulum[0], 8) == pytest.approx(STEP / np.sqrt(12), rel=0.25)
+    assert white_noise_level(TIME, pendulum[0], 8) == pytest.approx(STEP / np.sqrt(12), rel=0.25)
     smooth = sosfiltfilt(butter(4, 0.2, output="sos"), pendulum[0])
-    assert white_noise(TIME, smooth, 8) is None
+    assert white_noise_level(TIME, smooth, 8) is None
 
 
 def test_the_default_fit_follows_a_fast_motion_up_to_its_rounding(pendulum):

@@ -151,7 +151,7 @@ def percent(share: float) -> str:
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
     yield from _positions("initial", joints, [joint.start_theta for joint in joints], "first")
-    deviations = [each and each.start_dtheta for each in (joint.uncertainty for joint in joints)]
+    deviations = [None if (each := joint.uncertainty) is None else each.start_dtheta for joint in joints]
     yield from _moving("initial", joints, [joint.start_dtheta for joint in joints], deviations)
     jumps = [(max(of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
     defined = [entry for entry in jumps if not math.isnan(entry[0])]
@@ -167,7 +167,7 @@ def end(joints: Sequence[JointReport]) -> Iterator[str]:
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
     yield from _positions("final", joints, [joint.end_theta for joint in joints], "last")
-    deviations = [each and each.end_dtheta for each in (joint.uncertainty for joint in joints)]
+    deviations = [None if (each := joint.uncertainty) is None else each.end_dtheta for joint in joints]
     yield from _moving("final", joints, [joint.end_dtheta for joint in joints], deviations)
 
 

@@ -107,7 +107,7 @@ class Part:
                 row += taylor[order + power - 1]
         return rows
 
-    def power(self, order: int) -> FloatArray:
+    def mean_square(self, order: int) -> FloatArray:
         """Return the mean square of a derivative away from the ends, (members,)."""
         return np.asarray(np.mean(self.spline(np.linspace(*self.inside, PROBES), nu=order) ** 2, axis=0))
 
@@ -115,7 +115,7 @@ class Part:
         """Return covariances of noise that is followed and of motion left out, (members, orders, orders)."""
         found = np.zeros((len(self.members), orders, orders))
         if self.noise is not None and self.noise.share:
-            found += self.power(orders - 1)[:, None, None] * self.noise.covariance(orders)
+            found += self.mean_square(orders - 1)[:, None, None] * self.noise.covariance(orders)
         if self.left_out is not None:
             found += self.left_out.covariance(orders)
         return found
@@ -140,12 +140,10 @@ class Part:
         noise = None if self.noise is None else self.noise.stretched(factor)
         spline, ringing = (
             BSpline(knots, self.spline.c, self.spline.k),
-            (factor * each for each in self.ringing),
+            (factor * self.ringing[0], factor * self.ringing[1]),
         )
         left_out = None if self.left_out is None else self.left_out.stretched(factor)
-        return replace(
-            self, spline=spline, smoothing=known, noise=noise, ringing=tuple(ringing), left_out=left_out
-        )
+        return replace(self, spline=spline, smoothing=known, noise=noise, ringing=ringing, left_out=left_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +316,7 @@ def unresolved(fit: Fit, orders: int) -> Iterator[tuple[IndexArray, FloatArray]]
             caution = CAUTION if known.spread else SMOOTH_CAUTION
             bound = caution**2 * known.disagreement + part.further_errors(orders)
             shortest = max(SHORTEST_IMPULSE, fit.step)
-            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.power(orders - 1)
+            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.mean_square(orders - 1)
             yield part.members, bound
 
 

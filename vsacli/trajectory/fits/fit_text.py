@@ -74,7 +74,9 @@ def _doubts(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
             yield f"{value} of {label} has a vibration at {_vibration(known)}"
 
 
-def undetermined(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[tuple[str, str]]:
+def undetermined_derivatives(
+    value: str, highest: str, labels: Sequence[str], fit: Fit
+) -> Iterator[tuple[str, str]]:
     """Yield components whose highest derivative is not determined, and what to do.
 
     Args:

@@ -94,7 +94,7 @@ def typical_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
     return _typical(time, rows, order, 1) if len(time) > order else np.zeros(len(rows))
 
 
-def white_noise(time: FloatArray, row: FloatArray, order: int) -> float | None:
+def white_noise_level(time: FloatArray, row: FloatArray, order: int) -> float | None:
     """Return the standard deviation of white noise that hides the motion in the differences of a row.
 
     It is known if differences of every second sample are as large: those of a motion are 2^order times, and

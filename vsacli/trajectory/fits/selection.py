@@ -147,7 +147,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     """Return a part of one component whose assessment includes the noise that it follows."""
     known = part.smoothing
-    if known is None or not noise.share:
+    if known is None or not noise.share or (part.smooth and noise.relative <= known.relative):
         return part
     return replace(part, smoothing=known.following(noise, _size(part, record.order)), noise=noise)
 

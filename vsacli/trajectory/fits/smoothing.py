@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.banded_qr import Posterior
 from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives
-from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines, white_noise
+from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines, white_noise_level
 from vsacli.trajectory.fits.penalized import Model, falls, motion_power
 from vsacli.trajectory.fits.resolution import LEFT_OVER, KnownNoise, Resolution, find_resolution
 from vsacli.trajectory.fits.spectrum import FollowedNoise
@@ -265,7 +265,7 @@ def _found(
     hum = spectral_lines(time, spline(time)[:, 0], order, size).hum
     if hum:
         return find_resolution(time, row, degree, order, known, min(hum))
-    white = white_noise(time, row, degree + 1) if known.deviation is None else None
+    white = white_noise_level(time, row, degree + 1) if known.deviation is None else None
     if white is None or (found.accepted and found.residual <= LEFT_OVER * white):
         return found
     vibrations = spectral_lines(time, row - spline(time)[:, 0], order, size)

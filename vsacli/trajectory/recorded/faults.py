@@ -83,14 +83,14 @@ class Outliers(Faults):
 
     curve: FloatArray
 
-    def without(self, excepted: BoolArray) -> Outliers | None:
+    def except_for(self, excepted: BoolArray) -> Outliers | None:
         """Return the outliers except some, by a mask, (outliers,); None if none are left."""
         kept = ~excepted
         if not kept.any():
             return None
         return Outliers(self.first[kept], self.last[kept], self.sizes[kept], self.curve[kept])
 
-    def replaced(self, values: FloatArray) -> FloatArray:
+    def smoothed(self, values: FloatArray) -> FloatArray:
         """Return a copy of the column, (samples,), with the curve instead of the outliers."""
         smooth = values.copy()
         smooth[self.first] = self.curve
@@ -137,7 +137,7 @@ def derivative_outliers(
     spans = [(at - 1, at), (at, at + 1), (at - 1, at + 1)]
     slopes = [_speed(time, lower, *span) for span in spans]
     distance = np.min([np.abs(values[off.first] - slope) for slope in slopes], axis=0)
-    return off.without(distance < DIFFERENCED * off.sizes)
+    return off.except_for(distance < DIFFERENCED * off.sizes)
 
 
 class _Event(NamedTuple):

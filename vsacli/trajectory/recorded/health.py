@@ -68,7 +68,7 @@ def check_health(stamps: FloatArray, records: Sequence[Samples], types: Sequence
                     below = None if below is None else below[component]
                     off, sentences = _check_derivative(stamps, record.time, below, row, unit)
                 if off is not None:
-                    row[:] = off.replaced(row)
+                    row[:] = off.smoothed(row)
                 checked.problems.extend(
                     SampleProblem(name, sentence, component, first) for first, sentence in sentences
                 )
@@ -137,7 +137,7 @@ def _check_values(
         slow = f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}"
         return None, [(0, slow)]
     off = outliers(time, values, quantization)
-    smooth = values if off is None else off.replaced(values)
+    smooth = values if off is None else off.smoothed(values)
     return off, [
         *_outlier_sentences(off, stamps, unit, ends),
         *_stretch_faults(stamps, time, smooth, quantization, unit, angle=angle),

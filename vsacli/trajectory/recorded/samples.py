@@ -14,7 +14,7 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, Fit, FitChoice, fit_samples, mismatches
 from vsacli.trajectory.fits.fit import unresolved, vibrations
-from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences, undetermined
+from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences, undetermined_derivatives
 from vsacli.trajectory.recorded import hermite
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.times import stretch
@@ -99,7 +99,9 @@ class Samples:
         fitted = names if resampled else self.missing
         yield from fit_sentences(value, fitted, self.labels, self.time, fit)
         if fitted:
-            yield from (sentence for sentence, _ in undetermined(value, fitted[-1], self.labels, fit))
+            yield from (
+                sentence for sentence, _ in undetermined_derivatives(value, fitted[-1], self.labels, fit)
+            )
         if not resampled:
             yield from mismatches(
                 self.signal.names, self.labels, self.time, self.derivatives, fit, start=self.start
@@ -250,7 +252,7 @@ class SampledProfile:
     def advice_without_derivative(self) -> dict[str, str]:
         """Return what to do by each warning on the highest derivative, for a robot that does not use it."""
         missing = self.signal.names[1:] if self.resampled else self.record.missing
-        return dict(undetermined(self.signal.names[0], missing[-1], self.record.labels, self.fit))
+        return dict(undetermined_derivatives(self.signal.names[0], missing[-1], self.record.labels, self.fit))
 
     @property
     def estimated(self) -> tuple[str, ...]:
