@@ -21,8 +21,7 @@ FALL = 6.0
 noise of first order by 4."""
 
 BROADEST = 2
-"""Most octaves between the first and the last of nearly the largest density if the residual is motion: these
-are at the cut-off of the fit."""
+"""Most octaves with nearly the largest density if the residual is motion: those at the cut-off of the fit."""
 
 FEWEST_SAMPLES = 64
 """Fewest samples of a spectrum."""
@@ -70,7 +69,7 @@ def left_out_motion(time: FloatArray, residual: FloatArray) -> LeftOutMotion | N
     falls = density[high[-1] : -1] > FALL * density[high[-1] + 1 :]
     last = int(high[-1] + (len(falls) if falls.all() else np.argmin(falls)))
     first = int(high[0])
-    if np.ptp(high) > BROADEST or last == high[-1]:
+    if np.ptp(high) >= BROADEST or last == high[-1]:
         return None
     step = 1 / float(time[-1] - time[0])
     middle = step * np.sqrt(2) * edges[first:last]
