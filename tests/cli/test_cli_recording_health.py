@@ -53,12 +53,22 @@ def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded
 @pytest.mark.slow
 def test_faults_come_before_what_follows_from_them(vsacli, recorded):
     q = positions()
-    q[700, 1] -= 0.1
+    q[700:760, 1] = q[700, 1]
     verdict, fault, *others = vsacli("check-feasibility", ROBOT, recorded(q)).out.splitlines()
     assert verdict.startswith("UNRELIABLE")
-    assert fault.startswith("warning: motion.csv:702: shoulder.q is off at t = 1.400 s")
+    assert fault.startswith("warning: motion.csv:702: shoulder.q is frozen at t = 1.400 s")
     assert "below the minimum" in others[0]
     assert not any("if the arm did move like this" in line for line in others)
+
+
+@pytest.mark.slow
+def test_a_false_sample_is_left_out_of_what_is_computed(vsacli, recorded):
+    q = positions()
+    q[700, 1] -= 0.1
+    outcome = vsacli("check-feasibility", ROBOT, recorded(q))
+    assert outcome.code == 0
+    assert "warning: motion.csv:702: shoulder.q is off at t = 1.400 s" in outcome.out
+    assert "left out" in outcome.out
 
 
 @pytest.mark.slow

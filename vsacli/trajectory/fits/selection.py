@@ -136,12 +136,16 @@ def _without_ringing(part: Part, record: Record) -> Part:
 
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
     """Return the filtered noise that a part of one component follows."""
-    step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
     bandwidth = record.known[int(part.members[0])].bandwidth
-    noise = followed_noise(part.spline, part.inside, step, record.order, bandwidth)
+    noise = followed_noise(part.spline, part.inside, _interval(record), record.order, bandwidth)
     if not (noise.share and part.exact and record.least):
         return noise
     return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))
+
+
+def _interval(record: Record) -> float:
+    """Return the mean sampling interval of a recording, s."""
+    return float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
 
 
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
@@ -259,11 +263,21 @@ def _with_left_out_motion(parts: Sequence[Part], record: Record) -> list[Part]:
 
 
 def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
-    """Return the motion that a part of one component leaves out; lines count as vibrations instead."""
+    """Return the motion that a part of one component leaves out; lines count as vibrations instead.
+
+    A residual as large as the filtered noise that the default fit follows is such noise.
+    """
     lines = None if part.smoothing is None else part.smoothing.lines
     if lines and (lines.hum or lines.others):
         return None
-    return left_out_motion(record.time, record.values[part.members[0]] - part.spline(record.time)[:, 0])
+    missed = left_out_motion(record.time, record.values[part.members[0]] - part.spline(record.time)[:, 0])
+    if missed is None:
+        return None
+    member = int(part.members[0])
+    free = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
+    noise = followed_noise(free.spline, free.inside, _interval(record), record.order)
+    explained = noise.share and _size(free, record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
+    return missed if missed.size > explained else None
 
 
 def fit_samples(
