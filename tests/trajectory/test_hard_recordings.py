@@ -104,6 +104,15 @@ def test_ends_at_which_a_filter_rings_are_left_out(seed, rings):
     assert max(fit.unreliable) >= max(fit.parts[0].ringing)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [134, 262, 278, 302, 398])
+def test_noise_between_ends_that_ring_counts(seed):
+    """Torques were wrong by 4 to 32 %, and by 24 deviations and more."""
+    judged = judge_hard(draw_hard(seed))
+    assert not judged.wrong
+    assert not judged.beyond
+
+
 def test_motions_that_begin_and_end_at_once_do_not_ring():
     from scipy.interpolate import make_interp_spline
 
@@ -146,8 +155,7 @@ def test_velocities_at_the_ends_of_a_recording_have_their_deviation(vsacli, tmp_
 def test_the_unseen_half_is_right_or_in_doubt(family):
     seeds = [seed for seed in range(1, 200, 2) if FAMILIES[seed // 2 % len(FAMILIES)] == family]
     judged = [judge_hard(draw_hard(seed)) for seed in seeds]
-    # of 25 recordings with steep filters, two on a rigid robot: their noise is as smooth as the motion
-    assert sum(each.wrong for each in judged) <= (2 if family == "ringing" else 0)
+    assert not any(each.wrong for each in judged)
     within_reach = [each for each in judged if each.attainable <= 0.1]
     assert sum(each.verdict == "ok" for each in within_reach) >= 0.6 * len(within_reach)
     ratios = [each.stated / each.error for each in judged if np.isfinite(each.stated)]

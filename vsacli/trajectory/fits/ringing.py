@@ -1,7 +1,9 @@
 """Ends of a recording at which a filter rings.
 
 A steep low-pass that starts and stops with the recording answers these steps with a decaying oscillation at
-its cut-off. A spline follows it like a motion, and it hides the noise of the rest from a spectrum.
+its cut-off. A spline follows it like a motion, and it hides the noise of the rest from a spectrum. Noise of
+the whole recording may hide it in the highest derivative, and the motion in lower ones. It is as long at both
+ends, where the filter ran forwards and backwards.
 """
 
 from __future__ import annotations
@@ -22,6 +24,9 @@ HIGHER = 3.0
 """Smallest peak of an end that rings, over the largest derivative in the middle half. The fourth derivative
 of a polynomial of degree 7 from rest to rest has 2.7."""
 
+HIGHEST = 9.0
+"""The same for an end that may be longer, or turn less; those of a sweep from 0.2 to 4 Hz have 4."""
+
 TURNS = 3
 """Fewest changes of sign of an end that rings; a motion that starts at once has less."""
 
@@ -34,7 +39,7 @@ begins."""
 
 
 def ringing_ends(spline: BSpline[np.float64], inside: tuple[float, float], order: int) -> tuple[float, float]:
-    """Return how long both ends ring, s; 0 without ringing.
+    """Return how long both ends ring, s, by three neighboring derivatives; 0 without ringing.
 
     Args:
         spline: spline near or through the samples, with one column.
@@ -42,19 +47,20 @@ def ringing_ends(spline: BSpline[np.float64], inside: tuple[float, float], order
         order: order of the highest derivative that is needed.
     """
     time = np.linspace(*inside, PROBES)
-    derivative = spline(time, nu=order)[:, 0]
-    usual = float(np.abs(derivative[PROBES // 4 : -PROBES // 4]).max())
-    step = float(time[1] - time[0])
-    return _ringing(derivative, usual) * step, _ringing(derivative[::-1], usual) * step
+    derivatives = [spline(time, nu=near)[:, 0] for near in (order - 1, order, order + 1)]
+    probes = max(_ringing(inward) for row in derivatives for inward in (row, row[::-1]))
+    return (probes * float(time[1] - time[0]),) * 2
 
 
-def _ringing(inward: FloatArray, usual: float) -> int:
-    """Return the number of probes, from the first on, that ring."""
+def _ringing(inward: FloatArray) -> int:
+    """Return the number of probes of a derivative, from the first on, that ring."""
+    usual = float(np.abs(inward[PROBES // 4 : -PROBES // 4]).max())
     beyond = np.flatnonzero(np.abs(inward[: PROBES // 4]) > usual)
     if not beyond.size:
         return 0
     end = inward[: int(beyond[-1]) + 1]
     size, turns = np.abs(end), np.count_nonzero(np.diff(np.sign(end)))
     decays = size[-len(end) // 4 :].max() < DECAYED * size.max()
-    rings = size.max() > HIGHER * usual and turns >= TURNS and len(end) < LONGEST * PROBES / 4
-    return len(end) if rings and decays else 0
+    high = turns >= TURNS - 1 and size.max() > HIGHEST * usual
+    rings = turns >= TURNS and size.max() > HIGHER * usual and len(end) < LONGEST * PROBES / 4
+    return len(end) if decays and (high or rings) else 0

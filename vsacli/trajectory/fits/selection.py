@@ -137,7 +137,8 @@ def _without_ringing(part: Part, record: Record) -> Part:
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
     """Return the filtered noise that a part of one component follows."""
     bandwidth = record.known[int(part.members[0])].bandwidth
-    noise = followed_noise(part.spline, part.inside, _interval(record), record.order, bandwidth)
+    rings = any(part.ringing)
+    noise = followed_noise(part.spline, part.inside, _interval(record), record.order, bandwidth, rings=rings)
     if not (noise.share and part.exact and record.least):
         return noise
     return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))

@@ -33,6 +33,12 @@ RISE = 4.0
 """Smallest rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise
 differ by less than a factor of 2.2 in 19 of 20 cases."""
 
+QUIET = 1e-4
+"""Largest share of the samples' power of noise at the cut-off of a filter that rings; more is motion."""
+
+STEEP = 4
+"""Power of the frequency by which the derivative is weighted, so that it is largest at such a cut-off."""
+
 NO_RISE = 4.0
 """Largest rise of the samples' density beyond a valley; that of filtered noise does not rise."""
 
@@ -41,7 +47,8 @@ SMALL = 0.01
 valley: it is still small compared with the motion itself."""
 
 FLAT = 0.2
-"""Smallest density of the samples at the top of such noise, over that at its start; for motion it falls."""
+"""Smallest density of the samples at the top of such noise, over that at its start; for motion it falls.
+From a start below a fifth of the top's frequency on, it may fall as fast as that grows."""
 
 HUMP = 0.1
 """Smallest density of the lines of a hump, over its largest density."""
@@ -154,6 +161,8 @@ def followed_noise(
     step: float,
     order: int,
     bandwidth: float | None = None,
+    *,
+    rings: bool = False,
 ) -> FollowedNoise:
     """Find filtered noise in a derivative of a spline; none is found in fewer than about a hundred samples.
 
@@ -163,25 +172,27 @@ def followed_noise(
         step: mean sampling interval, s.
         order: order of the derivative.
         bandwidth: frequency up to which humps are motion, Hz; None if unknown.
+        rings: whether a steep filter rings at an end, so that there is noise below its cut-off.
     """
     time = _stretches(inside, step)
     spectrum = _spectrum(spline, time, step, order)
     total = float(np.sum(spectrum.power))
     if not total or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
         return FollowedNoise()
-    bands = _bands(spectrum)
+    bands, motion = _bands(spectrum), _power_of_motion(spline, time, order)
+    found = _below_cutoff(spectrum, bands, motion) if rings and bandwidth is None else FollowedNoise()
     # Of several humps of noise, the one from the lowest valley on includes all others.
-    valleys, descends = _valleys(bands, _power_of_motion(spline, time, order))
+    valleys, descends = _valleys(bands, motion)
     for valley in np.flatnonzero(valleys).tolist():
         top = valley + int(np.argmax(bands.derivative[valley:]))
         peak = float(spectrum.frequency[bands.line[top]])
-        steady = descends[valley] or bands.samples[top] > FLAT * bands.samples[valley]
-        known = bandwidth is not None and peak <= bandwidth
-        if steady and not known and _is_noise(spectrum, bands, valley, top):
+        fall = bands.samples[top] / bands.samples[valley]
+        steady = descends[valley] or fall > min(FLAT, bands.line[valley] / bands.line[top])
+        if steady and peak > (bandwidth or 0) and _is_noise(spectrum, bands, valley, top):
             power = float(np.sum((bands.width * bands.derivative)[valley:])) * len(spectrum.lines)
             above = _end_of_motion(spectrum, bands, valley, top)
-            return FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak)
-    return FollowedNoise()
+            return max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
+    return found
 
 
 def motion_band(
@@ -248,6 +259,20 @@ def _bands(spectrum: _Spectrum) -> _Bands:
     medians = np.maximum(medians, np.finfo(float).tiny)
     slowest = float(np.mean(spectrum.power[:, 1:FIRST_LINE], axis=0).max())
     return _Bands(line, count, medians, medians * spectrum.weight[line], slowest)
+
+
+def _below_cutoff(spectrum: _Spectrum, bands: _Bands, motion: float) -> FollowedNoise:
+    """Return the noise of a filter that rings: white up to the cut-off, if there is no motion there."""
+    frequency = spectrum.frequency[bands.line]
+    top = int(np.argmax(bands.derivative * frequency**STEEP))
+    reach = max(LEAST_LINES, int(HALF_WIDTH * (last := int(bands.line[top]))))
+    near = slice(max(1, last - reach), last + reach + 1)
+    density = float(np.mean(spectrum.power[:, near] / spectrum.weight[near]))  # more than medians: it peaks
+    if last * density > QUIET * motion:
+        return FollowedNoise()
+    power = density * np.sum(spectrum.weight[: last + 1]) / np.sum(spectrum.power.mean(axis=0))
+    above = frequency[np.argmax(bands.samples <= NO_RISE * density)]
+    return FollowedNoise(float(np.sqrt(min(1.0, power))), float(above), float(frequency[top]))
 
 
 def _valleys(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
