@@ -327,8 +327,11 @@ SLOW = "time,base.q\n" + "".join(f"{1000 * t},{t}\n" for t in range(5))
 SHORT = "time,base.q\n0,1\n1,2\n2,1\n"
 
 BAD = {
-    "there is no column 'time'; add it, or name it with --columns": ("stamp,base.q\n0,1\n1,2\n", []),
-    "joint 'bose' is not in vsa-3r (base, shoulder, elbow); did you mean 'base'?": (
+    "there is no column 'time'; unknown column 'stamp'; if it has another name, use --columns": (
+        "stamp,base.q\n0,1\n1,2\n",
+        [],
+    ),
+    "m.csv:1: unknown column 'bose.q'; did you mean 'base.q'?": (
         "time,bose.q\n0,1\n1,2\n",
         [],
     ),

@@ -139,7 +139,7 @@ def test_columns_with_little_time_in_common_stop_the_fit(
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("elbo", "joint 'elbo' is not in vsa-3r (base, shoulder, elbow); did you mean 'elbow'?"),
+        ("elbo", "5 unknown columns: elbo.q, elbo.theta_1, elbo.tau_motor_1, ...; did you mean elbow.q, "),
         ("wrist", "joint 'wrist' is not in vsa-3r (base, shoulder, elbow): is this the recording of another"),
     ],
 )

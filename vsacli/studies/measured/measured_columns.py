@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -10,11 +10,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.renamed import successor
 from vsacli.base.simulation_variables import measured
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, listed
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
@@ -22,10 +20,14 @@ from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import find_disorder
+from vsacli.trajectory.recorded.header_problems import Header, misspellings
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
+
+USE_OPTION = "use --columns"
+RATE_OF_ROWS = "if the rows are equally spaced, give their rate in a file for --columns"
 
 
 class Jointed(Protocol):
@@ -135,8 +137,13 @@ def read_recording(
     table = read_table(path, mapping, {TIME, *places}, empty_cells=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
-    stranger = _stranger(names, table.others, places, jointed.joint_names, robot)
-    problems = list(_unusable(names, table.others, places, stranger))
+    unknown = [name for name, _ in map(split_heading, table.others) if role_of(name)[0] != COMMANDED]
+    expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
+    header = Header(
+        (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, USE_OPTION
+    )
+    stranger = _other_joints(header, places, robot)
+    problems = list(_unusable(header, places, stranger))
     units = {TIME: "s", **{name: place.unit for name, place in places.items()}}
     factors = unit_factors(headings, units, problems)
     if problems:
@@ -215,80 +222,53 @@ MOST_NAMED = 7
 """Largest number of joints of a robot that a message lists."""
 
 
-def _stranger(
-    names: Sequence[str],
-    others: Sequence[str],
-    places: Mapping[str, Place],
-    joints: Sequence[str],
-    robot: str,
-) -> str:
-    """Return a sentence on joints in unknown columns that the robot does not have; empty without any."""
-    endings = {name.removeprefix(f"{joint}.") for joint in joints for name in places if "." in name}
-    found: dict[str, None] = {}
-    for name, _ in map(split_heading, others):
-        joint = next(
-            (name.removesuffix(f".{ending}") for ending in endings if name.endswith(f".{ending}")), ""
-        )
-        if joint and not name.startswith(tuple(f"{known}." for known in joints)):
-            found[joint] = None
-    if not found:
-        return ""
-    recorded = {joints[places[name].joint] for name in names if name in places}
-    missing = [joint for joint in joints if joint not in recorded]
-    near = [meant for word in found if (meant := nearest(word, missing))]
-    listed = ", ".join(joints[:MOST_NAMED]) + (", ..." if len(joints) > MOST_NAMED else "")
-    one = len(found) == 1
-    noun, verb, them = ("joint", "is", "its") if one else ("joints", "are", "their")
-    said = f"{noun} {', '.join(map(repr, found))} {verb} not in {robot} ({listed})"
-    if len(near) == len(found):
-        return f"{said}; did you mean {', '.join(map(repr, near))}?"
+def _other_joints(header: Header, places: Mapping[str, Place], robot: str) -> str:
+    """Return a sentence on columns of joints that the robot does not have; empty without any."""
+    endings = {name.rpartition(".")[2] for name in places if "." in name}
+    own = tuple(f"{joint}." for joint in header.joint_names)
+    parts = [(name, *name.rpartition(".")) for name in header.names if not name.startswith(own)]
+    columns = {name: joint for name, joint, _, ending in parts if joint and ending in endings}
+    meant = header.misspelled(columns, [name for name in places if name not in header.names])
+    if len(meant) == len(columns):
+        return "; ".join(misspellings(meant))
+    joints = dict.fromkeys(columns.values())
+    noun, verb, them = ("joint", "is", "its") if len(joints) == 1 else ("joints", "are", "their")
+    where = f"not in {robot} ({listed(header.joint_names, MOST_NAMED)})"
     return (
-        f"{said}: is this the recording of another robot? If not, map or ignore {them} columns with --columns"
+        f"{noun} {', '.join(map(repr, joints))} {verb} {where}: is this the recording of another robot? If"
+        f" not, map or ignore {them} columns with --columns"
     )
 
 
-def _unusable(
-    names: Sequence[str], strangers: Sequence[str], places: Mapping[str, Place], stranger: str
-) -> Iterator[str]:
+def _unusable(header: Header, places: Mapping[str, Place], stranger: str) -> Iterator[str]:
     """Yield problems of the header of a recording.
 
     Args:
-        names: names of its known columns.
-        strangers: names of the others.
+        header: names of its columns, except for commands under unknown names.
         places: places by possible names of columns.
         stranger: sentence on unknown joints; otherwise empty.
     """
-    found = [name for name in names if name in places]
-    renamed = {name: new for name in strangers if (new := successor(split_heading(name)[0], places))}
-    if TIME not in names and (found or renamed or stranger):
-        near = nearest(TIME, strangers)
-        hint = f"did you mean {near!r}? Name" if near else "add it, or name"
-        yield f"there is no column {TIME!r}; {hint} it with --columns"
-    for name, new in renamed.items():
-        yield f"column {name!r} is now called {new!r}; rename it, or map it with --columns"
-    if not found and not renamed:
-        yield stranger or _no_column(strangers, places)
-    for name in sorted({name for name in names if names.count(name) > 1 and name in places}):
-        yield f"column {name!r} appears {names.count(name)} times; keep one"
-    twice = {place: name for name in found if (place := places[name]._replace(unit="", gear=1.0))}
-    for name in found:
-        other = twice[places[name]._replace(unit="", gear=1.0)]
+    if header.is_foreign:
+        yield stranger or _no_column(header, places)
+        return
+    yield from header.of_names()
+    yield from header.of_time(RATE_OF_ROWS)
+    first: dict[Place, str] = {}
+    for name in filter(places.get, header.names):
+        other = first.setdefault(places[name]._replace(unit="", gear=1.0), name)
         if other != name:
-            yield f"columns {name!r} and {other!r} are the same signal; keep one"
+            yield f"columns {other!r} and {name!r} are the same signal; keep one"
 
 
-def _no_column(strangers: Sequence[str], places: Mapping[str, Place]) -> str:
+def _no_column(header: Header, places: Mapping[str, Place]) -> str:
     """Return that no column of a recording is known, with the nearest or some possible names."""
-    plain = [name for name, _ in map(split_heading, strangers) if role_of(name)[0] != COMMANDED]
-    near = {name: new for name in plain if (new := nearest(name, places))}
     first: dict[str, str] = {}
     for name, place in places.items():
         first.setdefault(place.variable, name)
     usual = [first[name] for name in USUAL if name in first] or list(first.values())[:2]
-    hint = "".join(f"; {name!r} may be {new!r}" for name, new in list(near.items())[:1])
-    return (
-        f"expected columns such as {', '.join([TIME, *usual])}{hint}; if they have other names, use --columns"
-    )
+    near = [f"; {name!r} may be {meant!r}" for name, meant in header.meant.items() if meant in places]
+    hint = f"{''.join(near[:1])}; if they have other names, {USE_OPTION}"
+    return f"expected columns such as {', '.join([TIME, *usual])}{hint}"
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample

@@ -17,7 +17,7 @@ from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
-from vsacli.trajectory.recorded.header_problems import Header, probable
+from vsacli.trajectory.recorded.header_problems import Header
 
 Naming = dict[str, dict[int, str]]
 """Names of the columns of each quantity, by index of the joint or wrench axis."""
@@ -103,8 +103,9 @@ def column_layout(
     naming = used[0] if used else namings[0]
     expected = [TIME, *_all(naming), *(_all(_WRENCH_NAMING) if WRENCH in wanted else ())]
 
-    known = _known(of_every_joint)
-    if _is_foreign(names, known):
+    renaming = f"use a trajectory file as printed by vsacli info {file}"
+    found = Header(names, _known(of_every_joint), expected, joints.names, file, renaming)
+    if found.is_foreign:
         examples = ", ".join(expected[:2])
         advice = (
             f"for a motor catalog use --catalog {file}"
@@ -113,7 +114,6 @@ def column_layout(
         )
         message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
-    found = Header(names, known, expected, joints.names, file)
     problems = list(found.of_names())
     naming = naming | _WRENCH_NAMING
     if len(used) == len(namings):
@@ -169,14 +169,6 @@ def _columns(pattern: str, joints: CommandedJoints) -> Naming:
 
 def _all(naming: Naming) -> list[str]:
     return [column for columns in naming.values() for column in columns.values()]
-
-
-def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
-    """Return whether at most the time is known, and some other name is not a misspelling of a known one."""
-    columns = [name for name in names if name != TIME]
-    signals = [name for name in known if name != TIME]
-    none_known = not any(name in known for name in columns)
-    return none_known and any(probable(name, signals) is None for name in columns)
 
 
 def _units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:

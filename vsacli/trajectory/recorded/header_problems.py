@@ -37,6 +37,7 @@ class Header:
         expected: names in the naming that the header uses.
         joint_names: names of the joints.
         file: path of the file.
+        renaming: advice for columns with other names, a clause.
     """
 
     names: Sequence[str]
@@ -44,6 +45,7 @@ class Header:
     expected: Sequence[str]
     joint_names: Sequence[str]
     file: str
+    renaming: str
 
     @cached_property
     def parenthesised(self) -> dict[str, re.Match[str]]:
@@ -53,11 +55,25 @@ class Header:
 
     @cached_property
     def meant(self) -> dict[str, str]:
-        """The missing column that each misspelled one probably stands for."""
-        missing = [column for column in self.expected if column not in self.names]
+        """The column that each renamed or misspelled one probably stands for."""
         unknown = [name for name in self.names if name not in {*self.known, *self.parenthesised}]
-        found = {column: probable(column, missing) for column in unknown}
-        return {column: near for column, near in found.items() if near is not None}
+        return self.misspelled(unknown, [column for column in self.expected if column not in self.names])
+
+    @property
+    def explained(self) -> set[str]:
+        """Names of the columns that are there, if under a wrong name."""
+        return {*self.names, *self.meant.values(), *(each["name"] for each in self.parenthesised.values())}
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether no column but the time is known, and not all others are misspelled ones."""
+        signals = {*self.known} - {TIME}
+        return signals.isdisjoint(self.names) and bool(self.strangers or signals.isdisjoint(self.explained))
+
+    def misspelled(self, unknown: Collection[str], missing: Sequence[str]) -> dict[str, str]:
+        """Return the columns that probably stand for known ones, renamed or `missing`, with these."""
+        found = {name: successor(name, self.known) or probable(name, missing) for name in unknown}
+        return {name: near for name, near in found.items() if near is not None}
 
     @cached_property
     def strangers(self) -> list[str]:
@@ -66,7 +82,7 @@ class Header:
 
     def of_names(self) -> Iterator[str]:
         """Yield problems of names: misspellings, units in parentheses, names that occur twice."""
-        yield from _misspellings(self.meant)
+        yield from misspellings(self.meant)
         for name, found in self.parenthesised.items():
             yield f"{name!r}: units are written in square brackets, {found['name']} [{found['unit']}]"
         yield from (f"column {name!r} appears {n} times" for name, n in Counter(self.names).items() if n > 1)
@@ -74,7 +90,12 @@ class Header:
     def of_strangers(self) -> Iterator[str]:
         """Yield one problem for all unknown columns, if there are any."""
         if self.strangers:
-            yield f"{_unknown(self.strangers)}; to leave columns out or to rename them, {self._printed}"
+            yield f"{_unknown(self.strangers)}; to leave columns out or to rename them, {self.renaming}"
+
+    def of_time(self, otherwise: str) -> Iterator[str]:
+        """Yield that no column holds times, if so; `otherwise` is the advice if all columns are known."""
+        if TIME not in self.explained:
+            yield f"there is no column {TIME!r}; {self._other_name(1) if self.strangers else otherwise}"
 
     def of_gaps(self, naming: Mapping[str, Mapping[int, str]], needed: Collection[str]) -> Iterator[str]:
         """Yield problems of missing and unknown columns: one for both, if a name may be the reason.
@@ -83,15 +104,9 @@ class Header:
             naming: expected columns of each quantity, by index of the joint or wrench axis.
             needed: quantities that are required.
         """
-        explained = {
-            *self.names,
-            *self.meant.values(),
-            *(each["name"] for each in self.parenthesised.values()),
-        }
-        renamed = False
-        if TIME not in explained:
-            renamed = bool(self.strangers)
-            yield f"there is no column {TIME!r}; {self._other_name(1) if renamed else RATE_INSTEAD}"
+        explained = self.explained
+        yield from self.of_time(RATE_INSTEAD)
+        renamed = TIME not in explained and bool(self.strangers)
         for name, columns in naming.items():
             absent = {index: column for index, column in columns.items() if column not in explained}
             if not absent:
@@ -109,15 +124,11 @@ class Header:
         if not renamed:
             yield from self.of_strangers()
 
-    @property
-    def _printed(self) -> str:
-        return f"use a trajectory file as printed by vsacli info {self.file}"
-
     def _other_name(self, missing: int) -> str:
         """Return the columns one of which may be missing, and what to do then, as two clauses."""
         present = f"columns: {listed(self.names, MOST_PRESENT)}"
         condition = "if it has another name" if missing == 1 else "if they have other names"
-        return f"{_unknown(self.strangers) if self.strangers else present}; {condition}, {self._printed}"
+        return f"{_unknown(self.strangers) if self.strangers else present}; {condition}, {self.renaming}"
 
     def _combined(self, signal: str) -> str:
         motion = f"position: {{type: csv, file: {self.file}}}"
@@ -137,8 +148,6 @@ def probable(column: str, missing: Sequence[str]) -> str | None:
     Of a joint's columns only the part that is wrong is compared: `shoulder.theta` shares its joint with
     `shoulder.dq`, and nothing else.
     """
-    if (renamed := successor(column, missing)) is not None:
-        return renamed
     joint, dot, quantity = column.partition(".")
     others = [each.partition(".") for each in missing]
     if not dot or not any(separator for _, separator, _ in others):
@@ -150,7 +159,7 @@ def probable(column: str, missing: Sequence[str]) -> str | None:
     return None if near is None else f"{near}.{quantity}"
 
 
-def _misspellings(meant: Mapping[str, str]) -> Iterator[str]:
+def misspellings(meant: Mapping[str, str]) -> Iterator[str]:
     """Yield one problem for all columns with the same mistake, in the joint or in the quantity."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for column, near in meant.items():
