@@ -175,7 +175,6 @@ class TimeColumn(NamedTuple):
         source: entry of the column in a mapping.
         reason: reason for the choice, a clause.
         nanoseconds: position of its column of nanoseconds, if there is one.
-        clock: whether the stamps are clock texts.
         unit_guessed: whether the unit was derived from the size of the steps.
     """
 
@@ -183,25 +182,7 @@ class TimeColumn(NamedTuple):
     source: MappedColumn
     reason: str
     nanoseconds: int | None = None
-    clock: bool = False
     unit_guessed: bool = False
-
-    @property
-    def numbered(self) -> MappedColumn:
-        """The entry of the column by its number, with its unit."""
-        if self.nanoseconds is not None:
-            return MappedColumn(column=self.place + 1, nanoseconds=self.nanoseconds + 1)
-        return MappedColumn(column=self.place + 1, unit=self.unit_of_stamps)
-
-    @property
-    def unit_of_stamps(self) -> str:
-        """The unit of the stamps."""
-        return "ns" if self.nanoseconds is not None else self.source.unit or "s"
-
-    @property
-    def guessed(self) -> bool:
-        """Whether the column was chosen although its name does not indicate times."""
-        return self.reason.startswith(GUESSED)
 
 
 def time_columns(rows: FirstRows) -> Iterator[TimeColumn]:
@@ -238,7 +219,7 @@ def unread_times(rows: FirstRows) -> Iterator[str]:
 def _described(rows: FirstRows, place: int, reason: str) -> TimeColumn:
     column = rows.called(place)
     if rows.clocks(place):
-        return TimeColumn(place, MappedColumn(column=column), "as a clock shows it", clock=True)
+        return TimeColumn(place, MappedColumn(column=column), "as a clock shows it")
     own = rows.unit(place) or MappedColumn(column=column).doubt(rows.columns[place])
     unit, why = guessed_unit(rows.numbers(place)) if own is None else (own, "")
     by_steps = unit is not None and STEPS in why

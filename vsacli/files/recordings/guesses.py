@@ -6,6 +6,8 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from itertools import islice
 from typing import NamedTuple
 
 from vsacli.documents.column_mapping import MappedColumn
@@ -42,9 +44,6 @@ COMMAND = "a command, not a measurement"
 
 ARRAYS = ("q", "dq", "tau_motor_1")
 """Content of the arrays of `sensor_msgs/JointState`: position, velocity, effort."""
-
-_BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
-"""Regular expression of a joint name that is recognized without a robot."""
 
 _STIFFNESS = re.compile(r"k[_ -]?\d+", re.IGNORECASE)
 """Regular expression of the whole name of a stiffness in short; gains, such as `Kp1`, do not match."""
@@ -110,6 +109,11 @@ class _Column(NamedTuple):
         return self.quantity, self.bare, self.of_motor, *words
 
     @property
+    def of_motors(self) -> bool:
+        """Whether the name speaks of motors."""
+        return any(word in MOTOR_WORDS for word in self.words)
+
+    @property
     def family(self) -> tuple[str, ...]:
         """Words of the name that are common to the same signal of other joints."""
         return tuple("#" if word.isdecimal() or len(word) == 1 else word for word in self.words)
@@ -131,24 +135,21 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
         time: column of stamps, if there is one.
         joint_names: joints of the robot that was recorded; empty if unknown.
     """
-    columns, labels = _named_columns(rows, time), _labels(rows)
-    if not rows.header.line:
-        columns, labels = _joint_states(rows, time)
+    columns, labels = (
+        (_named_columns(rows, time), _labels(rows)) if rows.header.line else _joint_states(rows, time)
+    )
     found: dict[str, Guess] = {}
+    names = JointNames(joint_names)
     if joint_names:
-        columns = [_of_motor(column, JointNames(joint_names)) for column in columns]
+        columns = [_of_motor(column, names) for column in columns]
     best = {column.signal: column.role for column in reversed(columns)}
     columns = [column for column in columns if column.role == best[column.signal]]
+    assign = partial(_of_robot, joints=names) if joint_names else _named
     for quantity in dict.fromkeys((*QUANTITIES, *VARIABLES_OF_MOTORS)):
-        if quantity == "theta":
-            continue
-        of_it = [column for column in columns if column.quantity == quantity]
+        of_it = [column for column in columns if column.quantity == quantity != "theta"]
         measured = [column for column in of_it if column.role != COMMANDED]
-        names = JointNames(joint_names)
-        assigned = list(_of_robot(measured, labels, names) if joint_names else _named(measured, labels))
-        if not assigned:  # by name or order, none of the joints has a measurement
-            assigned = list(_of_robot(of_it, labels, names) if joint_names else _named(of_it, labels))
-        for column, joint in assigned:
+        # commands only if, by name or order, none of the joints has a measurement
+        for column, joint in list(assign(measured, labels)) or assign(of_it, labels):
             source, doubt = _source(rows, column)
             command = COMMAND if column.role == COMMANDED else ""
             reasons = "; ".join(filter(None, (joint.reason, command, doubt)))
@@ -161,10 +162,8 @@ def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
     """Return columns of joints by their names: with a quantity first, then in the order of the roles."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
-    columns = [column for column in columns if column.role != ERROR]
-    columns.sort(key=lambda column: (column.bare, list(ROLES).index(column.role)))
-    columns.sort(key=lambda column: any(word in MOTOR_WORDS for word in column.words))
-    return columns
+    columns.sort(key=lambda column: (column.of_motors, column.bare, list(ROLES).index(column.role)))
+    return [column for column in columns if column.role != ERROR]
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
@@ -191,7 +190,7 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
 def _of_motor(column: _Column, joints: JointNames) -> _Column:
     """Return a column as that of a motor if its name says of which motor it is, otherwise unchanged."""
     variable = OF_MOTORS.get(column.quantity)
-    if variable is None or (column.quantity == "q" and not any(word in MOTOR_WORDS for word in column.words)):
+    if variable is None or (column.quantity == "q" and not column.of_motors):
         return column
     found = motor_of(column.words, joints)
     if found is None:
@@ -228,20 +227,21 @@ def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Colum
 
 def _of_robot(
     columns: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
-) -> Iterator[tuple[_Column, _Joint]]:
-    """Yield columns with the joints that their names indicate; if none does, one family in joint order."""
-    named, families = False, defaultdict(list)
+) -> list[tuple[_Column, _Joint]]:
+    """Return columns with the joints that their names indicate; if none does, one family in joint order."""
+    families = defaultdict(list)
     for column in columns:
         families[column.family].append(column)
-    for family in families.values():
-        for column, joint in _matched(family, labels, joints):
-            named = True
-            yield column, joint
-    for family in () if named else families.values():
-        if len(family) == len(joints.names) and not any(_is_no_joint(column) for column in family):
-            for rank, (column, name) in enumerate(zip(family, joints.names, strict=True), 1):
-                yield column, _Joint(name, f"joint {rank} of the robot, by the order alone", sure=False)
-            return
+    complete = (
+        family
+        for family in families.values()
+        if len(family) == len(joints.names) and not any(map(_is_no_joint, family))
+    )
+    return [pair for family in families.values() for pair in _matched(family, labels, joints)] or [
+        (column, _Joint(name, f"joint {rank} of the robot, by the order alone", sure=False))
+        for family in islice(complete, 1)
+        for rank, (column, name) in enumerate(zip(family, joints.names, strict=True), 1)
+    ]
 
 
 def _matched(
@@ -255,22 +255,15 @@ def _matched(
     for column in family:
         label = None if column.entry is None else labels.get(column.entry)
         if label is not None:
-            match = joints.in_words(words_of(label))
-            if match is not None:
-                found.append((column, _Joint(match.joint, f"the rows call it {label}", match.joint == label)))
+            name, reason = joints.in_words(words_of(label)), f"the rows call it {label}"
         elif column.bare:
-            name = joints.called(column.words)
-            reason = "named as the joint; taken for its position"
-            if name:
-                found.append((column, _Joint(name, reason)))
-            else:
-                unmatched.append(column)
+            name, reason = joints.called(column.words), "named as the joint; taken for its position"
         else:
-            match = joints.in_words(column.words)
-            if match is not None:
-                found.append((column, _Joint(match.joint)))
-            else:
-                unmatched.append(column)
+            name, reason = joints.in_words(column.words), ""
+        if name:
+            found.append((column, _Joint(name, reason, label in (None, name))))
+        elif label is None:
+            unmatched.append(column)
     numbered = [column for column in unmatched if any(word.isdecimal() for word in column.words)]
     shifted = len(family) == len(joints.names) or any("0" in column.words for column in numbered)
     return [] if numbered and shifted else found
@@ -282,16 +275,12 @@ def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tu
     for column in columns:
         label = None if column.entry is None else labels.get(column.entry)
         last = _SEPARATORS.split(column.before.rstrip("_-./ "))[-1]
-        if column.bare and not _BARE.fullmatch(last):
-            continue
         if label is None and _is_no_joint(column):
             continue
         rank += 1
         if label is not None:
             if IDENTIFIER.fullmatch(label):
                 yield column, _Joint(label, f"the rows call it {label}")
-        elif column.bare:
-            yield column, _Joint(last, "its name says no quantity", sure=False)
         elif column.entry is None and IDENTIFIER.fullmatch(last) and last.lower() not in GENERIC:
             yield column, _Joint(last)
         else:

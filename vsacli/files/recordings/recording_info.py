@@ -27,6 +27,7 @@ from vsacli.documents.preamble import find_surroundings
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import (
+    GUESSED,
     FirstRows,
     TimeColumn,
     read_first_rows,
@@ -102,7 +103,7 @@ def describe_recording(
     time = clock.column if clock and clock.disorder is None else None
     if rate is not None:
         rate = checked_rate(rate)
-        if time is not None and not time.guessed:
+        if time is not None and not time.reason.startswith(GUESSED):
             name = rows.columns[time.place] or time.place + 1
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
@@ -132,16 +133,24 @@ def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
     """Return the first column of stamps that increase where the joints have numbers, or nearly do."""
     clocks: list[_Clock] = []
     for column in time_columns(rows):
-        found = [guess for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN]
-        columns = {str(guess.place): MappedColumn(column=guess.place + 1, unit=AS_WRITTEN) for guess in found}
-        mapping = ColumnMapping({TIME: column.numbered, **columns}, REST, skip_rows=rows.skip_rows)
-        table = read_table(rows.path, mapping, set(mapping.columns), empty_cells=True)
-        table = table.without_empty_rows().with_joined_rows()
+        places = [guess.place for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN]
+        table = _read_columns(rows, places, column).without_empty_rows().with_joined_rows()
         stamps = _seconds(table)
         clocks.append(_Clock(column, table, stamps, find_disorder(stamps)))
         if clocks[-1].disorder is None:
             return clocks[-1]
     return min(clocks, key=lambda clock: np.count_nonzero(~(np.diff(clock.stamps) > 0)), default=None)
+
+
+def _read_columns(
+    rows: FirstRows, places: Sequence[int], time: TimeColumn | None, rate: float | None = None
+) -> Table:
+    """Return columns of all rows under their positions, as written, and the times."""
+    columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
+    if time is not None:
+        columns[TIME] = time.source
+    mapping = ColumnMapping(columns, REST, rate, rows.skip_rows)
+    return read_table(rows.path, mapping, set(columns), empty_cells=True)
 
 
 def _seconds(table: Table) -> FloatArray:
@@ -282,7 +291,7 @@ class _Survey:
         progress: Progress,
         rate: float | None,
     ) -> None:
-        self._rows, self._time, self._stated = rows, time, None if time else rate
+        self._rows, self._time = rows, time
         self._guesses = {guess.place: guess for guess in found}
         self.rows = 0
         self.time: dict[str, Any] | None = None
@@ -297,7 +306,7 @@ class _Survey:
         with progress(size) as bar:
             for first in range(0, max(1, len(numbers)), TOGETHER):
                 part = numbers[first : first + TOGETHER]
-                self._look(part, self._read(part))
+                self._look(part, _read_columns(rows, part, time, None if time else rate))
                 bar.update(size * len(part) // max(1, len(numbers)))
 
     def _unread(self, place: int) -> dict[str, Any]:
@@ -316,13 +325,6 @@ class _Survey:
             "max": math.nan,
             "rows": None,
         }
-
-    def _read(self, places: Sequence[int]) -> Table:
-        columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
-        if self._time is not None:
-            columns[TIME] = self._time.numbered
-        mapping = ColumnMapping(columns, REST, self._stated, self._rows.skip_rows)
-        return read_table(self._rows.path, mapping, set(columns), empty_cells=True)
 
     def _look(self, places: Sequence[int], table: Table) -> None:
         self.rows = len(table.values)
@@ -351,9 +353,12 @@ class _Survey:
             rate = math.nan if disorder.rate is None else disorder.rate
             duration = (len(stamps) - 1) / rate
         column, first = clock.column, clock.table.first_stamp
+        unit = (
+            "clock" if isinstance(first, str) else "ns" if column.nanoseconds else column.source.unit or "s"
+        )
         self.time = {
             "column": self._rows.columns[column.place] or column.place + 1,
-            "unit": "clock" if column.clock else column.unit_of_stamps,
+            "unit": unit,
             "unit_guessed": column.unit_guessed,
             "first": float(stamps[0]) if first is None else first,
             "duration": duration,

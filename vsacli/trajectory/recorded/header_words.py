@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
 WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
@@ -98,19 +97,7 @@ def motor_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, 
         return None
     rest = tuple(word for at, word in enumerate(words) if at != telling[-1] and word not in MOTOR_WORDS)
     numbered = all(words[at].isdecimal() for at in telling[:-1])
-    return (motor, rest) if numbered or joints.in_words(rest) is not None else None
-
-
-class Match(NamedTuple):
-    """A joint whose name was found in that of a column.
-
-    Attributes:
-        joint: name of the joint.
-        whole: whether the whole name was found, not only the part that distinguishes it from other joints.
-    """
-
-    joint: str
-    whole: bool
+    return (motor, rest) if numbered or joints.in_words(rest) else None
 
 
 class JointNames:
@@ -126,16 +113,16 @@ class JointNames:
         first, last = _common(list(self._words.values()))
         self._cores = {name: words[first : len(words) - last] for name, words in self._words.items()}
 
-    def in_words(self, words: Sequence[str]) -> Match | None:
-        """Return the joint with the longest name found in these words; None for none or for a tie."""
+    def in_words(self, words: Sequence[str]) -> str:
+        """Return the joint with the longest name found in these words; empty for none or for a tie."""
         phrase = f" {' '.join(words)} "
         for whole, of_joints in ((True, self._words), (False, self._cores)):
             there = [name for name, own in of_joints.items() if own and f" {' '.join(own)} " in phrase]
             longest = max((len(of_joints[name]) for name in there), default=0)
             found = [name for name in there if len(of_joints[name]) == longest]
             if len(found) == 1 and (whole or self._tells(of_joints[found[0]], words)):
-                return Match(found[0], whole)
-        return None
+                return found[0]
+        return ""
 
     def called(self, words: Sequence[str]) -> str:
         """Return the joint whose name is the whole column name; empty if there is none."""
