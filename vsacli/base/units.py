@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 
@@ -16,6 +16,10 @@ class Quantity:
     def unit(self, joint_type: str) -> str:
         """Return the unit at a joint of type `revolute` or `prismatic`."""
         return self.revolute if joint_type == "revolute" else self.prismatic
+
+    def of_component(self, index: int, joint_types: Sequence[str]) -> str:
+        """Return the unit at a joint, or along an axis of a wrench."""
+        return self.unit(joint_types[index])
 
     def inside(self, variant: str | None) -> Quantity:
         """Return the quantity in a record with a unit variant of its own; None is that of the joint."""
@@ -41,6 +45,10 @@ class WrenchQuantity(Quantity):
     def unit(self, _joint_type: str) -> str:
         """Return both units, whatever the joint."""
         return str(self)
+
+    def of_component(self, index: int, _joint_types: Sequence[str]) -> str:
+        """See `Quantity.of_component`."""
+        return self.of_axis(index)
 
     def of_axis(self, axis: int) -> str:
         """Return the unit of a component: three forces, then three moments."""

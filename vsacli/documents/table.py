@@ -18,7 +18,6 @@ from vsacli.documents.column_mapping import AS_NAMED, ChosenColumns, ColumnMappi
 from vsacli.documents.csv_file import (
     CHUNK,
     MAX_BYTES,
-    SEPARATORS,
     Header,
     Rows,
     filled_lines,
@@ -26,7 +25,7 @@ from vsacli.documents.csv_file import (
     read_numbers,
     split_heading,
 )
-from vsacli.documents.preamble import naming_lines_to_skip
+from vsacli.documents.preamble import NO_HEADER, naming_lines_to_skip
 from vsacli.documents.source import (
     MAX_DOCUMENT_BYTES,
     Source,
@@ -36,9 +35,6 @@ from vsacli.documents.source import (
     refuse_other_formats,
 )
 from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a_clock
-
-AT_TOP = Header(1, SEPARATORS[-1], ())
-"""Header in the first line."""
 
 SAME_STAMP = 1e-3
 """Largest difference of equal stamps, in intervals of a signal: a joint at 1 rad/s moves by 1e-5 rad within
@@ -68,7 +64,7 @@ class Table:
     columns: tuple[str, ...]
     values: FloatArray = field(repr=False)
     source: Source
-    header: Header = AT_TOP
+    header: Header = NO_HEADER
     others: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     first_stamp: int | str | None = None

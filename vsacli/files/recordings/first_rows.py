@@ -259,9 +259,8 @@ def _seconds_and_nanoseconds(rows: FirstRows) -> tuple[int, int] | None:
     for place in rows.of_numbers:
         *before, last = words[place] or ("",)
         named = [other for other in rows.of_numbers if words[other] in [(*before, rest) for rest in REST]]
-        if last not in SECONDS:
-            continue
-        if named and are_seconds_and_nanoseconds(rows.numbers(place), rows.numbers(named[0]), least=0):
+        seconds = rows.numbers(place) if last in SECONDS and named else ()
+        if seconds and are_seconds_and_nanoseconds(seconds, rows.numbers(named[0]), least=0):
             return place, named[0]
     for place in rows.of_numbers[:-1]:
         if are_seconds_and_nanoseconds(rows.numbers(place), rows.numbers(place + 1), least=1e8):

@@ -15,8 +15,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.base.units import WrenchQuantity
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH
 from vsacli.documents.csv_file import read_header
 from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
 from vsacli.results.charts.reduction import Curve
@@ -132,7 +131,7 @@ def _curve(
     ends = stated["unreliable"]
     return RecordedCurve(
         name=stated["name"] if profile.signal is WRENCH else f"{stated['name']}.{profile.signal.names[0]}",
-        unit=_unit(profile.signal, 0, member, joint_types),
+        unit=profile.signal.quantities[0].of_component(member, joint_types),
         fit=FITS.get(stated["method"], stated["method"]),
         knots=stated["knots"],
         recorded=Curve.reduced(stamps, values[steps]),
@@ -145,19 +144,11 @@ def _curve(
         spectrum=_spectrum(even, smooth + np.interp(even, time, residual), smooth, stated),
         highest=Highest(
             name=profile.signal.names[-1],
-            unit=_unit(profile.signal, -1, member, joint_types),
+            unit=profile.signal.quantities[-1].of_component(member, joint_types),
             order=profile.signal.orders - 1,
             deviation=float(stated.get("deviation", math.nan)),
         ),
     )
-
-
-def _unit(signal: Signal, order: int, member: int, joint_types: Sequence[str]) -> str:
-    """Return the unit of a value or derivative of a component."""
-    quantity = signal.quantities[order]
-    if isinstance(quantity, WrenchQuantity):
-        return quantity.of_axis(member)
-    return quantity.unit(joint_types[member])
 
 
 def _spectrum(

@@ -201,12 +201,12 @@ def _of_motor(column: _Column, joints: JointNames) -> _Column:
 
 def _labels(rows: FirstRows) -> dict[int, str]:
     """Return joint names found in the rows, as ROS writes them, by their indices in arrays."""
-    labels = {}
-    for place, column in enumerate(rows.columns):
-        words = words_of(column)
-        if len(words) > 1 and words[-2] == "name" and words[-1].isdecimal() and rows.text(place):
-            labels[int(words[-1])] = rows.text(place)
-    return labels
+    words = [words_of(column) or ("",) for column in rows.columns]
+    return {
+        int(last): rows.text(place)
+        for place, (*before, last) in enumerate(words)
+        if before[-1:] == ["name"] and last.isdecimal() and rows.text(place)
+    }
 
 
 def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Column], dict[int, str]]:

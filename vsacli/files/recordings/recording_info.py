@@ -166,7 +166,7 @@ class _Proposal:
         rows: first rows of the table.
         time: column of stamps; None if a rate stands in their place, or nothing does.
         found: likely meanings of the columns.
-        rate: rows per second, if there is no column of stamps.
+        rate: rows per second; None if there is a column of stamps, or nothing tells it.
         disorder: failure of the stamps to increase, from which this rate follows; None if they do, or if the
             rate is stated.
     """
@@ -180,8 +180,7 @@ class _Proposal:
         disorder: Disorder | None,
     ) -> None:
         self._rows, self._time, self._found = rows, time, found
-        self._rate = None if time is not None else rate
-        self._disorder = disorder
+        self._rate, self._disorder = rate, disorder
 
     def _left_out(self, taken: Sequence[Guess]) -> str | tuple[str | int, ...]:
         """Return the columns to ignore: all others, one by one if commands know some by their names."""
@@ -306,7 +305,7 @@ class _Survey:
         with progress(size) as bar:
             for first in range(0, max(1, len(numbers)), TOGETHER):
                 part = numbers[first : first + TOGETHER]
-                self._look(part, _read_columns(rows, part, time, None if time else rate))
+                self._look(part, _read_columns(rows, part, time, rate))
                 bar.update(size * len(part) // max(1, len(numbers)))
 
     def _unread(self, place: int) -> dict[str, Any]:
@@ -354,7 +353,11 @@ class _Survey:
             duration = (len(stamps) - 1) / rate
         column, first = clock.column, clock.table.first_stamp
         unit = (
-            "clock" if isinstance(first, str) else "ns" if column.nanoseconds else column.source.unit or "s"
+            "clock"
+            if isinstance(first, str)
+            else "ns"
+            if column.source.nanoseconds
+            else column.source.unit or "s"
         )
         self.time = {
             "column": self._rows.columns[column.place] or column.place + 1,

@@ -15,9 +15,8 @@ from vsacli.base.simulation_variables import measured
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.csv_file import split_heading
-from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, preferred, read_recording
+from vsacli.studies.measured.measured_columns import Measured, Recording, preferred, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 
 POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
@@ -75,24 +74,10 @@ class _RobotColumns(NamedTuple):
         return np.array([joint.has(variable) for joint in self.robot.joints])
 
 
-class RecordedColumns(NamedTuple):
-    """The columns of a recording.
-
-    Attributes:
-        columns: required columns.
-        unused: names of the others.
-        stranger: sentence on joints that the robot does not have; otherwise empty.
-        source: file as read.
-    """
-
-    columns: list[Column]
-    unused: tuple[str, ...]
-    stranger: str
-    source: Source
-
-
-def recorded_columns(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED) -> RecordedColumns:
-    """Return the required columns, the names of the others, and the file as read.
+def recorded_columns(
+    robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
+) -> tuple[list[Column], tuple[str, ...], Recording]:
+    """Return the required columns, the names of the others, and the recording as read.
 
     Args:
         robot: recorded robot.
@@ -113,8 +98,7 @@ def recorded_columns(robot: Robot, path: str | Path, mapping: ColumnMapping = AS
         columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
-    unused = (*others, *recording.others)
-    return RecordedColumns(columns, unused, recording.stranger, recording.table.source)
+    return columns, (*others, *recording.table.others), recording
 
 
 def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:

@@ -72,7 +72,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
             prevent a fit.
     """
-    recorded, unused, stranger, source = recorded_columns(robot, path, mapping)
+    recorded, unused, recording = recorded_columns(robot, path, mapping)
     needed = {place for index in range(len(robot.joints)) for place in _needed(robot, index)}
     columns = [column for column in recorded if column.place in needed] or recorded
     unused = (*(column.name for column in recorded if column.place not in needed), *unused)
@@ -92,14 +92,14 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
             arrays[MOTOR][:, index, 0] = arrays[POSITION][:, index, 0]
     return Record(
         path=str(path),
-        source=source,
+        source=recording.table.source,
         time=time,
         q=arrays[POSITION][..., 0],
         theta=arrays[MOTOR],
         tau_motor=arrays[TORQUE],
         columns={column.place: column.name for column in columns},
         unused=unused,
-        doubts=(*([stranger] if stranger else []), *doubts(columns)),
+        doubts=(*filter(None, [recording.stranger]), *doubts(columns)),
     )
 
 

@@ -19,9 +19,10 @@ from vsacli.documents.csv_file import split_heading
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
-from vsacli.trajectory.recorded.disorder import find_disorder
+from vsacli.trajectory.recorded.disorder import replace_stamps
 from vsacli.trajectory.recorded.header_problems import Header, misspellings
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
+from vsacli.trajectory.recorded.problems import time_problems
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
@@ -100,14 +101,12 @@ class Recording(NamedTuple):
     Attributes:
         time: times, (samples,) in s since the first sample.
         signals: signals in the order of the variables, then of the joints.
-        others: names of columns that are not among these variables, and that the mapping does not ignore.
-        table: table of the file.
+        table: table of the file; its `others` are not among these variables.
         stranger: sentence on joints that the subject of the recording does not have; otherwise empty.
     """
 
     time: FloatArray
     signals: tuple[Measured, ...]
-    others: tuple[str, ...]
     table: Table
     stranger: str
 
@@ -155,8 +154,8 @@ def read_recording(
         if name in places
     ]
     signals.sort(key=lambda signal: order[signal.column])
-    times = _elapsed(table, factors[names.index(TIME)], mapping.rate)
-    return Recording(times, tuple(signals), table.others, table, stranger)
+    times = _elapsed(table, names.index(TIME), factors, mapping.rate)
+    return Recording(times, tuple(signals), table, stranger)
 
 
 def _of_signals(mapping: ColumnMapping, places: Mapping[str, Place], jointed: Jointed) -> ColumnMapping:
@@ -276,17 +275,14 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 
-def _elapsed(table: Table, factor: float, rate: float | None) -> FloatArray:
+def _elapsed(table: Table, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
-    # subtraction before scaling: stamps since 1970 lose no digits
-    names = [split_heading(column)[0] for column in table.columns]
-    stamps = table.values[:, names.index(TIME)]
+    stamps = table.values[:, at]
     if len(stamps) < 2:
         rows = counted(len(stamps), "row")
         raise InputError.one(f"has {rows}; a recording needs at least 2", table.source.path)
-    disorder = find_disorder(stamps * factor)
-    if disorder is None:
-        return np.asarray((stamps - stamps[0]) * factor)
-    if disorder.is_replaced_by(rate):
-        return np.arange(len(stamps)) / (rate or 1)
-    raise InputError.one(f"time {disorder.message}", table.source.path, table.line_of(disorder.sample))
+    times, replaced = replace_stamps(stamps * factors[at], rate)
+    for problem in time_problems(times):
+        raise InputError.one(f"time {problem.message}", table.source.path, table.line_of(problem.sample or 0))
+    # subtraction before scaling: stamps since 1970 lose no digits
+    return times if replaced else np.asarray((stamps - stamps[0]) * factors[at])

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
-from vsacli.base.wrench import WRENCH_AXES, wrench_columns
+from vsacli.base.wrench import wrench_columns
 from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
@@ -175,7 +174,7 @@ def _units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:
     """Return the units of columns by name."""
     types = tuple(joints.types.values())
     return {TIME: VARIABLES[TIME].quantity.unit("")} | {
-        column: _unit(VARIABLES[quantity].quantity, quantity, index, types)
+        column: VARIABLES[quantity].quantity.of_component(index, types)
         for quantity, columns in naming.items()
         for index, column in columns.items()
     }
@@ -201,10 +200,3 @@ def unit_factors(
                 refused.append((name, str(error)))
     problems.extend(of_columns(refused))
     return factors
-
-
-def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:
-    """Return the unit of a column; the axes of a wrench are forces, then moments."""
-    if name not in WRENCH.names:
-        return quantity.unit(joint_types[index])
-    return quantity.prismatic if WRENCH_AXES[index].startswith("f") else quantity.revolute

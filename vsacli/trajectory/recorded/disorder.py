@@ -56,6 +56,14 @@ def find_disorder(stamps: FloatArray) -> Disorder | None:
     return next(filter(None, _patterns(stamps, steps)))
 
 
+def replace_stamps(stamps: FloatArray, rate: float | None) -> tuple[FloatArray, Disorder | None]:
+    """Return the times by a stated rate, 1/s, and why they replace the stamps, s; else these and None."""
+    disorder = find_disorder(stamps)
+    if rate is None or disorder is None or not disorder.is_replaced_by(rate):
+        return stamps, None
+    return np.arange(len(stamps)) / rate, disorder
+
+
 def _patterns(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None]:
     failures = np.flatnonzero(~(steps > 0))
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0

@@ -26,7 +26,7 @@ from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
-from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
+from vsacli.trajectory.recorded.disorder import Disorder, replace_stamps
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
@@ -187,12 +187,7 @@ def read_samples(
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
-    time = _si(table, layout.time)
-    replaced = find_disorder(time)
-    if replaced is not None and replaced.is_replaced_by(mapping.rate):
-        time = np.arange(len(time)) / (mapping.rate or 1)
-    else:
-        replaced = None
+    time, replaced = replace_stamps(_si(table, layout.time), mapping.rate)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     problems = [*time_problems(time), *sample_problems(records)]
     if problems:
