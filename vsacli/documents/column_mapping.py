@@ -240,8 +240,6 @@ class _Choice:
         )
 
     def _note_repeated(self, headings: Iterable[str]) -> None:
-        if not self._mapping:
-            return  # repeated names in the header were refused before
         for name, count in Counter(split_heading(heading)[0] for heading in headings).items():
             source = self._mapping.columns.get(name)
             if count > 1 and source is not None:

@@ -20,7 +20,7 @@ from vsacli.documents.table import Table, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import replace_stamps
-from vsacli.trajectory.recorded.header_problems import Header, misspellings
+from vsacli.trajectory.recorded.header_problems import ColumnNames, misspellings
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 from vsacli.trajectory.recorded.problems import time_problems
 
@@ -138,7 +138,7 @@ def read_recording(
     names = [name for name, _ in headings]
     unknown = [name for name, _ in map(split_heading, table.others) if role_of(name)[0] != COMMANDED]
     expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
-    header = Header(
+    header = ColumnNames(
         (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, USE_OPTION
     )
     stranger = _other_joints(header, places, robot)
@@ -221,7 +221,7 @@ MOST_NAMED = 7
 """Largest number of joints of a robot that a message lists."""
 
 
-def _other_joints(header: Header, places: Mapping[str, Place], robot: str) -> str:
+def _other_joints(header: ColumnNames, places: Mapping[str, Place], robot: str) -> str:
     """Return a sentence on columns of joints that the robot does not have; empty without any."""
     endings = {name.rpartition(".")[2] for name in places if "." in name}
     own = tuple(f"{joint}." for joint in header.joint_names)
@@ -239,7 +239,7 @@ def _other_joints(header: Header, places: Mapping[str, Place], robot: str) -> st
     )
 
 
-def _unusable(header: Header, places: Mapping[str, Place], stranger: str) -> Iterator[str]:
+def _unusable(header: ColumnNames, places: Mapping[str, Place], stranger: str) -> Iterator[str]:
     """Yield problems of the header of a recording.
 
     Args:
@@ -259,7 +259,7 @@ def _unusable(header: Header, places: Mapping[str, Place], stranger: str) -> Ite
             yield f"columns {other!r} and {name!r} are the same signal; keep one"
 
 
-def _no_column(header: Header, places: Mapping[str, Place]) -> str:
+def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
     """Return that no column of a recording is known, with the nearest or some possible names."""
     first: dict[str, str] = {}
     for name, place in places.items():

@@ -16,7 +16,7 @@ from vsacli.documents.csv_file import of_columns, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
-from vsacli.trajectory.recorded.header_problems import Header
+from vsacli.trajectory.recorded.header_problems import ColumnNames
 
 Naming = dict[str, dict[int, str]]
 """Names of the columns of each quantity, by index of the joint or wrench axis."""
@@ -59,16 +59,16 @@ class ColumnLayout:
 
 def known_columns(joints: CommandedJoints) -> set[str]:
     """Return all possible column names of a recorded trajectory of these joints."""
-    return _known(_of_every_joint(joints))
+    return {
+        TIME,
+        *_all(_WRENCH_NAMING),
+        *(name for naming in _of_every_joint(joints) for name in _all(naming)),
+    }
 
 
 def _of_every_joint(joints: CommandedJoints) -> list[Naming]:
     """Return both namings of columns, as if every signal commanded all joints."""
     return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in NAMINGS]
-
-
-def _known(namings: Sequence[Naming]) -> set[str]:
-    return {TIME, *_all(_WRENCH_NAMING), *(column for naming in namings for column in _all(naming))}
 
 
 def column_layout(
@@ -96,14 +96,13 @@ def column_layout(
     """
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
-    of_every_joint = _of_every_joint(joints)
     namings = [_columns(pattern, joints) for pattern in NAMINGS]
     used = [naming for naming in namings if any(column in names for column in _all(naming))]
     naming = used[0] if used else namings[0]
     expected = [TIME, *_all(naming), *(_all(_WRENCH_NAMING) if WRENCH in wanted else ())]
 
     renaming = f"use a trajectory file as printed by vsacli info {file}"
-    found = Header(names, _known(of_every_joint), expected, joints.names, file, renaming)
+    found = ColumnNames(names, known_columns(joints), expected, joints.names, file, renaming)
     if found.is_foreign:
         examples = ", ".join(expected[:2])
         advice = (
@@ -128,7 +127,12 @@ def column_layout(
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     of_signals = {
-        key: {column for each in of_every_joint for name in signal.names for column in each[name].values()}
+        key: {
+            column
+            for each in _of_every_joint(joints)
+            for name in signal.names
+            for column in each[name].values()
+        }
         for key, signal in COMMANDED.items()
     }
     return _layout(names, columns, naming, of_signals)

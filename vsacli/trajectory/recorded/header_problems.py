@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,7 +27,7 @@ _PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
 
 @dataclass(frozen=True)
-class Header:
+class ColumnNames:
     """The names of the columns of a table, compared with those that are expected.
 
     Attributes:
@@ -81,11 +80,10 @@ class Header:
         return [name for name in self.names if name not in {*self.known, *self.parenthesised, *self.meant}]
 
     def of_names(self) -> Iterator[str]:
-        """Yield problems of names: misspellings, units in parentheses, names that occur twice."""
+        """Yield problems of names: misspellings and units in parentheses."""
         yield from misspellings(self.meant)
         for name, found in self.parenthesised.items():
             yield f"{name!r}: units are written in square brackets, {found['name']} [{found['unit']}]"
-        yield from (f"column {name!r} appears {n} times" for name, n in Counter(self.names).items() if n > 1)
 
     def of_strangers(self) -> Iterator[str]:
         """Yield one problem for all unknown columns, if there are any."""
