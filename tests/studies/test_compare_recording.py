@@ -331,6 +331,15 @@ BAD = {
         "stamp,base.q\n0,1\n1,2\n",
         [],
     ),
+    "there is no column 'time'; if the rows are equally spaced, give their rate in a file for --columns": (
+        "base.q\n0\n1\n",
+        [],
+    ),
+    "'base.q (deg)': units are written in square brackets, base.q [deg]": (
+        "time,base.q (deg),elbow.q\n0,1,1\n1,2,2\n",
+        [],
+    ),
+    "m.csv:1: column 'base.q' appears 2 times": ("time,base.q,base.q [deg]\n0,1,1\n1,2,2\n", []),
     "m.csv:1: unknown column 'bose.q'; did you mean 'base.q'?": (
         "time,bose.q\n0,1\n1,2\n",
         [],
@@ -347,6 +356,7 @@ BAD = {
         "time,base.q\n0,1\n1,2\n1,3\n",
         [],
     ),
+    "m.csv:4: time must be finite, not nan": ("time,base.q\n,\n0,1\n,2\n2,3\n", []),
     "has 1 row; a recording needs at least 2": ("time,base.q\n0,1\n", []),
     "[N] is a force, expected an angle in rad, deg or rev": ("time,base.q [N]\n0,1\n1,2\n", []),
     "columns 'base.q' and 'q1' are the same signal; keep one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),

@@ -82,9 +82,14 @@ class Table:
         """Return the line number of a row counted from 0; 0 if the file no longer exists."""
         return self.lines.of(row)
 
-    def without_empty_rows(self) -> Table:
-        """Return the rows with a number in any column but the time; others are of other topics of a log."""
-        there = ~np.isnan(self.values[:, self._signals]).all(axis=1)
+    def without_empty_rows(self, *, stamped: bool = False) -> Table:
+        """Return the rows with a number in any column but the time; others are of other topics of a log.
+
+        Args:
+            stamped: whether to keep rows with no number but the time, which may be the beginning of the log.
+        """
+        cells = self.values if stamped else self.values[:, self._signals]
+        there = ~np.isnan(cells).all(axis=1)
         if there.all() or not there.any():
             return self
         return replace(self, values=self.values[there], kept=np.flatnonzero(there))

@@ -27,9 +27,6 @@ from vsacli.trajectory.recorded.problems import time_problems
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
 
-USE_OPTION = "use --columns"
-RATE_OF_ROWS = "if the rows are equally spaced, give their rate in a file for --columns"
-
 
 class Jointed(Protocol):
     """The subject of a recording: a result, or a robot."""
@@ -133,13 +130,14 @@ def read_recording(
     """
     places = known_columns(jointed, wanted)
     mapping = _of_signals(mapping, places, jointed)
-    table = read_table(path, mapping, {TIME, *places}, empty_cells=True).with_joined_rows()
+    table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
+    table = table.without_empty_rows(stamped=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
     unknown = [name for name, _ in map(split_heading, table.others) if role_of(name)[0] != COMMANDED]
     expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
     header = ColumnNames(
-        (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, USE_OPTION
+        (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, "use --columns"
     )
     stranger = _other_joints(header, places, robot)
     problems = list(_unusable(header, places, stranger))
@@ -251,7 +249,7 @@ def _unusable(header: ColumnNames, places: Mapping[str, Place], stranger: str) -
         yield stranger or _no_column(header, places)
         return
     yield from header.of_names()
-    yield from header.of_time(RATE_OF_ROWS)
+    yield from header.of_time("if the rows are equally spaced, give their rate in a file for --columns")
     first: dict[Place, str] = {}
     for name in filter(places.get, header.names):
         other = first.setdefault(places[name]._replace(unit="", gear=1.0), name)
@@ -266,7 +264,7 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
         first.setdefault(place.variable, name)
     usual = [first[name] for name in USUAL if name in first] or list(first.values())[:2]
     near = [f"; {name!r} may be {meant!r}" for name, meant in header.meant.items() if meant in places]
-    hint = f"{''.join(near[:1])}; if they have other names, {USE_OPTION}"
+    hint = f"{''.join(near[:1])}; if they have other names, {header.renaming}"
     return f"expected columns such as {', '.join([TIME, *usual])}{hint}"
 
 

@@ -119,12 +119,8 @@ def _repeats(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | No
         return None
     first, last = (np.flatnonzero(steps > 0)[[0, -1]] + 1).tolist()  # rows where a stamp begins
     fine = steps[: max(0, start - 1)]
-    if len(fine) >= ENOUGH_STEPS:
-        rate = rounded_rate(1 / float(fine.mean()))
-    else:
-        rate = (
-            rounded_rate((last - first) / float(stamps[last] - stamps[first])) if last > first else math.nan
-        )
+    even = fine if len(fine) >= ENOUGH_STEPS else steps[first:last]
+    rate = rounded_rate(len(even) / float(even.sum())) if len(even) else math.nan
     cause = (
         f"{counted(repeated, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: stamps with too"
         f" few digits, in steps of {grain:.3g} s"
