@@ -132,7 +132,7 @@ def random_task(seed: int) -> Task | None:
     name = str(rng.choice(names))
     free = Trajectory(times, position, _stiffness(np.where(chosen, 1e4, np.nan), 0.0, span), name="random")
     dense = compute_block(robot, free.at(np.linspace(*span, 401)))
-    level = np.where(chosen, rng.uniform(1.2, 2.0, count) * np.nanmax(dense.stiffness_min, axis=0), np.nan)
+    level = np.where(chosen, rng.uniform(1.2, 2.0, count) * np.fmax.reduce(dense.stiffness_min), np.nan)
     if not np.isfinite(level[chosen]).all() or (level[chosen] <= 0).any():
         return None
     stiffness = _stiffness(level, 0.05, span)
@@ -245,6 +245,17 @@ def test_a_sample_over_its_limit_by_rounding_does_not_hide_a_peak(
         "elbow: position is 0.4243 rad at t = 4.500 s, between two samples, above its limit of" in outcome.out
     )
     assert (outcome.code, stated) == ((3, True) if bound < 0.43 else (0, False))
+
+
+def test_a_peak_between_samples_that_keep_the_limit_has_a_cause_and_a_fix(
+    vsacli: Callable[..., Outcome], own_folder: Path
+) -> None:
+    (own_folder / "swinging.yaml").write_text(SWINGING)
+    limits = "joints.elbow.limits={velocity: 0.65}"
+    inputs = REPOSITORY / "robots/vsa_3r.yaml", "swinging.yaml", "--set", limits
+    out = vsacli("check-feasibility", *inputs, "--fixes").out
+    assert "elbow: velocity is -0.6664 rad/s at t = 1.500 s, below its limit of -0.65 rad/s" in out
+    assert "1. slow down by a factor " in out
 
 
 @pytest.mark.parametrize("bound", ["107.5174037996141", "107.5174037996142", "107.5174038"])

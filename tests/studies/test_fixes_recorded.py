@@ -14,12 +14,16 @@ from vsacli import Robot, Trajectory, fixes, inverse_dynamics, load_trajectory
 from vsacli.robot.joint import Limits
 from vsacli.studies.search import Fix
 from vsacli.studies.search.changed_motion import with_changed_stiffness
+from vsacli.trajectory.times import ResampledTimes
 
 VARIABLES = {"max_torque": "tau_motor", "max_velocity": "dtheta", "position": "q", "velocity": "dq"}
 """What limits bound."""
 
 NOISE = 2e-4
 """Standard deviation of the samples, rad."""
+
+DENSE = 4000
+"""Hz: twenty samples in each interval of a recording."""
 
 SEEDS, QUICK = 20, (2, 3)
 STEP = 1 / 400
@@ -36,8 +40,12 @@ def recorded_swing(seed: int) -> Trajectory:
 
 
 def limited(robot: Robot, trajectory: Trajectory, limit: str, deviations: float) -> Robot:
-    """With a limit that the motion exceeds by some standard deviations, and nowhere by more of them."""
-    result, name = inverse_dynamics(robot, trajectory), VARIABLES[limit]
+    """With a limit that the motion exceeds by some standard deviations, and nowhere by more of them.
+
+    Peaks between the samples count as well, so the limit is set where the motion is sampled densely.
+    """
+    dense = trajectory.sampled(ResampledTimes(*trajectory.times.span, DENSE))
+    result, name = inverse_dynamics(robot, dense), VARIABLES[limit]
     bound = float(np.max(np.abs(getattr(result, name)) - deviations * getattr(result, f"{name}_std")))
     (joint,) = robot.joints
     if limit.startswith("max"):

@@ -80,8 +80,11 @@ def fixes(
         if asked.falls_short(as_it_is) is not None:
             refuse_damped_transmissions(robot, trajectory, "fixes")
         return Fixes(min_margin)
-    if not acceptance.refused_joints(trajectory).any() and asked.falls_short(as_it_is) is None:
-        return Fixes(min_margin)
+    if not acceptance.refused_joints(trajectory).any():
+        short = asked.falls_short(as_it_is)
+        if short is None:
+            return Fixes(min_margin)
+        asked = replace(asked, acceptance=replace(acceptance, between=short))
     found_causes = dict(causes(asked))
     with progress(len(ALONE) + len(COMBINED)) as bar:
         searches = Countdown(bar.update, len(ALONE) + len(COMBINED))
