@@ -388,9 +388,10 @@ class _Survey:
         if role_of(self._rows.columns[place])[0] in (COMMANDED, ERROR) or not np.all(np.diff(stamps) > 0):
             return
         guess = self._guesses.get(place)
-        angle = guess is not None and guess.quantity == "q"
+        angle, taken = (guess is not None and guess.quantity in some for some in (("q",), TAKEN))
         name = self._rows.columns[place] or f"column {place + 1}"
-        for first, sentence in column_faults(stamps, elapsed_times(stamps), values, angle=angle):
+        time = elapsed_times(stamps)
+        for first, sentence in column_faults(stamps, time, values, angle=angle, left_out=taken):
             line = table.line_of(int(rows[first]))
             self.warnings.append(f"{self._file}:{line}: {name} {sentence}")
 

@@ -102,7 +102,13 @@ USED = (
 
 
 def column_faults(
-    stamps: FloatArray, time: FloatArray, values: FloatArray, unit: str = "", *, angle: bool = False
+    stamps: FloatArray,
+    time: FloatArray,
+    values: FloatArray,
+    unit: str = "",
+    *,
+    angle: bool = False,
+    left_out: bool = False,
 ) -> Iterator[tuple[int, str]]:
     """Yield the first sample of each kind of fault of a column, and a sentence without its subject.
 
@@ -112,8 +118,10 @@ def column_faults(
         values: column, (samples,), more than four samples.
         unit: unit of its values, after a space.
         angle: whether the values may be wrapped angles.
+        left_out: whether outliers are left out where the column is used.
     """
-    yield from _check_values(stamps, time, values, unit, USED, angle=angle)[1]
+    ends = LEFT_OUT if left_out else USED
+    yield from _check_values(stamps, time, values, unit, ends, angle=angle)[1]
 
 
 _ColumnCheck = tuple[Outliers | None, list[tuple[int, str]]]
