@@ -119,25 +119,25 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
 def derivative_outliers(
     time: FloatArray, lower: FloatArray | None, values: FloatArray, quantization: Quantization
 ) -> Outliers | None:
-    """Return the outliers of a given derivative.
+    """Return the outliers of a given derivative that the next lower one contradicts.
 
-    The derivative of an encoder's steps has peaks that are outliers of a smooth curve, and yet as recorded.
-    They are equal to a difference of neighboring samples of what was differentiated.
+    Kinks of a motion, and differences of an encoder's steps, are outliers of a smooth curve and yet true:
+    they are nearer to a difference of neighboring samples of what was differentiated than the curve is.
 
     Args:
         time: times, (samples,), s.
-        lower: derivative of the next lower order, (samples,); None if it is not given.
+        lower: derivative of the next lower order, (samples,); None if it is not given, so that none is sure.
         values: derivative, (samples,).
         quantization: its resolution.
     """
-    off = outliers(time, values, quantization)
+    off = None if lower is None else outliers(time, values, quantization)
     if off is None or lower is None:
-        return off
+        return None
     at = np.clip(off.first, 1, len(time) - 2)
     spans = [(at - 1, at), (at, at + 1), (at - 1, at + 1)]
-    slopes = [_speed(time, lower, *span) for span in spans]
-    distance = np.min([np.abs(values[off.first] - slope) for slope in slopes], axis=0)
-    return off.except_for(distance < DIFFERENCED * off.sizes)
+    slopes = np.array([_speed(time, lower, *span) for span in spans])
+    of_value, of_curve = (np.abs(slopes - row).min(axis=0) for row in (values[off.first], off.curve))
+    return off.except_for(of_value <= np.maximum(of_curve, DIFFERENCED * off.sizes))
 
 
 class _Event(NamedTuple):
