@@ -271,10 +271,10 @@ def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
     lines = None if part.smoothing is None else part.smoothing.lines
     if lines and (lines.hum or lines.others):
         return None
-    missed = left_out_motion(record.time, record.values[part.members[0]] - part.spline(record.time)[:, 0])
+    member = int(part.members[0])
+    missed = left_out_motion(record.time, record.values[member] - part.spline(record.time)[:, 0])
     if missed is None:
         return None
-    member = int(part.members[0])
     free = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
     noise = followed_noise(free.spline, free.inside, _interval(record), record.order)
     explained = noise.share and _size(free, record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])

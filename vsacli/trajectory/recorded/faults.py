@@ -130,8 +130,7 @@ def derivative_outliers(
         values: derivative, (samples,).
         quantization: its resolution.
     """
-    off = None if lower is None else outliers(time, values, quantization)
-    if off is None or lower is None:
+    if lower is None or (off := outliers(time, values, quantization)) is None:
         return None
     at = np.clip(off.first, 1, len(time) - 2)
     spans = [(at - 1, at), (at, at + 1), (at - 1, at + 1)]
