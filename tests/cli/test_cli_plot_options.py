@@ -10,7 +10,7 @@ import pytest
 from samples.command_line import contents
 from samples.marks import slow
 
-from vsacli.results.store.study_table import FORMAT
+from vsacli.base import file_formats
 
 OF_JOINTS = ("q", "stiffness", "tau_motor", "tau_e", "elastic_energy", "motor_energy", "dtheta", "phi")
 NAMES = ("motion", "motor-torque", "elastic-torque", "energy")
@@ -88,7 +88,7 @@ def test_results_without_a_number_are_compared(vsacli, tmp_path, feasible_result
 
 def test_studies_have_no_joints_to_choose(vsacli, tmp_path):
     with h5py.File(tmp_path / "s.h5", "w") as file:
-        file.attrs["format"] = FORMAT
+        file.attrs["format"] = file_formats.STUDY_TABLE
     done = vsacli("plot", "s.h5", "--joints", "elbow")
     assert (done.code, done.err.splitlines()[-1]) == (
         2,

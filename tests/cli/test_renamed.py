@@ -9,10 +9,9 @@ import pytest
 from samples.command_line import REST_TO_REST, ROBOT
 
 from vsacli.base import did_you_mean as module
-from vsacli.base import renamed
+from vsacli.base import file_formats, renamed
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.renamed import RENAMINGS, Renaming
-from vsacli.results.store.schema import FORMAT
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +45,8 @@ def test_a_result_of_an_older_format_is_refused_and_its_inputs_come_out(vsacli, 
         file.attrs["format"] = "vsacli-result/1"
     outcome = vsacli(*command, "before.h5")
     assert outcome.code == 2
-    expected = f"before.h5: has the format vsacli-result/1, but this version reads {FORMAT}; run invdyn again"
+    reads = f"but this version reads {file_formats.RESULT}; run invdyn again"
+    expected = f"before.h5: has the format vsacli-result/1, {reads}"
     assert expected in outcome.err
     assert vsacli("info", "before.h5", "--extract", "inputs").code == 0
     files = sorted(path.name for path in (own_folder / "inputs").rglob("*.yaml"))

@@ -16,8 +16,8 @@ from samples.command_line import REPOSITORY, ROBOT, rest_to_rest, without_hint
 from samples.marks import slow, slow_but
 
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.files.info.describe import describe_trajectory
 from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bound, static_load
+from vsacli.files.info.trajectory_info import describe_trajectory
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Joint, Limits, Pose
 from vsacli.robot.kinematics import tip_position

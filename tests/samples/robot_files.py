@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import yaml
 
+from vsacli.base import file_formats
 from vsacli.documents.fields import declared
 from vsacli.documents.record_values import json_value
 from vsacli.documents.table import Table
-from vsacli.robot.file import FORMAT
 from vsacli.robot.model import Robot
 
 
@@ -40,7 +40,7 @@ def tables(content: Any) -> Iterator[Table]:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file, and its tables where their paths are relative to it."""
-    path.write_text(yaml.safe_dump({"format": FORMAT, **fields(robot)}))
+    path.write_text(yaml.safe_dump({"format": file_formats.ROBOT, **fields(robot)}))
     for table in tables(robot):
         header = ",".join(table.columns)
         np.savetxt(

@@ -23,7 +23,7 @@ from vsacli.analysis.trouble_text import (
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.tables import ReportText, headline
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, warnings_and_notes
 
 _AT_A_ROW = re.compile(r":\d+: |^\w+\[\d+")
 """Regular expression of a warning on a row of a file or a sample of an array."""
@@ -93,15 +93,15 @@ class Report(Stored):
         others = [warning for warning in self.warnings if not self._is_cause(warning)]
         found = [
             *self._failed_check(),
-            *text.warnings_and_notes(first, ()),
+            *warnings_and_notes(first, ()),
             *findings(self.joints, self.samples),
             *text.stops(self.joints, self.drifts),
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *text.warnings_and_notes(others, ()),
+            *warnings_and_notes(others, ()),
             *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in others) else []),
-            *text.warnings_and_notes((), self.notes),
+            *warnings_and_notes((), self.notes),
         ]
         lines = [
             *text.start(self.joints),

@@ -61,12 +61,6 @@ ROUNDING_SHARE = 1e-9
 """Share of the largest velocity of any motor that may be rounding, for a joint held still."""
 
 
-def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
-    """Yield one line for each warning and each note, labeled."""
-    yield from (f"warning: {warning}" for warning in warnings)
-    yield from (f"note: {note}" for note in notes)
-
-
 def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
     """Return a table of peaks, commanded and attainable stiffness, below its header with units."""
     types = [joint.type for joint in joints]

@@ -9,6 +9,12 @@ from functools import cache
 from typing import Any
 
 
+def import_from(home: str) -> Any:
+    """Import an object from its home, "module:name"."""
+    module, _, name = home.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
 class LazyRegistry(Mapping[str, Any]):
     """Objects by name, each imported when it is looked up; listing the names imports nothing.
 
@@ -20,8 +26,7 @@ class LazyRegistry(Mapping[str, Any]):
         self.homes = dict(homes)
 
     def __getitem__(self, name: str) -> Any:
-        module, _, thing = self.homes[name].partition(":")
-        return getattr(importlib.import_module(module), thing)
+        return import_from(self.homes[name])
 
     def name_of(self, cls: type) -> str:
         """Return the name of a registered class, without importing anything.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
@@ -154,3 +154,9 @@ def shown(content: Any) -> Any:
         case Sequence():
             return [shown(value) for value in content]
     return content
+
+
+def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
+    """Yield one line for each warning and each note, labeled."""
+    yield from (f"warning: {warning}" for warning in warnings)
+    yield from (f"note: {note}" for note in notes)

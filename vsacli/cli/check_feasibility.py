@@ -109,10 +109,11 @@ def check_feasibility(
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.search import check_fixed_target, fixes
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
+            from vsacli.studies.search import check_fixed_target
+
             check_fixed_target(output, outputs)
         run = Run(
             *inputs,
@@ -130,6 +131,8 @@ def check_feasibility(
             report = _compute_and_draw(run, figures, run_stem(robot, trajectory), outputs, talk)
         found = None
         if list_fixes or output is not None:
+            from vsacli.studies.search import fixes
+
             progress = partial(talk.progress, shown_from=0, label="searching")
             found = fixes(*inputs, min_margin, progress=progress)
         if found is not None and output is not None and number is not None:

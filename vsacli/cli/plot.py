@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from vsacli.base import file_formats
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -185,22 +186,19 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
 
 def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
     """Draw results, simulations, study tables or a sensitivity analysis."""
-    from vsacli.results.store.schema import SENSITIVITY
-    from vsacli.results.store.study_table import FORMAT
-
     kind = _kind_of(paths)
-    if kind in (FORMAT, SENSITIVITY) and shown != _EVERYTHING:
-        words = "study tables" if kind == FORMAT else "sensitivity files"
+    if kind in (file_formats.STUDY_TABLE, file_formats.SENSITIVITY) and shown != _EVERYTHING:
+        words = "study tables" if kind == file_formats.STUDY_TABLE else "sensitivity files"
         raise click.UsageError(f"{shown.option} cannot be used with {words}; leave it out")
-    if kind == SENSITIVITY:
+    if kind == file_formats.SENSITIVITY:
         _draw_ranking(paths, target, talk)
     elif target.place.file_format == PAGE:
         from vsacli.cli.plot_page import write_page
 
         if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
             raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
-        write_page(paths, None if kind == FORMAT else shown.span, *target, talk)
-    elif kind == FORMAT:
+        write_page(paths, None if kind == file_formats.STUDY_TABLE else shown.span, *target, talk)
+    elif kind == file_formats.STUDY_TABLE:
         _draw_studies(paths, target)
     elif len(paths) == 1:
         _draw_file(paths[0], shown, target, talk)
@@ -257,11 +255,10 @@ def _kind_of(paths: list[Path]) -> str | None:
         click.UsageError: some files are study tables, and others are not.
     """
     from vsacli.results.store.reader import stored_format
-    from vsacli.results.store.study_table import FORMAT
 
     there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
     formats = [stored_format(path) for path in there]
-    are = [each == FORMAT for each in formats]
+    are = [each == file_formats.STUDY_TABLE for each in formats]
     if any(are) and not all(are):
         table, other = there[are.index(True)], there[are.index(False)]
         raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")

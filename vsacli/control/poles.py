@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from vsacli.base import file_formats
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
@@ -14,7 +15,6 @@ from vsacli.documents.fields import Items, Record, check_fields, text, value
 from vsacli.documents.reading import read_document
 from vsacli.robot.model import Robot
 
-FORMAT = "vsacli-poles/1"
 DEFAULT = "-20"
 """Default of all poles, 1/s: errors settle within half a second."""
 
@@ -87,7 +87,7 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
     Raises:
         InputError: the file has problems.
     """
-    document, source = read_document(path, PolesFile, FORMAT)
+    document, source = read_document(path, PolesFile, file_formats.POLES)
     given = {joint.name: joint for joint in document.joints}
     for name in given.keys() - set(robot.joint_names):
         hint = did_you_mean(name, robot.joint_names)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vsacli.base import file_formats
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.units import DIMENSIONLESS, RATE
 from vsacli.documents import tree
@@ -34,8 +35,6 @@ from vsacli.documents.number import evaluate
 from vsacli.documents.reading import read_document
 from vsacli.documents.time_column import TIME
 from vsacli.documents.tree import INVALID, Node, Scope
-
-FORMAT = "vsacli-columns/1"
 
 
 class ColumnName(OwnKind):
@@ -193,7 +192,7 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
     """
     if path is None:
         return AS_NAMED
-    document, _ = read_document(path, ColumnsFile, FORMAT)
+    document, _ = read_document(path, ColumnsFile, file_formats.COLUMNS)
     return ColumnMapping(
         document.columns or {}, document.ignore or (), document.rate, document.skip_rows or ()
     )

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import enum
 import os
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from vsacli.base import file_formats
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
+from vsacli.base.lazy import import_from
 from vsacli.base.storage import place_of
 from vsacli.base.version import __version__
-from vsacli.control import poles
-from vsacli.documents import columns_file, tree
-from vsacli.documents.json_schema import json_schema
+from vsacli.documents import tree
 from vsacli.documents.source import (
     HDF5_SIGNATURE,
     Problems,
@@ -27,9 +26,6 @@ from vsacli.documents.source import (
     recognizing_other_formats,
 )
 from vsacli.documents.tree import parse_yaml
-from vsacli.robot import file as robot_file
-from vsacli.studies.sweeps import study_file
-from vsacli.trajectory import file as trajectory_file
 
 
 class FileKind(enum.StrEnum):
@@ -48,31 +44,42 @@ class FileKind(enum.StrEnum):
     COLUMNS = "columns"
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """A kind of YAML file.
 
     Attributes:
-        format: value of the key `format`.
-        record: record class of the whole document.
-        title: short description.
+        format: Value of the key `format`.
+        home: Record class of the whole document, "module:name"; imported for its schema only.
+        title: Short description.
     """
 
     format: str
-    record: type
+    home: str
     title: str
+
+    @property
+    def record(self) -> type:
+        """Record class of the whole document."""
+        record: type = import_from(self.home)
+        return record
 
     def schema(self) -> dict[str, Any]:
         """Return the JSON Schema, draft 2020-12."""
+        from vsacli.documents.json_schema import json_schema
+
         return json_schema(self.record, self.format, self.title)
 
 
 DOCUMENTS = {
-    "robot": Document(robot_file.FORMAT, robot_file.RobotFile, "robot of vsacli"),
-    "trajectory": Document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, "trajectory of vsacli"),
-    "poles": Document(poles.FORMAT, poles.PolesFile, "poles of a vsacli controller"),
-    "study": Document(study_file.FORMAT, study_file.StudyFile, "study of vsacli"),
-    "columns": Document(columns_file.FORMAT, columns_file.ColumnsFile, "columns of recordings for vsacli"),
+    "robot": Document(file_formats.ROBOT, "vsacli.robot.file:RobotFile", "robot of vsacli"),
+    "trajectory": Document(
+        file_formats.TRAJECTORY, "vsacli.trajectory.file:OF_ANY_ROBOT", "trajectory of vsacli"
+    ),
+    "poles": Document(file_formats.POLES, "vsacli.control.poles:PolesFile", "poles of a vsacli controller"),
+    "study": Document(file_formats.STUDY, "vsacli.studies.sweeps.study_file:StudyFile", "study of vsacli"),
+    "columns": Document(
+        file_formats.COLUMNS, "vsacli.documents.columns_file:ColumnsFile", "columns of recordings for vsacli"
+    ),
 }
 """Kinds of documents, by name."""
 
@@ -124,13 +131,12 @@ def _is_catalog(path: str | os.PathLike[str]) -> bool:
 
 
 def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
-    from vsacli.results.store import schema, study_table
     from vsacli.results.store.reader import other_version, stored_format
 
     kinds = {
-        schema.FORMAT: (FileKind.RESULT, "invdyn"),
-        schema.SIMULATION: (FileKind.SIMULATION, "simulate"),
-        study_table.FORMAT: (FileKind.STUDY_TABLE, "study"),
+        file_formats.RESULT: (FileKind.RESULT, "invdyn"),
+        file_formats.SIMULATION: (FileKind.SIMULATION, "simulate"),
+        file_formats.STUDY_TABLE: (FileKind.STUDY_TABLE, "study"),
     }
     found = stored_format(Path(path)) or ""
     if found in kinds:

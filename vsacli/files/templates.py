@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.actuators.kinds import example
+from vsacli.base import file_formats
 from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
@@ -143,7 +144,7 @@ def robot_template(
         "gravity": [0, 0, -9.81],
         "joints": [_joint(number, *joint) for number, joint in enumerate(chosen)],
     }
-    return commented_document(robot_file.FORMAT, robot_file.RobotFile, values, ROBOT_HEAD, SOURCES)
+    return commented_document(file_formats.ROBOT, robot_file.RobotFile, values, ROBOT_HEAD, SOURCES)
 
 
 def _joint_types(letters: str) -> list[str]:
@@ -233,7 +234,7 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
 
 def _trajectory_document(values: Values, remark: str = "") -> str:
     head = (*TRAJECTORY_HEAD, *textwrap.wrap(remark, WIDTH - 2))
-    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, head)
+    return commented_document(file_formats.TRAJECTORY, trajectory_file.OF_ANY_ROBOT, values, head)
 
 
 def _position(robot: Robot) -> Values:

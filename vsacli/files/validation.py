@@ -1,30 +1,24 @@
-"""All problems of files of any kind; each file is checked as by the command that reads it."""
+"""All problems of files of any kind; each file is checked as by the command that reads it.
+
+The reader of a kind is imported for a file of this kind, since all readers take longer to import than a robot
+to check.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from vsacli.actuators.laws.table import MeasuredSpring
+from vsacli.base import file_formats
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import counted, listed
-from vsacli.control.poles import FORMAT, PolesFile, load_gains
-from vsacli.documents.columns_file import load_columns
-from vsacli.documents.csv_file import read_header
-from vsacli.documents.reading import read_document
-from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognize
-from vsacli.files.limits_of_motion import unattainable
-from vsacli.files.placeholder_robot import placeholder_robot
-from vsacli.results.store.reader import open_stored
-from vsacli.results.store.study_table import StoredStudy
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.reader import read_urdf
-from vsacli.studies.sweeps.study import load_study
-from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.trajectory.trajectory import Trajectory
 
 MOST_ROBOTS_SHOWN = 3
 SPRING_COLUMNS = {"deflection", "torque"}
@@ -133,6 +127,10 @@ def _robot(path: str, robots: Robots) -> Checked:
 
 
 def _trajectory(path: str, robots: Robots) -> Checked:
+    from vsacli.files.limits_of_motion import unattainable
+    from vsacli.files.placeholder_robot import placeholder_robot
+    from vsacli.trajectory.file import load_trajectory
+
     if not robots:
         return _described(path, load_trajectory(path, placeholder_robot(path).robot), [WITHOUT_ROBOT])
 
@@ -152,7 +150,10 @@ def _described(path: str, trajectory: Trajectory, notes: Iterable[str]) -> Check
 
 
 def _poles(path: str, robots: Robots) -> Checked:
-    document, _ = read_document(path, PolesFile, FORMAT)
+    from vsacli.control.poles import PolesFile
+    from vsacli.documents.reading import read_document
+
+    document, _ = read_document(path, PolesFile, file_formats.POLES)
     summary = f"poles of {counted(len(document.joints), 'joint')}"
     if not robots:
         return _usable(path, summary, notes=[WITHOUT_ROBOT])
@@ -162,6 +163,8 @@ def _poles(path: str, robots: Robots) -> Checked:
 
 def _gains(path: str, robot: Robot) -> Any:
     """Return gains with or without integral action, which requires one more pole."""
+    from vsacli.control.poles import load_gains
+
     try:
         return load_gains(path, robot, integral=False)
     except InputError:
@@ -196,6 +199,10 @@ def _misfit(path: str, robots: int, best: str) -> Iterator[Problem]:
 
 
 def _table(path: str, robots: Robots) -> Checked:
+    from vsacli.actuators.laws.table import MeasuredSpring
+    from vsacli.documents.csv_file import read_header
+    from vsacli.documents.table import read_table
+
     if set(read_header(path).columns) != SPRING_COLUMNS:
         return _trajectory(path, robots)
     table = read_table(path)
@@ -211,6 +218,8 @@ def _catalog(path: str, _: Robots) -> Checked:
 
 
 def _urdf(path: str, _: Robots) -> Checked:
+    from vsacli.robot.urdf.reader import read_urdf
+
     urdf = read_urdf(path)
     flaws = [link.flaw for link in urdf.links.values() if link.flaw is not None]
     doubts = [*flaws, *((warning.line, warning.message) for warning in urdf.warnings)]
@@ -219,6 +228,8 @@ def _urdf(path: str, _: Robots) -> Checked:
 
 
 def _stored(path: str, _: Robots) -> Checked:
+    from vsacli.results.store.reader import open_stored
+
     with open_stored(path) as result:
         result.check()
         names = f"{result.robot_name}, {result.trajectory_name}"
@@ -229,17 +240,23 @@ def _stored(path: str, _: Robots) -> Checked:
 
 def _study(path: str, _: Robots) -> Checked:
     """Check a study with the files that it names, whatever robots are among the files."""
+    from vsacli.studies.sweeps.study import load_study
+
     study = load_study(path)
     return _usable(path, f"study {study.file.name}, {counted(study.runs, 'run')} of {study.robot.name}")
 
 
 def _columns(path: str, _: Robots) -> Checked:
     """Check a columns file; whether its columns exist depends on the recording."""
+    from vsacli.documents.columns_file import load_columns
+
     mapping = load_columns(path)
     return _usable(path, f"columns of recordings, {counted(len(mapping.columns), 'name')}")
 
 
 def _table_of_study(path: str, _: Robots) -> Checked:
+    from vsacli.results.store.study_table import StoredStudy
+
     with StoredStudy(path) as table:
         table.check()
         return _usable(

@@ -9,13 +9,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from vsacli.base import file_formats
 from vsacli.base.errors import InputError, check_path
 from vsacli.documents.fields import choice, declared
 from vsacli.documents.reading import Changes, changed, read_document
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-
-FORMAT = "vsacli-robot/1"
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def read_robot(path: str | os.PathLike[str]) -> ReadRobot:
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    return ReadRobot(*read_document(path, RobotFile, FORMAT))
+    return ReadRobot(*read_document(path, RobotFile, file_formats.ROBOT))
 
 
 def text_to_change(robot: Robot) -> tuple[str, Path]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from vsacli.base import units
+from vsacli.base import file_formats, units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from vsacli.trajectory.fits import FitChoice
     from vsacli.trajectory.recorded.recording import Recording
 
-FORMAT = "vsacli-trajectory/1"
 DEFAULT_RATE = 1000.0
 
 
@@ -187,7 +186,7 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
         InputError: the file has problems; lists each with its line.
     """
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
-    return read_document(path, cls, FORMAT, joints.types, joints.exempt)
+    return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
 
 def declared_trajectory(

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from vsacli.analysis.report_text import energy_lines, warnings_and_notes
+from vsacli.analysis.report_text import energy_lines
 from vsacli.analysis.trouble_text import grouped, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.integrator import Method

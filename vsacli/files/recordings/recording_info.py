@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.progress import Progress, unseen
@@ -20,7 +21,7 @@ from vsacli.base.simulation_variables import measured
 from vsacli.base.texts import for_yaml, joined
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
-from vsacli.documents.columns_file import FORMAT, checked_rate
+from vsacli.documents.columns_file import checked_rate
 from vsacli.documents.csv_file import read_header, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.preamble import find_surroundings
@@ -38,7 +39,6 @@ from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
 from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
-from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.recorded.columns import column_layout
 from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
@@ -199,7 +199,7 @@ class _Proposal:
 
     def columns_file(self, joint_names: Sequence[str]) -> Iterator[str]:
         """Yield a file for `--columns`."""
-        yield f"format: {FORMAT}"
+        yield f"format: {file_formats.COLUMNS}"
         yield from self._rates()
         yield from self._lines(self._found, joint_names)
 
@@ -213,7 +213,7 @@ class _Proposal:
         """Yield a trajectory file with the positions of the recording."""
         joint_names, file = robot.joint_names if robot else (), for_yaml(Path(self._rows.path).name)
         yield from [f"# not complete: {refusal}"] if refusal else []
-        yield f"format: {trajectory_file.FORMAT}"
+        yield f"format: {file_formats.TRAJECTORY}"
         yield "name: recorded"
         yield from self._rates()
         if self._rate is None and self._time is None and not self._disorder:

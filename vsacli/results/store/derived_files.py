@@ -9,13 +9,13 @@ from typing import Any, NamedTuple, Protocol
 import h5py
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.outputs import Staged
 from vsacli.base.simulation_variables import MEASURED, SIMULATION_VARIABLES, measured
 from vsacli.base.variables import MOTORS, Block
 from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import ChunkFiller, chunk_rows
-from vsacli.results.store.schema import SENSITIVITY, SIMULATION
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -35,7 +35,7 @@ class SimulationWriter(ResultWriter):
         sensed: whether the run has sensor readings.
     """
 
-    _format = SIMULATION
+    _format = file_formats.SIMULATION
     _declared = SIMULATION_VARIABLES
 
     def __init__(
@@ -85,7 +85,7 @@ class SensitivityWriter(ResultWriter):
         slopes: names of the differentiated variables, each with whether it is a variable of motors.
     """
 
-    _format = SENSITIVITY
+    _format = file_formats.SENSITIVITY
 
     def __init__(
         self,

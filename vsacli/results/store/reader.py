@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self, TypeVar, cast
 import h5py
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
@@ -37,9 +38,7 @@ from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
-    FORMAT,
     PRECISION,
-    SIMULATION,
     row_shape,
     storage_type,
     variable_attributes,
@@ -186,7 +185,7 @@ class StoredResult(StoredFile):
         precision: precision of the stored values, "double" or "single"; they are read as double.
     """
 
-    format = FORMAT
+    format = file_formats.RESULT
     kind = "result"
     command = "invdyn"
     declared: Mapping[str, Variable] = VARIABLES
@@ -402,7 +401,7 @@ class StoredResult(StoredFile):
 class StoredSimulation(StoredResult):
     """An open simulation file; a context manager that closes it."""
 
-    format = SIMULATION
+    format = file_formats.SIMULATION
     kind = "simulation"
     command = "simulate"
     declared = SIMULATION_VARIABLES

@@ -13,9 +13,6 @@ from vsacli.base.units import Quantity, WrenchQuantity
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.base.wrench import WRENCH_AXES
 
-FORMAT, SIMULATION, SENSITIVITY = "vsacli-result/2", "vsacli-simulation/2", "vsacli-sensitivity/2"
-"""Formats of files in the layout of results."""
-
 EXISTING = "existing"
 """Attribute of variables that depend on devices of the joints: 1 for each column that a joint has."""
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from vsacli.base import file_formats
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.schema import SENSITIVITY
 
 
 class StoredSensitivity(StoredResult):
     """An open sensitivity file; a context manager that closes it."""
 
-    format = SENSITIVITY
+    format = file_formats.SENSITIVITY
     kind = "sensitivity"
     command = "sensitivity"
     _of_runs = ()

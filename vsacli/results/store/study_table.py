@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
@@ -32,7 +33,6 @@ from vsacli.results.store.new_file import NewFile
 from vsacli.results.store.reader import StoredFile, kind_of_format
 from vsacli.results.store.schema import TEXT, storable, unit_attributes
 
-FORMAT = "vsacli-study-table/1"
 FIRST_LIMIT = "first_limit"
 TEXTS = {
     "trajectory": "file of the trajectory",
@@ -204,7 +204,7 @@ class StudyWriter(NewFile):
 
     def _attributes(self) -> dict[str, Any]:
         return {
-            "format": FORMAT,
+            "format": file_formats.STUDY_TABLE,
             "generated_by": f"vsacli {__version__}",
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             **{name: storable(text) for name, text in self._head.provenance.items()},
@@ -281,7 +281,7 @@ class StoredStudy(StoredFile):
         try:
             with reporting_damage(path):
                 self.attributes: dict[str, Any] = dict(self._file.attrs)
-                if (found := self.attributes.get("format")) != FORMAT:
+                if (found := self.attributes.get("format")) != file_formats.STUDY_TABLE:
                     kind = kind_of_format(found if isinstance(found, str) else None)
                     raise InputError.one(f"is {kind}, expected a table that vsacli study writes", path)
                 check_present(self.attributes, ("study_name", "robot_name"))

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, StorageError
@@ -19,7 +20,7 @@ from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variabl
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.new_file import ChunkFiller, NewFile
-from vsacli.results.store.schema import DOUBLE, FLOATS, FORMAT, PRECISION, TEXT, storable
+from vsacli.results.store.schema import DOUBLE, FLOATS, PRECISION, TEXT, storable
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -50,7 +51,7 @@ class ResultWriter(NewFile):
             variable; or the precision is unknown.
     """
 
-    _format = FORMAT
+    _format = file_formats.RESULT
     _declared: Mapping[str, Variable] = VARIABLES
 
     def __init__(

@@ -7,10 +7,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from vsacli.base import file_formats
 from vsacli.base.texts import for_yaml
 from vsacli.base.units import TORQUE
 from vsacli.documents.fields import Choice, Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
-from vsacli.robot.file import FORMAT
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
 from vsacli.robot.urdf.link_tree import UrdfJoint
@@ -27,7 +27,7 @@ def robot_text(conversion: Conversion) -> str:
         "# From a URDF, by vsacli import-urdf: frames, masses, inertias, damping and limits of the joints.",
         "# A URDF says nothing about motors and springs: replace what is marked as placeholder, then remove",
         "# `placeholder: true`.",
-        f"format: {FORMAT}",
+        f"format: {file_formats.ROBOT}",
         f"name: {for_yaml(robot.name)}",
         f"description: {for_yaml(robot.description)}",
         "placeholder: true",

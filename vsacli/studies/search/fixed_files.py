@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
@@ -22,7 +23,6 @@ from vsacli.robot.file import text_to_change
 from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
 from vsacli.studies.search.task import branch_path
-from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import ResampledTimes, UniformTimes
@@ -110,7 +110,7 @@ def _document(
     trajectory: Trajectory, factor: float, declared: Mapping[Signal, dict[str, Any]]
 ) -> Iterator[str]:
     """Yield the lines of the trajectory file."""
-    yield f"format: {FORMAT}\n"
+    yield f"format: {file_formats.TRAJECTORY}\n"
     yield f"name: {for_yaml(trajectory.name)}\n"
     if factor != 1:
         yield f"slow_down: {factor!r}\n"

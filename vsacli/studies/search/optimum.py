@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import in_header
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText, headline
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import in_header
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.tolerances import MonteCarlo

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText, cell, headline
-from vsacli.base.texts import counted, joined
+from vsacli.base.texts import counted, joined, warnings_and_notes
 from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, in_header, time_text, units_of
 from vsacli.studies.sizing.choices import CRITERIA, Choice
 from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand

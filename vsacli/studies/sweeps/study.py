@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.base import file_formats
 from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
@@ -29,7 +30,7 @@ from vsacli.robot.file import ReadRobot, read_robot
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import KEPT, Column, over_time
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
-from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
+from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.changes import Divided, divided
 from vsacli.trajectory.file import load_trajectory
 
@@ -255,7 +256,7 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
         InputError: a file is wrong (with every problem of the first such file), the engine is unknown, or its
             C compiler is missing.
     """
-    file, source = read_document(path, StudyFile, FORMAT)
+    file, source = read_document(path, StudyFile, file_formats.STUDY)
     folder = Path(source.path).parent
     _check_named(source, "robot", file.robot)
     read = read_robot(folder / file.robot)

@@ -252,7 +252,6 @@ class Optimized:
         return JOINT, CRITERIA[self.minimize].quantity, CRITERIA[self.minimize].words
 
 
-FORMAT = "vsacli-study/1"
 GRID = "grid"
 METHODS = (GRID, "random", "latin_hypercube")
 

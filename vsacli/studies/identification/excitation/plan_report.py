@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from vsacli.analysis.report import Report
+from vsacli.base import file_formats
 from vsacli.base.json_records import Published, named
 from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.tables import ReportText, headline
@@ -192,7 +193,7 @@ def excitation_text(excitation: Excitation) -> str:
     }
     values |= {key: formula(profile) for key, profile in profiles.items()}
     head = [part for line in _head(excitation) for part in textwrap.wrap(one_line(line), WIDTH - 2)]
-    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, head)
+    return commented_document(file_formats.TRAJECTORY, trajectory_file.OF_ANY_ROBOT, values, head)
 
 
 def _head(excitation: Excitation) -> Iterator[str]:

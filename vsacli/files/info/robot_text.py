@@ -1,0 +1,163 @@
+"""Description of a robot as text: tables of geometry, masses and drives, and lines of the actuators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from vsacli.actuators.kinds import ACTUATORS
+from vsacli.base.tables import aligned
+from vsacli.base.texts import counted, together, warnings_and_notes
+from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
+from vsacli.documents.field_kinds import Field, variant_inside
+from vsacli.documents.fields import declared
+from vsacli.files.info.numbers_in_text import row, short, span
+
+Values = Mapping[str, Any]
+"""Values of a record by field, as in JSON."""
+
+
+PLACES = {"link": "between its links", "transmission": "parallel to its springs"}
+
+
+def robot_lines(robot: Values) -> Iterator[str]:
+    """Yield the description of a robot as lines of text."""
+    reach, joints = robot["reach"], robot["joints"]
+    yield f"robot {robot['name']}: {counted(len(joints), 'joint')}, {short(robot['mass'])} kg"
+    if robot["description"]:
+        yield robot["description"]
+    yield f"gravity {row(robot['gravity'])} m/s^2 in the base frame"
+    for name in ("base", "tool"):
+        pose = robot[name]
+        yield f"{name} xyz {row(pose['xyz'])} m, rpy {row(pose['rpy'])} rad"
+    yield f"reach {short(reach['found'])} m from the origin of DH frame 0; bound {short(reach['bound'])} m"
+    yield from ("", *aligned(list(_geometry(joints))))
+    yield from ("", *aligned(list(_masses(joints))))
+    yield from ("", *aligned(list(_drives(joints))), "")
+    yield "static load: the largest torque of gravity that was found, over configurations within the limits"
+    yield "stiffness: attainable without load, and with the static load in either direction"
+    yield from ("", *device_lines(joints))
+    yield from _dampers(joints)
+    if robot["held_at_zero"]:
+        yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"
+    yield from warnings_and_notes(robot["warnings"], ())
+
+
+def _geometry(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
+    yield "joint", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "limits"
+    for joint in joints:
+        row = (short(joint["dh"][name]) for name in ("a", "alpha", "d", "theta"))
+        unit = POSITION.unit(joint["type"])
+        yield joint["name"], joint["type"], *row, span(joint["limits"]["position"], unit)
+
+
+def _masses(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
+    moments = ("xx", "yy", "zz", "xy", "xz", "yz")
+    yield "joint", "mass [kg]", "com [m]", *(f"{name} [kg m^2]" for name in moments)
+    for joint in joints:
+        link = joint["link"]
+        inertia = (short(link["inertia"][name]) for name in moments)
+        yield joint["name"], short(link["mass"]), row(link["com"]), *inertia
+
+
+def _drives(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
+    yield "joint", "actuator", "springs", "static load", "stiffness", "under load"
+    for joint in joints:
+        kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
+        unit = STIFFNESS.unit(kind)
+        attainable = (span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
+        load = f"{short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
+        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *attainable
+
+
+def _dampers(joints: Sequence[Values]) -> Iterator[str]:
+    """Yield one line with the places and ranges of dampers, if there are any."""
+    words = [
+        f"{joint['name']} {PLACES[damper['location']]}, {span(damper['range'], DAMPING.unit(joint['type']))}"
+        for joint in joints
+        if (damper := joint["damper"])
+    ]
+    if words:
+        yield f"dampers: {'; '.join(words)}"
+
+
+def _springs(actuator: Values) -> str:
+    """Return the types of mechanism, springs and coupling, as far as present."""
+    mechanism = actuator.get("mechanism")
+    written = (mechanism or actuator).get("spring") or []
+    springs = written if isinstance(written, list) else [written]
+    words = [mechanism["type"]] if mechanism else []
+    words += dict.fromkeys(spring["type"] for spring in springs)
+    if actuator.get("coupling"):
+        words.append(f"(coupling {actuator['coupling']['type']})")
+    return " ".join(words)
+
+
+def device_lines(joints: Sequence[Values]) -> Iterator[str]:
+    """Yield a line for all joints with equal actuators, and below it a line for each part of the actuator."""
+    equal: dict[tuple[str, ...], list[int]] = {}
+    for number, joint in enumerate(joints):
+        kind = ACTUATORS[joint["actuator"]["type"]]
+        parts = tuple(_parts(kind, joint["actuator"], joint["type"]))
+        equal.setdefault((joint["actuator"]["type"], *parts), []).append(number)
+    names = [joint["name"] for joint in joints]
+    for (kind_name, *lines), numbers in equal.items():
+        yield f"{together(numbers, names)}: {kind_name}"
+        yield from (f"  {line}" for line in lines)
+
+
+def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
+    """Yield a line for each record in an actuator, and one line for its own parameters."""
+    own = []
+    for name, field, value in _given(cls, values):
+        if not field.kind.records:
+            own.append(_words(name, field.quantity, value, joint_type))
+        elif isinstance(value, list) and len(value) > 1 and value.count(value[0]) == len(value):
+            numbers = " and ".join(str(number) for number in range(1, len(value) + 1))
+            yield f"{name}s {numbers}: {_record(field, value[0], joint_type)}"
+        elif isinstance(value, list):
+            for number, each in enumerate(value, start=1):
+                yield f"{name} {number}: {_record(field, each, joint_type)}"
+        else:
+            yield f"{name}: {_record(field, value, joint_type)}"
+    if own:
+        yield ", ".join(own)
+
+
+def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
+    """Yield the fields with a value that is neither absent, infinite nor the default."""
+    for name, (field, default) in declared(cls).items():
+        value = values.get(name)
+        if value is not None and value != default and value != math.inf:
+            yield name, field, value
+
+
+def _record(field: Field, values: Values, joint_type: str) -> str:
+    """Return a record of a field in words: its type and its parameters."""
+    word = values.get("type", "")
+    cls = field.kind.records[word]
+    inside = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), joint_type) or joint_type
+    words = [word] if word else []
+    for name, each, value in _given(cls, values):
+        if each.kind.records:
+            several = value if isinstance(value, list) else [value]
+            words += [f"{name} ({_record(each, one, inside)})" for one in several]
+        else:
+            words.append(_words(name, each.quantity.inside(inside), value, joint_type))
+    return ", ".join(words)
+
+
+def _words(name: str, quantity: Quantity, value: Any, joint_type: str) -> str:
+    """Return name and value of a field, with its unit."""
+    written = quantity.unit(joint_type)
+    unit = "" if written == str(DIMENSIONLESS) else f" {written}"
+    match value:
+        case bool() | str():
+            return f"{name} {value}"
+        case float() | int():
+            return f"{name} {value:.5g}{unit}"
+        case list() if all(isinstance(each, float | int) for each in value):
+            return f"{name} [{', '.join(f'{each:.5g}' for each in value)}]{unit}"
+        case _:
+            return name
