@@ -133,7 +133,6 @@ def test_hostile_numbers_are_judged_without_an_error(tmp_path):
         ("mass: 6.7858", "mass: 1e30"),
         ("a: 0.30", "a: 1e30"),
         ("alpha: pi/2", "alpha: -1e30"),
-        ("k: 400, k_c: 2000", "k: 1e-30, k_c: 1e30"),
         ("inertia: 3.20", "inertia: 1e-30"),
         ("[0, 0, -9.81]", "[1e30, 0, 1e30]"),
     ):

@@ -111,7 +111,7 @@ def test_turns_that_are_meant_explain_no_duration(tmp_path):
     changes = [("[90 deg, 45 deg, -60 deg]", "[720 deg, 0, 0]"), ("duration: 4.0", "duration: 0.1")]
     motion = edited(REST_TO_REST, tmp_path / "move.yaml", *changes)
     (warning,) = load_trajectory(motion, load_robot(ROBOT)).warnings
-    assert "duration = 0.1 s makes base move at up to 275 rad/s" in warning
+    assert "duration = 0.1 s makes what is farthest from base accelerate at up to 5660 m/s^2" in warning
 
 
 def test_positions_within_the_limits_of_the_joint_may_be_meant(tmp_path):

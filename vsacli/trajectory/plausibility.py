@@ -23,7 +23,6 @@ from vsacli.robot.plausibility import strange_of_robot
 from vsacli.robot.plausibility.bodies import (
     CENTIMETERS,
     DEGREES,
-    FASTEST,
     MILLIMETERS,
     ROUNDED,
     SIZES,
@@ -58,11 +57,9 @@ UNITS_OF_TIME = (
 )
 UNITS_OF_STIFFNESS = (*TOO_SOFT, NEWTON_MILLIMETERS)
 
-SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs")
+SPRINGS = ("stiff springs", "hardening of springs")
 RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
-FAST = ("fast motions of revolute joints", "fast motions of prismatic joints")
-"""Names of rules, some of them of the robot, whose findings explain those of other rules."""
 
 
 def implausible(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
@@ -156,12 +153,6 @@ def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
             yield from checked.paced(units.TIME, way / checked.duration)
 
 
-def _velocities(checked: CheckedTrajectory, *, revolute: bool) -> Iterator[Measured]:
-    if checked.moved is not None:
-        sizes = np.where(checked.revolute == revolute, np.abs(checked.moved[1]).max(axis=1), 0.0)
-        yield from checked.paced(units.TIME, sizes, unit="rad/s" if revolute else "m/s")
-
-
 def _accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
     """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
     if checked.moved is not None and not checked.robot.placeholder:
@@ -169,11 +160,11 @@ def _accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[M
         yield from checked.paced(quantity, np.abs(checked.moved[2]).max(axis=1) * levers)
 
 
-def _rate(checked: CheckedTrajectory, periods: float) -> Iterator[Measured]:
-    """Yield the number of samples in `periods` seconds."""
+def _samples(checked: CheckedTrajectory) -> Iterator[Measured]:
+    """Yield the rate, with the number of samples as size."""
     for path, quantity, value, _ in checked.numbers:
         if quantity == units.RATE and path == ("rate",):
-            yield Measured(path, value, PER_SECOND, value * periods)
+            yield Measured(path, value, PER_SECOND, value * checked.duration)
 
 
 def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
@@ -226,38 +217,25 @@ MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
         low=1e-3, usual=0.5, reason="a turn would take more than an hour and a half",
         finding="lets no joint move faster than {size} rad (reaches) a second in the mean",
         units=UNITS_OF_TIME),
-    Rule("fast motions of revolute joints", "`duration`, `times`",
-        lambda checked: _velocities(checked, revolute=True),
-        size="rad/s, largest velocity", high=FASTEST, usual=2, reason="limbs are slower",
-        finding="makes {joint} move at up to {size} {unit}", units=UNITS_OF_TIME,
-        advice="check it, and the positions", explained_by=POSITIONS),
-    Rule("fast motions of prismatic joints", "`duration`, `times`",
-        lambda checked: _velocities(checked, revolute=False),
-        size="m/s, largest velocity", high=20, usual=0.5, reason="linear motors are slower",
-        finding="makes {joint} move at up to {size} {unit}", units=UNITS_OF_TIME,
-        advice="check it, and the positions", explained_by=POSITIONS),
     Rule("accelerations", "`duration`, `times`", lambda checked: _accelerations(checked, units.TIME),
         size="m/s^2, largest acceleration of the farthest point", high=300, usual=3,
         reason="the fastest parallel robots reach half",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
         units=tuple(each._replace(power=-2) for each in UNITS_OF_TIME),
         advice="check it, and the positions",
-        explained_by=(*POSITIONS, *SIZES, *FAST)),
+        explained_by=(*POSITIONS, *SIZES)),
     Rule("accelerations of sinusoids", "`frequency`", lambda checked: _accelerations(checked, units.RATE),
         size="m/s^2, largest acceleration of the farthest point", high=300, usual=3,
         reason="the fastest parallel robots reach half",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
         units=(OtherUnit("rad/s", 0.5 / math.pi, 2),), advice="it counts periods in a second",
-        explained_by=(*POSITIONS, *SIZES, *FAST)),
-    Rule("numbers of samples", "`rate`", lambda checked: _rate(checked, checked.duration),
+        explained_by=(*POSITIONS, *SIZES)),
+    Rule("numbers of samples", "`rate`", _samples,
         size="samples in all", low=10, usual=4000,
         reason="too few to show anything",
         finding="gives only {size} samples of the whole motion",
         units=(OtherUnit("kHz", 1e3), OtherUnit("1/ms", 1e3)),
-        advice="it is the number of samples in a second", explained_by=(*FAST, "accelerations")),
-    Rule("rates", "`rate`", lambda checked: _rate(checked, 1.0),
-        size="samples per second", high=2e5, reason="controllers are slower",
-        finding="is {size} samples per second", advice="it is the number of samples in a second"),
+        advice="it is the number of samples in a second", explained_by=("accelerations",)),
 )  # fmt: skip
 
 EFFORT_RULES: tuple[Rule[CheckedTrajectory], ...] = (

@@ -43,10 +43,6 @@ FURTHER: list[Slip] = [
 ]  # fmt: skip
 
 REST: list[Slip] = [
-    Slip("the base in mm", "vsa_3r", "rest_to_rest",
-        {"joints:\n": "base: {xyz: [300, 0, 700]}\njoints:\n"}, "place of the base", "base.xyz.0", "300 mm"),
-    Slip("N mm s/rad as damping of a joint", "rp_2", "rp_2",
-        {"damping: 0.02 ": "damping: 20e3 "}, "damping of joints", "arm.damping", "20000 N mm s/rad"),
     Slip("masses in g, inertias in g m^2", "tendon_1r", "tendon_1r",
         {"mass: 0.8 ": "mass: 800 ", "xx: 5e-4, yy: 4.5e-3, zz: 4.5e-3": "xx: 0.5, yy: 4.5, zz: 4.5"},
         "densities of links", "mass", "800 g"),
@@ -55,7 +51,4 @@ REST: list[Slip] = [
         "densities of links", "inertia", "kg cm^2"),
     Slip("lengths converted twice", "vsa_3r", "rest_to_rest",
         {"a: 0.30": "a: 0.0003", "[-0.15, 0, 0]": "[-0.00015, 0, 0]"}, "sizes of links", "mass", ""),
-    Slip("g as mass of points", "tendon_1r", "tendon_1r",
-        {"mass: 0.8 ": "mass: 800 ", "xx: 5e-4, yy: 4.5e-3, zz: 4.5e-3": "xx: 0, yy: 0, zz: 0"},
-        "mass of the robot", "mass", "800 g"),
 ]  # fmt: skip

@@ -48,12 +48,6 @@ FURTHER: list[Slip] = [
 ]  # fmt: skip
 
 REST: list[Slip] = [
-    Slip("s/100 as duration of a stroke", "rp_2", "rp_2",
-        {"duration: 2.0": "duration: 0.01"}, "fast motions of prismatic joints", "duration", "0.01 min"),
-    Slip("ks as duration", "vsa_3r", "rest_to_rest",
-        {"duration: 4.0": "duration: 0.004"}, "fast motions of revolute joints", "duration", "0.004 min"),
-    Slip("MHz as rate", "vsa_3r", "rest_to_rest",
-        {"rate: 1000": "rate: 1e6"}, "rates", "rate", ""),
     Slip("N mm as moment", "vsa_3r", "vsa_3r_pick_and_place",
         {"[0, 0, -4.905, 0, 0, 0]": "[0, 0, -4.905, 0, 0, 2000]"},
         "moments on the end effector", "levels.1.5", "2000 N mm"),

@@ -44,7 +44,7 @@ SLIPS_OF_GRAVITY = (
     OtherUnit("cm/s^2", 1e-2),
     OtherUnit("ft/s^2", 0.3048),
 )
-SIZES = ("lengths", "densities of links", "sizes of links", "mass of the robot")
+SIZES = ("lengths", "densities of links", "sizes of links")
 """Names of rules of numbers that determine the sizes of a robot; if one has findings, sizes mean little."""
 
 Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
@@ -113,14 +113,6 @@ def _gyration(checked: CheckedRobot, index: int) -> float:
     return ratio(float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz))
 
 
-def _crowding(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the heaviest link on behalf of all; a robot without any mass has a warning of its own."""
-    crowding = _links(lambda checked, _: ratio(checked.sizes.mass, checked.sizes.extent**3))
-    heaviest = max(crowding(checked), key=lambda measured: measured.value)
-    if heaviest.value > 0:
-        yield heaviest._replace(beside={"extent": f"{checked.sizes.extent:.3g}"})
-
-
 def _gravity(size: Callable[[float], float]) -> Measure:
     """Return the measure of the magnitude of gravity, with a size from it."""
 
@@ -165,10 +157,6 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         reason="real robots: up to 8",
         finding="is {size} times the largest radius of gyration of a link, {gyration} m",
         units=(MILLIMETERS, CENTIMETERS)),
-    Rule("place of the base", "`base.xyz`", _numbers("m", "base", size=_in_extents),
-        size="over the reach", high=100,
-        reason="no room is so large",
-        finding="is {size} times the reach of the robot", units=(MILLIMETERS,)),
     Rule("densities of links", "`mass`, `inertia`",
         _links(lambda checked, index: density_of_sphere(checked.joints[index].link)),
         size="kg/m^3, of a solid sphere with this mass and sum of moments",
@@ -181,12 +169,6 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="makes a link whose radius of gyration is {size} times the reach of the robot",
         advice="check the units of mass, inertia and lengths",
         explained_by=("lengths", "densities of links")),
-    Rule("mass of the robot", "`mass`", _crowding,
-        size="kg/m^3, of a cube as long as the reach", low=1e-4, high=1e4, usual=30,
-        reason="real robots: 0.3 to 510; solid iron: 7900",
-        finding="makes, with the other links, {size} kg/m^3 of a cube as long as the reach, {extent} m",
-        units=(OtherUnit("g", 1e-3), OtherUnit("t", 1e3)), advice="check the units of masses and lengths",
-        explained_by=("lengths", "densities of links", "sizes of links")),
     Rule("size of gravity", "`gravity`", _gravity(lambda size: size or math.nan),
         size="m/s^2, if there is any", low=0.02, high=30, usual=9.81,
         reason="Jupiter: 25; Ceres: 0.28",

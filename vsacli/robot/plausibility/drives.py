@@ -6,21 +6,18 @@ import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
-from vsacli.base import units
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, FASTEST, RPM, SIZES, Measure
+from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
 
 TINY = 0.1
 """Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
 
-DAMPING_IN_MILLIMETERS = OtherUnit("N mm s/rad", 1e-3)
 ROTARY = (RPM._replace(instead_of="rad/s"), DEGREES_PER_SECOND._replace(instead_of="rad/s"))
 OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
 WHICH_SIDE = "with `side: shaft` it is that of the motor's shaft, otherwise that on the joint's side"
@@ -134,92 +131,22 @@ def _shaft_velocity(driven: _Driven) -> float:
     return driven.velocity * abs(driven.motor.gear_ratio or 1.0) if driven.rotates else math.nan
 
 
-def _output_velocity(driven: _Driven) -> float:
-    return driven.velocity if driven.joint.is_revolute else math.nan
-
-
 def _joint_velocity(driven: _Driven) -> float:
     """Return the largest velocity that the motor allows the joint, over the limit of the joint."""
     limit = max(map(abs, driven.joint.limits.velocity))
     return ratio(driven.velocity, limit) if driven.rotates else math.nan
 
 
-def _speed_voltage(driven: _Driven) -> float:
-    """Return the voltage that the largest velocity of a motor induces, over its largest voltage."""
-    constant, bound = driven.behind.torque_constant, driven.motor.max_voltage
-    if constant is None or bound is None:
-        return math.nan
-    return abs(constant) * driven.velocity / _bounded(bound)
-
-
-def _damping(number: int, joint: Joint, size: float) -> Measured:
-    path = joint_path(number, joint, "damping")
-    return Measured(path, joint.damping, units.DAMPING.unit(joint.type), size)
-
-
-def _braking(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the torque of damping at the largest velocity, over the largest torque; 0 if that is infinite."""
+def _dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield Coulomb friction of motors as written: one number if it is equal in both directions."""
     for driven in _all_motors(checked):
-        joint, motor = driven.joint, driven.behind
-        velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
-        if velocity < FASTEST and driven.carries:
-            yield driven.measured("damping", motor.damping * velocity / motor.max_torque)
-            torque = sum(each.max_torque for each in joint.actuator.motors)
-            yield _damping(driven.number, joint, joint.damping * velocity / torque)
-
-
-def _joint_damping(checked: CheckedRobot) -> Iterator[Measured]:
-    for number, joint in enumerate(checked.joints):
-        yield _damping(number, joint, ratio(joint.damping, checked.sizes.scale(joint)))
-
-
-class _Rubbing(NamedTuple):
-    """Dry friction of a motor, or of a joint, which has no gear and no largest torque.
-
-    Attributes:
-        gear: torque on the joint side over that on the side of the values.
-    """
-
-    path: NumberPath
-    friction: Friction
-    joint: Joint
-    scale: float
-    unit: str
-    gear: float = 1.0
-    max_torque: float = math.nan
-
-
-def _rubbing(checked: CheckedRobot) -> Iterator[_Rubbing]:
-    for driven in _all_motors(checked):
-        friction, joint, gear = driven.motor.friction, driven.joint, abs(driven.motor.ratio_of_side)
-        if friction is not None:
-            path, unit, bound = driven.path("friction"), driven.unit("max_torque"), driven.motor.max_torque
-            yield _Rubbing(path, friction, joint, driven.scale, unit, gear, _bounded(bound))
-    for number, joint in enumerate(checked.joints):
-        if joint.friction is not None:
-            path, unit = joint_path(number, joint, "friction"), units.TORQUE.unit(joint.type)
-            yield _Rubbing(path, joint.friction, joint, checked.sizes.scale(joint), unit)
-
-
-def _coulomb(size: Callable[[_Rubbing, float], float]) -> Measure:
-    """Return the measure of Coulomb friction as written: one number if it is equal in both directions."""
-
-    def measure(checked: CheckedRobot) -> Iterator[Measured]:
-        for rubbing in _rubbing(checked):
-            backward, forward = rubbing.friction.coulomb
-            sides = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
-            for side, torque in sides.items():
-                path = (*rubbing.path, "coulomb", *(() if side is None else (side,)))
-                yield Measured(path, torque, rubbing.unit, size(rubbing, torque))
-
-    return measure
-
-
-def _widths(checked: CheckedRobot) -> Iterator[Measured]:
-    for rubbing in _rubbing(checked):
-        if rubbing.joint.is_revolute:
-            width = rubbing.friction.width
-            yield Measured((*rubbing.path, "width"), width, "rad/s", width / rubbing.gear)
+        if driven.motor.friction is not None:
+            backward, forward = driven.motor.friction.coulomb
+            directions = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
+            for direction, torque in directions.items():
+                path = (*driven.path("friction"), "coulomb", *(() if direction is None else (direction,)))
+                size = torque / _bounded(driven.motor.max_torque)
+                yield Measured(path, torque, driven.unit("max_torque"), size)
 
 
 GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
@@ -250,31 +177,17 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
         units=(OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6)),
         advice=WHICH_SIDE, explained_by=GEARS),
-    Rule("damping of motors", "`motor.damping`",
-        _motors("damping", lambda m: m.motor.damping / m.motor.inertia),
-        size="1/s, over the inertia of the motor", high=500,
-        reason="motors coast for more than 2 ms",
-        finding="stops the motor alone at a rate of {size} 1/s",
-        units=(DAMPING_IN_MILLIMETERS, OtherUnit("N m s/krpm", 0.03 / math.pi)),
-        advice="check the units of damping and inertia"),
     Rule("velocities of motors", "`max_velocity`",
         _motors("max_velocity", _shaft_velocity, carrying=True),
         size="rad/s, of the motor's shaft", high=2500, usual=400, reason="robots have no faster motors",
         finding="is more than 24,000 turns a minute of the motor", units=ROTARY, in_angles=True),
-    Rule("velocities of motors behind the gear", "`max_velocity`",
-        _motors("max_velocity", _output_velocity, unit="rad/s", carrying=True),
-        size="joint-side, rad/s", high=FASTEST, usual=4,
-        reason="limbs are slower",
-        finding="is, on the joint's side of the gear, {size} rad/s", units=ROTARY,
-        advice="with `gear_ratio` and `side: shaft` it would be that of the motor's shaft",
-        explained_by=(*GEARS, "velocities of motors")),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
         _motors("max_velocity", _joint_velocity, carrying=True),
         size="joint-side, over the joint's limit", high=8,
         reason="a joint's limit is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
         units=ROTARY, advice="check the units of both", in_angles=True,
-        explained_by=(*GEARS, "velocities of motors", "velocities of motors behind the gear")),
+        explained_by=(*GEARS, "velocities of motors")),
     Rule("weak motors", "`max_torque`",
         _motors("max_torque", lambda m: ratio(m.torque, m.load), carrying=True),
         size="joint-side, over the load of the stretched arm's weight",
@@ -292,36 +205,10 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
 )  # fmt: skip
 
 RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("damping compared with torque", "`damping`, `motor.damping`", _braking,
-        size="its torque at the largest velocity, over the motors' largest torque",
-        high=1, usual=0.05,
-        reason="the joint could not reach its velocity limit",
-        finding="takes, at the largest velocity of the joint, {size} times the largest torque of its motors",
-        units=(DAMPING_IN_MILLIMETERS._replace(instead_of="N m s/rad"),),
-        explained_by=(*GEARS, "velocities of motors", "velocities of motors and joints", "weak motors")),
-    Rule("damping of joints", "`damping`", _joint_damping,
-        size="torque at 1 rad/s (force at 1 m/s), over weight times reach",
-        high=500, usual=1e-3,
-        reason="placeholders in real descriptions reach 50",
-        finding="brakes, at 1 rad/s or 1 m/s, with {size} times the weight of the robot at its reach",
-        units=(DAMPING_IN_MILLIMETERS,), explained_by=(*SIZES, "damping compared with torque")),
-    Rule("dry friction compared with torque", "`motor.friction.coulomb`",
-        _coulomb(lambda rubbing, torque: torque / rubbing.max_torque),
+    Rule("dry friction compared with torque", "`motor.friction.coulomb`", _dry_friction,
         size="over the motor's largest torque", high=1, usual=0.1,
         reason="the motor could not move",
         finding="is {size} times the largest torque of the motor", units=OTHER_TORQUES, explained_by=GEARS),
-    Rule("dry friction compared with weight", "`friction.coulomb`, `motor.friction.coulomb`",
-        _coulomb(lambda rubbing, torque: ratio(torque * rubbing.gear, rubbing.scale)),
-        size="joint-side, over weight times reach",
-        high=100, usual=0.05, reason="a hundred such robots would hang on the joint without moving it",
-        finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
-        units=OTHER_TORQUES, advice=WHICH_SIDE,
-        explained_by=(*SIZES, *GEARS, "dry friction compared with torque")),
-    Rule("widths of friction", "`friction.width`, `motor.friction.width` of revolute joints", _widths,
-        size="joint-side, rad/s", high=3, usual=0.05,
-        reason="above, it is viscous friction",
-        finding="smooths friction over {size} rad/s on the joint's side of the gear",
-        units=(DEGREES_PER_SECOND, RPM), explained_by=GEARS),
 )  # fmt: skip
 
 WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
@@ -330,16 +217,6 @@ WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
         reason="from the smallest motors, 0.0003, to large direct drives, a few",
         finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),
         advice="from volts per 1000 turns a minute it is 0.00955 N m/A for each of them"),
-    Rule("resistances of windings", "`resistance`", _motors("resistance"),
-        size="ohm", low=1e-3, high=1000,
-        reason="from large motors to those of watches",
-        finding="is that of no winding of a robot's motor", units=(OtherUnit("mohm", 1e-3),)),
-    Rule("voltages at the largest velocity", "`torque_constant`, `max_velocity`, `max_voltage`",
-        _motors("torque_constant", _speed_voltage),
-        size="back-EMF at this velocity, over the largest voltage", high=5, usual=0.8,
-        reason="the motor could not reach a fifth of its limit",
-        finding="makes {size} times the largest voltage at the motor's largest velocity",
-        units=(OtherUnit("mN m/A", 1e-3),), explained_by=("velocities of motors", "torque constants")),
 )  # fmt: skip
 
 DRIVE_RULES = (*GEAR_RULES, *MOTOR_RULES, *RESISTANCE_RULES, *WINDING_RULES)

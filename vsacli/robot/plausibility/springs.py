@@ -19,9 +19,6 @@ from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, Corridor, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
-SMALL_SHARE = 0.003
-"""Small angle, as a share of half a turn: half a degree."""
-
 TOO_SOFT = (
     OtherUnit("N m/deg", 180 / math.pi, instead_of="N m/rad"),
     OtherUnit("kN m/rad", 1e3, instead_of="N m/rad"),
@@ -99,15 +96,15 @@ def _springs(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringL
             yield joint, at, law
 
 
-def _hardening(checked: CheckedRobot, share: float, *, of_pairs: bool = False) -> Iterator[Measured]:
-    """Yield the stiffness at a share of half a turn (of the reach) or at the law's end, over that at rest.
+def _hardening(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield the stiffness at half a turn (at the reach) or at the law's end, over that at rest.
 
-    With `of_pairs`, only springs of joints with commanded stiffness, which depends on hardening.
+    Only springs of joints with commanded stiffness, which depends on hardening.
     """
     for joint, path, law in _springs(checked):
-        if not law.is_linear and ("stiffness" in joint.actuator.commanded or not of_pairs):
+        if not law.is_linear and "stiffness" in joint.actuator.commanded:
             unit, full = ("rad", HALF_TURN) if joint.is_revolute else ("m", checked.sizes.extent)
-            deflection = min(law.domain[1], share * full)
+            deflection = min(law.domain[1], full)
             rest, there = law.stiffness(np.array([0.0, deflection])).tolist()
             size = there / rest if rest else math.nan
             yield Measured(path, math.nan, "", size, {"deflection": f"{deflection:.3g} {unit}"})
@@ -170,16 +167,11 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         low=4, usual=50, reason="the arm would hang down",
         finding="yields by more than 0.25 rad (of the reach) to what the weight of the stretched arm can ask",
         units=TOO_SOFT, explained_by=SIZES),
-    Rule("hardening of springs", "`spring`", lambda checked: _hardening(checked, 1.0, of_pairs=True),
+    Rule("hardening of springs", "`spring`", _hardening,
         size="stiffness at half a turn (reach), over that at rest", low=1.5,
         reason="without hardening, the stiffness cannot change",
         finding="is at {deflection} but {size} times as stiff as at rest",
         advice="check the units of its constants: rad, not deg (m, not mm)"),
-    Rule("early hardening of springs", "`spring`", lambda checked: _hardening(checked, SMALL_SHARE),
-        size=f"stiffness at {SMALL_SHARE:g} of half a turn (reach), over that at rest", high=2,
-        reason="bundled springs require forty times this deflection",
-        finding="is already at {deflection} {size} times as stiff as at rest",
-        advice="check the units of its constants: N m/rad^3, say, not N mm/rad^3"),
     Rule("deflections", "`max_deflection`, `file` of a table", _deflections,
         size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="joint springs do not wind up so far",
