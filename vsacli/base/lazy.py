@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -99,8 +100,6 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
 
 def _imported_for_types(path: str) -> Iterator[tuple[str, str]]:
     """Yield each name that a module imports under `if TYPE_CHECKING:`, with the module it comes from."""
-    import ast
-
     with open(path, encoding="utf-8") as file:
         statements = ast.parse(file.read()).body
     block = next(statement for statement in statements if isinstance(statement, ast.If))

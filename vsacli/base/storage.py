@@ -6,6 +6,7 @@ being written. An error of the operating system becomes a `StorageError` with a 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import enum
 import errno
@@ -275,8 +276,6 @@ def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
 @cache
 def _standard_input() -> str:
     """Copy standard input to a file, removed at exit: inputs are read more than once, to name lines."""
-    import atexit
-
     if sys.stdin is None:
         raise OSError(0, "standard input is closed")
     kept = contextlib.ExitStack()

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs, Staged
+from vsacli.base.storage import temporary_folder
 from vsacli.base.texts import joined
 from vsacli.cli.command_parts import (
     compute,
@@ -38,7 +40,6 @@ if TYPE_CHECKING:
 
 @click.command(
     "check-feasibility",
-    short_help="Report whether a robot can execute a trajectory.",
     epilog=example("vsacli check-feasibility robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --fixes"),
 )
 @robot_argument
@@ -108,7 +109,6 @@ def check_feasibility(
         check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
-    from vsacli.base.outputs import Outputs
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
@@ -153,8 +153,6 @@ def _check_fix_options(number: int | None, output: str | None, changes: tuple[st
 
 def _compute_and_draw(run: Run, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> Report:
     """Compute, and draw the figure from a temporary result file."""
-    from vsacli.base.outputs import Staged
-    from vsacli.base.storage import temporary_folder
     from vsacli.results.charts.figures import (
         FEASIBILITY,
         FEASIBILITY_VARIABLES,

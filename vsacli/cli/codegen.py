@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
@@ -13,7 +14,6 @@ from vsacli.cli.option_types import Words
 
 @click.command(
     "codegen",
-    short_help="Generate C code of a robot for its controller.",
     epilog=example("vsacli codegen robots/vsa_3r.yaml -o controller"),
 )
 @robot_argument
@@ -58,7 +58,6 @@ def codegen(
     of operations. The folder also contains a test program with reference values, a Makefile, a CMake file, a
     Python module that calls the code, and a README.
     """
-    from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
     from vsacli.robot.parameters import parameters
 

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
+from vsacli.base.texts import one_line
+from vsacli.base.version import __version__
 from vsacli.cli.command_parts import (
     columns_option,
     example,
@@ -35,7 +38,6 @@ overflows."""
 
 @click.command(
     "compare",
-    short_help="Compare a result with a recording.",
     epilog=example("vsacli compare result.h5 torques.csv --plot figures"),
 )
 @click.argument("result", type=FILE)
@@ -73,7 +75,6 @@ def compare(
     to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
     that the recording does not fit the result.
     """
-    from vsacli.base.outputs import Outputs
     from vsacli.results.pages.document import input_text
     from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare as compared
@@ -112,8 +113,6 @@ def _draw(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outp
 
 def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
     """Return an HTML page with the report and all variables."""
-    from vsacli.base.texts import one_line
-    from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
     from vsacli.results.pages.document import PageTexts, printable, source_text
 

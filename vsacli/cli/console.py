@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TextIO, cast
 import click
 
 from vsacli.base.errors import InputError, StorageError, VsacliError
+from vsacli.base.fitted_text import fitted
 from vsacli.base.progress import NoBar, unseen
 from vsacli.base.texts import for_terminal, one_line, verdict_words
 
@@ -134,8 +135,6 @@ def for_width(text: str) -> str:
     width = _terminal_width(sys.stdout)
     if not width:
         return text
-    from vsacli.base.fitted_text import fitted
-
     return fitted(text, width)
 
 

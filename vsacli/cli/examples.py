@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 @click.command(
     "examples",
-    short_help="List the bundled robots and trajectories, or copy them.",
     epilog=example("vsacli examples puma_560 scara_4 --copy my-robots"),
 )
 @click.argument("names", metavar="[ROBOT]...", nargs=-1)
@@ -31,7 +31,6 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
     without names, write all bundled files. Nothing is written if one of the files exists, unless --overwrite
     is given.
     """
-    from vsacli.base.outputs import Outputs
     from vsacli.files.examples import copy_examples
     from vsacli.files.examples import examples as shipped
 

@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
 from vsacli.base.storage import STANDARD
 from vsacli.base.texts import joined
 from vsacli.cli.command_parts import (
@@ -55,7 +56,6 @@ _INSTEAD = {
 
 @click.command(
     "export",
-    short_help="Export results, or the robot, for other programs.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
 @click.argument("file", type=FILE)
@@ -182,7 +182,6 @@ def _check_options(names: Iterable[str], subject: str) -> None:
 def _export_robot(
     file: str, output: str | None, form: str, start: str | None, overwrite: bool, talk: Talk
 ) -> int:
-    from vsacli.base.outputs import Outputs
     from vsacli.robot.file import load_robot
 
     robot = load_robot(file)
@@ -225,7 +224,6 @@ def _read_start(path: str, robot: Robot) -> Start:
 def _export_result(
     file: str, output: str | None, form: ResultFormat, options: dict[str, Any], overwrite: bool, talk: Talk
 ) -> int:
-    from vsacli.base.outputs import Outputs
     from vsacli.base.variables import select_variables
     from vsacli.files.repetition import at_rate
     from vsacli.results.exports.result_format import UndefinedSamplesError, export_result

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     columns_option,
     example,
@@ -20,13 +21,13 @@ from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
+from vsacli.cli.identify_plots import draw_figures, identification_page
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
 
 
 @click.command(
     "identify",
-    short_help="Identify robot parameters from recordings.",
     epilog=example("vsacli identify robots/vsa_3r.yaml record.csv -o fitted.yaml --plot figures"),
 )
 @robot_argument
@@ -136,8 +137,6 @@ def identify(
     _check_options({"--duration": duration, "--sensor-noise": sensor_noise, "--seed": seed}, "needs --plan")
     if not recordings:
         raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
-    from vsacli.base.outputs import Outputs
-    from vsacli.cli.identify_plots import draw_figures, identification_page
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
     from vsacli.studies.identification.motor_equations import check_fit

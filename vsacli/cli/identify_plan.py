@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import read_robot, read_trajectory
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say, tell
 
@@ -34,7 +35,6 @@ def plan(
         raise click.UsageError(
             f"--plan: expected at most one TRAJECTORY to compare with, found {len(own_paths)}"
         )
-    from vsacli.base.outputs import Outputs
     from vsacli.studies.identification.excitation import (
         TRIALS,
         USUAL_NOISE,

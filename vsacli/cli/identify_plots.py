@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vsacli.base.texts import one_line
+from vsacli.base.version import __version__
+
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.cli.figure_options import FigureTarget
@@ -42,8 +45,6 @@ def identification_page(found: Identification, columns: str | None) -> str:
     Raises:
         InputError: a library that pages need is not installed.
     """
-    from vsacli.base.texts import one_line
-    from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
     from vsacli.results.pages.document import PageTexts, printable, source_text, tone_of
 

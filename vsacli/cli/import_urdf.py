@@ -8,6 +8,7 @@ import click
 
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.errors import InvalidRecordError
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
@@ -42,7 +43,6 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 
 @click.command(
     "import-urdf",
-    short_help="Convert a serial chain of a URDF to a robot file.",
     epilog=example("vsacli import-urdf robots/desk_arm.urdf --tip flange -o desk_arm.yaml"),
 )
 @click.argument("urdf", type=FILE)
@@ -135,7 +135,6 @@ def import_urdf(
     kinematics of the URDF. A URDF does not describe motors and springs: the robot file has placeholders,
     marked as such, which are sized to the load of each joint.
     """
-    from vsacli.base.outputs import Outputs
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:

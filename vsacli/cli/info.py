@@ -10,6 +10,8 @@ from typing import Any
 import click
 
 from vsacli.base.errors import InputError
+from vsacli.base.json_records import json_value
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
@@ -19,7 +21,6 @@ from vsacli.cli.option_types import RATE
 
 @click.command(
     "info",
-    short_help="Describe a robot, trajectory, recording or result.",
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
 @click.argument("file", type=FILE, required=False)
@@ -88,7 +89,6 @@ def info(
 
 
 def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:
-    from vsacli.base.json_records import json_value
     from vsacli.files.info import render
 
     if field is not None:
@@ -110,7 +110,6 @@ def _cache(folder: str, clear: bool) -> dict[str, Any]:
 
 
 def _extract(file: str, folder: str, talk: Talk) -> None:
-    from vsacli.base.outputs import Outputs
     from vsacli.documents.reading import written
     from vsacli.files.repetition import extract
 

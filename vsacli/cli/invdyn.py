@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     Inputs,
     compute,
@@ -31,6 +32,7 @@ from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import HDF5_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import RATE, Words
+from vsacli.cli.plot_recording import RECORDING, recording_figure
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
 @click.command(
     "invdyn",
-    short_help="Compute the motor torques that execute a trajectory.",
     epilog=example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml -o result.h5"),
 )
 @robot_argument
@@ -104,7 +105,6 @@ def invdyn(
     inputs = load_inputs(robot, trajectory, talk, changes, {} if rate is None else {"rate": "--rate"})
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
-    from vsacli.base.outputs import Outputs
     from vsacli.base.variables import select_variables
     from vsacli.results.store.writer import ResultWriter
 
@@ -128,7 +128,6 @@ def invdyn(
         report = compute(run, talk, writer)
         if drawn is not None:
             from vsacli.cli.plot import draw_staged
-            from vsacli.cli.plot_recording import recording_figure
 
             draw_staged(file, drawn, talk)
             if inputs.trajectory.estimates:
@@ -154,7 +153,6 @@ def _figures(
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
-    from vsacli.cli.plot_recording import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
     stored = VARIABLES if variables is None else variables

@@ -16,10 +16,12 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
+from vsacli.base.renamed import successor, usage
 from vsacli.base.storage import reason
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, flush_notes, reporting_stdout_errors, tell
+from vsacli.cli.input_errors import in_words, recognized
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml")
 _EPILOG += """
@@ -33,31 +35,47 @@ Exit codes (all: docs/cli.md):
 
 _SECTIONS = {
     "Computing": {
-        "invdyn": "vsacli.cli.invdyn:invdyn",
-        "check-feasibility": "vsacli.cli.check_feasibility:check_feasibility",
-        "simulate": "vsacli.cli.simulate:simulate",
-        "codegen": "vsacli.cli.codegen:codegen",
-        "sensitivity": "vsacli.cli.sensitivity:sensitivity",
-        "identify": "vsacli.cli.identify:identify",
-        "study": "vsacli.cli.study:study",
-        "optimize": "vsacli.cli.optimize:optimize",
-        "size": "vsacli.cli.size:size",
+        "invdyn": "Compute the motor torques that execute a trajectory.",
+        "check-feasibility": "Report whether a robot can execute a trajectory.",
+        "simulate": "Simulate the robot's full dynamics under a controller.",
+        "codegen": "Generate C code of a robot for its controller.",
+        "sensitivity": "Rank robot parameters by their effect on a motion.",
+        "identify": "Identify robot parameters from recordings.",
+        "study": "Compute many runs with varied parameters or motions.",
+        "optimize": "Optimize the stiffness or the timing of a motion.",
+        "size": "Select motors, gears and springs for given motions.",
     },
     "Results": {
-        "plot": "vsacli.cli.plot:plot",
-        "export": "vsacli.cli.export:export",
-        "compare": "vsacli.cli.compare:compare",
+        "plot": "Plot robots, results, simulations and recordings.",
+        "export": "Export results, or the robot, for other programs.",
+        "compare": "Compare a result with a recording.",
     },
     "Files": {
-        "new": "vsacli.cli.new:new",
-        "examples": "vsacli.cli.examples:examples",
-        "import-urdf": "vsacli.cli.import_urdf:import_urdf",
-        "validate": "vsacli.cli.validate:validate",
-        "info": "vsacli.cli.info:info",
-        "schema": "vsacli.cli.schema:schema",
+        "new": "Create a commented robot or trajectory file.",
+        "examples": "List the bundled robots and trajectories, or copy them.",
+        "import-urdf": "Convert a serial chain of a URDF to a robot file.",
+        "validate": "Report every problem of files of any kind.",
+        "info": "Describe a robot, trajectory, recording or result.",
+        "schema": "Print the JSON Schema of a YAML format, for editors.",
     },
 }
-_COMMANDS = LazyRegistry({name: home for section in _SECTIONS.values() for name, home in section.items()})
+_SHORT_HELP = {name: text for section in _SECTIONS.values() for name, text in section.items()}
+
+
+class Commands(LazyRegistry):
+    """Commands by name, each imported at first use: command `a-b` is the function `a_b` of `cli/a_b.py`.
+
+    The list of `vsacli --help` imports none of them.
+    """
+
+    def __init__(self) -> None:
+        functions = {name: name.replace("-", "_") for name in _SHORT_HELP}
+        super().__init__({name: f"vsacli.cli.{each}:{each}" for name, each in functions.items()})
+
+    def __getitem__(self, name: str) -> click.Command:
+        command: click.Command = super().__getitem__(name)
+        command.short_help = _SHORT_HELP[name]
+        return command
 
 
 class SectionedGroup(click.Group):
@@ -84,15 +102,13 @@ class SectionedGroup(click.Group):
         width = max(map(len, self.list_commands(context)))
         for heading, names in self.sections.items():
             with formatter.section(heading):
-                formatter.write_dl(
-                    [(name.ljust(width), self.commands[name].get_short_help_str()) for name in names]
-                )
+                formatter.write_dl([(name.ljust(width), _SHORT_HELP[name]) for name in names])
 
 
 @click.group(
     cls=SectionedGroup,
     sections={heading: tuple(section) for heading, section in _SECTIONS.items()},
-    commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click only looks commands up
+    commands=cast("MutableMapping[str, click.Command]", Commands()),  # click only looks commands up
     context_settings={"help_option_names": ["-h", "--help"]},
     short_help="Inverse dynamics of robots with variable stiffness actuators.",
     epilog=_EPILOG,
@@ -177,17 +193,14 @@ def _advised(error: click.ClickException) -> click.ClickException:
     Any other error is returned as it is.
     """
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        from vsacli.base.renamed import successor, usage  # loaded for error messages only
-
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
             return click.UsageError(
                 f"{error.option_name} is now {usage(error.option_name) or new}", error.ctx
             )
     if isinstance(error, click.MissingParameter) and error.ctx and (path := error.ctx.params.get("robot")):
-        from vsacli.cli.input_errors import in_words, recognized
-
-        if (kind := recognized(path)) in ("result", "simulation"):
+        kind = recognized(path)
+        if kind in ("result", "simulation"):
             missing = error.format_message().rstrip(".")
             hint = f"{path} is {in_words(kind)}: vsacli info {path} shows its report"
             return click.UsageError(f"{missing}; {hint}", error.ctx)

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.shell_completion import CompletionItem
 from click.types import StringParamType
 
 from vsacli.actuators.kinds import ACTUATORS, kind_and_mechanism, mechanisms_of
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
 from vsacli.base.storage import STANDARD
 from vsacli.base.texts import counted
 from vsacli.cli.command_parts import example, overwrite_option, read_robot
@@ -31,7 +33,6 @@ _output_option = click.option(
 
 @click.group(
     "new",
-    short_help="Create a commented robot or trajectory file.",
     epilog=example("vsacli new robot --joints RR"),
 )
 def new() -> None:
@@ -62,8 +63,6 @@ class _ActuatorType(StringParamType):
         self, _context: click.Context, _parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Complete names of kinds and mechanisms."""
-        from click.shell_completion import CompletionItem
-
         of_kinds = (f"{kind}:{each}" for kind in ACTUATORS for each in mechanisms_of(kind))
         names = (*ACTUATORS, *MECHANISMS, *of_kinds)
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
@@ -92,8 +91,6 @@ class _JointType(_ActuatorType):
         self, context: click.Context, parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Complete the actuator behind the name."""
-        from click.shell_completion import CompletionItem
-
         name, colon, actuator = incomplete.partition(":")
         found = super().shell_complete(context, parameter, actuator) if colon else []
         return [CompletionItem(f"{name}:{each.value}") for each in found]
@@ -235,8 +232,6 @@ def _write(
     if output is None or output == STANDARD:
         click.echo(text, nl=False)
         return
-    from vsacli.base.outputs import Outputs
-
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         outputs.file(output).write_text(text)
         for table in tables:

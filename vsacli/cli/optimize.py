@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     example,
     json_option,
@@ -41,7 +42,6 @@ CHANGE, PACE = "optimum", "pace"
 
 @click.command(
     "optimize",
-    short_help="Optimize the stiffness or the timing of a motion.",
     epilog=example(
         "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
     ),
@@ -106,7 +106,6 @@ def optimize(
     with naming_option("--min-margin"):
         check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
-    from vsacli.base.outputs import Outputs
     from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from vsacli.base import file_formats
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -21,8 +22,11 @@ from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, naming_option, recognized
 from vsacli.cli.option_types import TIME
+from vsacli.cli.plot_page import write_page
 from vsacli.cli.plot_recording import RECORDED, RECORDING, draw_recording, has_recording, recording_figure
 from vsacli.cli.plot_robot import draw_robot, write_robot_page
+from vsacli.cli.sensitivity import RANKING
+from vsacli.results.charts.ranking import Ranking
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -37,7 +41,6 @@ DRAWN = ("robot", "trajectory", "result", "simulation", "table of a study", "tab
 
 @click.command(
     "plot",
-    short_help="Plot robots, results, simulations and recordings.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
@@ -117,8 +120,6 @@ def plot(
     for a robot its figures and parameters.
     It requires the package bokeh: pip install bokeh.
     """
-    from vsacli.base.outputs import Outputs
-
     shown = _Shown(joints or (), _span(start, end), variables)
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise click.UsageError(f"{twice} is given twice; give each result once")
@@ -193,8 +194,6 @@ def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk
     if kind == file_formats.SENSITIVITY:
         _draw_ranking(paths, target, talk)
     elif target.place.file_format == PAGE:
-        from vsacli.cli.plot_page import write_page
-
         if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
             raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
         write_page(paths, None if kind == file_formats.STUDY_TABLE else shown.span, *target, talk)
@@ -267,8 +266,6 @@ def _kind_of(paths: list[Path]) -> str | None:
 
 def _draw_ranking(paths: list[Path], target: _Target, talk: Talk) -> None:
     """Draw the ranking of a sensitivity file."""
-    from vsacli.cli.sensitivity import RANKING
-    from vsacli.results.charts.ranking import Ranking
     from vsacli.results.plots import ranking_figure
     from vsacli.results.store.damage import reporting_damage
     from vsacli.results.store.sensitivity_file import StoredSensitivity

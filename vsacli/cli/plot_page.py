@@ -7,6 +7,9 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vsacli.base.errors import InputError, StorageError
+from vsacli.base.texts import one_line
+from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
 
@@ -72,7 +75,6 @@ def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
 
 def _fix(result: StoredResult, talk: Talk) -> FixText | None:
     """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
-    from vsacli.base.errors import InputError, StorageError
     from vsacli.base.flags import MIN_MARGIN
     from vsacli.files.repetition import rebuilt
     from vsacli.results.pages import FixText
@@ -100,9 +102,6 @@ def _check_version(made_by: str, path: Path) -> None:
     Raises:
         InputError: the result was computed by another version.
     """
-    from vsacli.base.errors import InputError
-    from vsacli.base.version import __version__
-
     if made_by != (this := f"vsacli {__version__}"):
         raise InputError.one(
             f"was computed by {made_by}, and this is {this}; check-feasibility --fixes looks for them", path
@@ -112,7 +111,6 @@ def _check_version(made_by: str, path: Path) -> None:
 def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
     """Return announcement and command of the next step: write the first fix, or list all fixes again."""
     from vsacli.base.flags import MIN_MARGIN
-    from vsacli.base.texts import one_line
     from vsacli.documents.reading import written
 
     inputs = result.inputs()

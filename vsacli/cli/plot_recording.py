@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError
+from vsacli.base.version import __version__
 from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import Talk
 
@@ -94,8 +95,6 @@ def recording_figure(
 
 def has_recording(stored: StoredResult, talk: Talk) -> bool:
     """Return whether the recording behind a result can be drawn; print a note if it exists but cannot."""
-    from vsacli.base.version import __version__
-
     if stored.kind != "result" or not stored.report_json.get("fits"):
         return False
     inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]

@@ -12,7 +12,6 @@ from vsacli.cli.option_types import Words
 
 @click.command(
     "schema",
-    short_help="Print the JSON Schema of a YAML format, for editors.",
     epilog=example("vsacli schema robot > robot.schema.json"),
 )
 @click.argument(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.base.texts import counted
 from vsacli.cli.command_parts import (
     Inputs,
@@ -28,6 +29,7 @@ from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SHARE, Whole
+from vsacli.results.charts.ranking import Ranking
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -51,7 +53,6 @@ def _share_or_file(context: click.Context, parameter: click.Parameter, text: str
 
 @click.command(
     "sensitivity",
-    short_help="Rank robot parameters by their effect on a motion.",
     epilog=example("vsacli sensitivity robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --tolerances 2%"),
 )
 @robot_argument
@@ -108,8 +109,6 @@ def sensitivity(
     """
     if runs is not None and tolerances is None:
         raise click.UsageError("--monte-carlo draws from tolerances: give --tolerances, e.g. 2%")
-    from vsacli.base.outputs import Outputs
-
     inputs = load_inputs(robot, trajectory, talk, changes)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
@@ -178,7 +177,6 @@ def _draw(
 ) -> None:
     """Draw the ranking, and the bands of motor torques if tolerances are given."""
     from vsacli.results.charts.optimum import Torque, band_sheet
-    from vsacli.results.charts.ranking import Ranking
     from vsacli.results.plots import ranking_figure
 
     names = [RANKING] if found.curves is None else [RANKING, BAND]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     Inputs,
     engine_option,
@@ -71,7 +72,6 @@ class Options(NamedTuple):
 
 @click.command(
     "simulate",
-    short_help="Simulate the robot's full dynamics under a controller.",
     epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --goal-tolerance 2%"),
 )
 @robot_argument
@@ -222,7 +222,6 @@ def simulate(
     if gains is not None:  # the result stores the poles file as one of its inputs
         arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
         inputs = inputs._replace(robot=arm)
-    from vsacli.base.outputs import Outputs
     from vsacli.results.store.derived_files import SimulationWriter
 
     sensed = simulation.keywords["sensors"] is not None

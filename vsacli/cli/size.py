@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     example,
     json_option,
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 @click.command(
     "size",
-    short_help="Select motors, gears and springs for given motions.",
     epilog=example("vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalog motors.csv"),
 )
 @robot_argument
@@ -86,7 +86,6 @@ def size(
         for option, given in {"--output": output, "--gear": gears, "--minimize": minimize}.items():
             if given:
                 raise click.UsageError(f"{option} needs --catalog FILE, the motors to choose from")
-    from vsacli.base.outputs import Outputs
     from vsacli.studies.sizing import size_drives, sized_text
     from vsacli.studies.sizing.ratios import gears_of_joints
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs
 from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
@@ -32,7 +33,6 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 
 @click.command(
     "study",
-    short_help="Compute many runs with varied parameters or motions.",
     epilog=example("vsacli study yield.yaml -o yield.h5"),
 )
 @click.argument("files", type=FILE, metavar="STUDY", nargs=-1, required=True)
@@ -123,7 +123,6 @@ def study(
 
 
 def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json: bool, talk: Talk) -> int:
-    from vsacli.base.outputs import Outputs
     from vsacli.results.store.study_table import StoredStudy
     from vsacli.studies.sweeps import merge
 

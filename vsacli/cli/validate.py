@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 @click.command(
     "validate",
-    short_help="Report every problem of files of any kind.",
     epilog=example("vsacli validate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)

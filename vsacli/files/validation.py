@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from vsacli.base import file_formats
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import counted, listed
+from vsacli.documents.reading import read_document
 from vsacli.files.file_kinds import FileKind, recognize
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
@@ -151,7 +152,6 @@ def _described(path: str, trajectory: Trajectory, notes: Iterable[str]) -> Check
 
 def _poles(path: str, robots: Robots) -> Checked:
     from vsacli.control.poles import PolesFile
-    from vsacli.documents.reading import read_document
 
     document, _ = read_document(path, PolesFile, file_formats.POLES)
     summary = f"poles of {counted(len(document.joints), 'joint')}"

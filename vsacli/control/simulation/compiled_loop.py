@@ -11,6 +11,7 @@ from types import FunctionType, MethodType
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.compute.aligned_rows import address
@@ -54,16 +55,14 @@ def dop853_with_stages() -> Any:
     hooks for that, so the code of its `_step_impl` is run with another `rk_step` and `MAX_FACTOR` among its
     globals.
     """
-    from scipy.integrate import DOP853
-
-    scipy: Any = DOP853  # its type stubs lack the members that a derived method needs
-    weights, times = _tableau(scipy)
-    end = scipy.n_stages
+    dop853: Any = scipy.integrate.DOP853  # its type stubs lack the members that a derived method needs
+    weights, times = _tableau(dop853)
+    end = dop853.n_stages
     step, dense = Stages(1, end, weights, times), Stages(end + 1, len(times) - 1, weights, times)
-    text = scipy._step_impl
+    text = dop853._step_impl
     one_by_one = text.__globals__.get("rk_step")
 
-    class WithStages(scipy):  # type: ignore[misc]
+    class WithStages(dop853):  # type: ignore[misc]
         def __init__(self, *arguments: Any, stages: Any, **options: Any) -> None:
             super().__init__(*arguments, **options)
             self._stages = stages
@@ -85,7 +84,7 @@ def dop853_with_stages() -> Any:
 
         def _dense_output_impl(self) -> Any:
             found = self._stages(self.t_old, self.h_previous, self.y_old, dense, self.K_extended)
-            self.A_EXTRA = scipy.A_EXTRA if found is None else scipy.A_EXTRA[:0]  # stages left to SciPy
+            self.A_EXTRA = dop853.A_EXTRA if found is None else dop853.A_EXTRA[:0]  # stages left to SciPy
             return super()._dense_output_impl()
 
     return WithStages

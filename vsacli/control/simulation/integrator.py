@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -166,8 +167,6 @@ class Integrator:
         return self._solve(times, start, self._budget.too_slow, solver, reserve=len(method.C_EXTRA))
 
     def _implicit(self, times: FloatArray, start: FloatArray) -> Generator[Samples, None, _End]:
-        from scipy.integrate import Radau
-
         slope = partial(jacobian, self.equations)
         try:
             floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
@@ -176,7 +175,7 @@ class Integrator:
             return _End(float(times[0]), self._budget.ending(float(times[0])))
         atol = np.maximum(self._tolerances.atol, floor)
         options: dict[str, Any] = {"jac": slope, "atol": atol}  # SciPy's stubs know only scalar tolerances
-        solver = partial(Radau, self.equations, **options)
+        solver = partial(scipy.integrate.Radau, self.equations, **options)
         return (yield from self._solve(times, start, self._budget.spent, solver, reserve=0))
 
     def _solve(

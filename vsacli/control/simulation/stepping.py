@@ -10,6 +10,7 @@ from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.control.simulation.ending import Budget, Ending, SpentError
@@ -100,10 +101,9 @@ def _stepped(solver: Any, budget: Budget, reserve: int) -> bool:
 
 def _first(crossed: Sequence[Event], inside: Any, solver: Any) -> Stop:
     """Return the stop at the first of the events that occur within the last step of a solver."""
-    from scipy.optimize import brentq
 
     def time_of(event: Event) -> float:
-        return brentq(
+        return scipy.optimize.brentq(
             lambda time: event(time, inside(time)),
             solver.t_old,
             solver.t,

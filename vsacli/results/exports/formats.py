@@ -16,6 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, TextIO, cast
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
@@ -65,9 +66,9 @@ def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], obj
 
     Each variable is read when it is written, so that only one is in memory.
     """
-    from scipy.io import savemat
-
-    savemat(cast("Any", stream), _Variables(selection, done), oned_as="column", long_field_names=True)
+    scipy.io.savemat(
+        cast("Any", stream), _Variables(selection, done), oned_as="column", long_field_names=True
+    )
 
 
 def check_sizes(selection: Selection) -> None:

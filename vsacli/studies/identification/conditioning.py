@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 
@@ -48,9 +49,7 @@ class Filter(NamedTuple):
     @classmethod
     def low_pass(cls, bandwidth: float, rate: float) -> Filter:
         """Return a filter with a bandwidth in Hz for recordings with a sample rate in Hz."""
-        from scipy.signal import butter
-
-        sections = butter(ORDER, bandwidth, fs=rate, output="sos")
+        sections = scipy.signal.butter(ORDER, bandwidth, fs=rate, output="sos")
         return cls(bandwidth, sections, max(1, int(rate / (2 * bandwidth))), int(RINGING * rate / bandwidth))
 
     def smoothed(self, columns: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
@@ -61,10 +60,10 @@ class Filter(NamedTuple):
             ends: continuation beyond both ends: "even" mirrors, which keeps the noise of the last sample as
                 small as that of others; "odd" rotates about the last sample, which keeps the slope.
         """
-        from scipy.signal import sosfiltfilt
-
         beyond = min(self.reach, len(columns) - 1)
-        return np.asarray(sosfiltfilt(self.sections, columns, axis=0, padtype=ends, padlen=beyond))
+        return np.asarray(
+            scipy.signal.sosfiltfilt(self.sections, columns, axis=0, padtype=ends, padlen=beyond)
+        )
 
     def applied(self, columns: FloatArray) -> FloatArray:
         """Return rows of equations, (rows, ...), from columns at the rate of the recording, (samples, ...).
@@ -163,12 +162,10 @@ def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: flo
 
 def spline_derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the first two derivatives of columns, (samples, ...); those of a column with NaN are all NaN."""
-    from scipy.interpolate import make_interp_spline
-
     there = np.isfinite(positions).all(axis=0)
     found = np.full((2, *positions.shape), np.nan)
     if there.any():
-        spline = make_interp_spline(time, positions[:, there], k=SMOOTHNESS)
+        spline = scipy.interpolate.make_interp_spline(time, positions[:, there], k=SMOOTHNESS)
         found[:, :, there] = spline(time, 1), spline(time, 2)
     return found[0], found[1]
 
@@ -245,13 +242,11 @@ def torque_noise(signals: Signals) -> FloatArray:
 
     The noise is assumed white; that of drives which filter their torque is larger.
     """
-    from scipy.signal import sosfreqz
-
     count = len(signals.time)
     if signals.rate / 4 < QUIET_FROM * signals.filter.bandwidth:
         return np.full(signals.tau_motor.shape[1:], np.nan)
     power = np.abs(np.fft.rfft(signals.tau_motor * np.hanning(count)[:, None, None], axis=0)) ** 2
     density = white_noise(power) / np.sum(np.hanning(count) ** 2)
-    _, gain = sosfreqz(signals.filter.sections, worN=1 << 16)
+    _, gain = scipy.signal.sosfreqz(signals.filter.sections, worN=1 << 16)
     passing = float(np.mean(np.abs(gain) ** 4))  # of the power of white noise, forwards and backwards
     return np.asarray(np.sqrt(density * passing))

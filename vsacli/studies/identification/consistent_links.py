@@ -19,6 +19,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.robot.joint import Link
@@ -214,13 +215,11 @@ class _Problem(NamedTuple):
         shift: FloatArray,
     ) -> _Problem:
         """Return the problem for an estimate; `root` is a square root of its covariance."""
-        from scipy.linalg import solve_triangular
-
         q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
         count = len(estimate.values)
         to_estimate = q[:, :count]
-        center = to_estimate @ solve_triangular(r[:count], estimate.values, trans="T")
-        errors = to_estimate @ solve_triangular(r[:count], root, trans="T")
+        center = to_estimate @ scipy.linalg.solve_triangular(r[:count], estimate.values, trans="T")
+        errors = to_estimate @ scipy.linalg.solve_triangular(r[:count], root, trans="T")
         inverse = np.asarray(
             np.linalg.inv(pseudo_inertia(bodies.reshape(-1, len(SYMBOLS)))), dtype=np.float64
         )

@@ -13,6 +13,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import AnyArray, FloatArray, IndexArray
 from vsacli.base.errors import InputError
@@ -282,13 +283,11 @@ def solved(system: System, tolerance: float = SEPARABLE) -> Step:
 
 def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
     """Return the solution for a given noise of each group, (groups,)."""
-    from scipy.linalg import solve_triangular
-
     weight = 1 / noise[system.group]
     split = independence(system.slopes * weight[:, None], tolerance, system.noise()[1] * weight[:, None])
     target = split.q.T @ (system.residual * weight)
     change = np.zeros(system.slopes.shape[1])
-    change[split.kept] = solve_triangular(split.r, target) / split.scale[split.kept]
+    change[split.kept] = scipy.linalg.solve_triangular(split.r, target) / split.scale[split.kept]
     return Step(change, split, weight, noise, float(np.linalg.norm(target)))
 
 
@@ -338,18 +337,17 @@ def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
     Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
     This bias is known roughly, and is counted as an error.
     """
-    from scipy.linalg import solve_triangular
-
     split, weight = step.split, step.weight[:, None]
     of_scores = score_covariance(system, split.q, left * step.weight)
     of_errors = split.q.T @ (system.errors * weight)
     of_residual, of_slopes = system.noise()
     of_residual = of_residual - of_slopes @ step.change
     of_slopes = of_slopes[:, split.kept] / split.scale[split.kept] * weight
-    bias = solve_triangular(split.r, of_slopes.T @ (of_residual * step.weight), trans="T")
+    bias = scipy.linalg.solve_triangular(split.r, of_slopes.T @ (of_residual * step.weight), trans="T")
     of_scores = of_scores + of_errors @ of_errors.T + np.outer(bias, bias)
-    half = solve_triangular(split.r, of_scores)
-    inner = solve_triangular(split.r, half.T) / np.outer(split.scale[split.kept], split.scale[split.kept])
+    half = scipy.linalg.solve_triangular(split.r, of_scores)
+    scale = split.scale[split.kept]
+    inner = scipy.linalg.solve_triangular(split.r, half.T) / np.outer(scale, scale)
     covariance = np.zeros((system.slopes.shape[1],) * 2)
     covariance[np.ix_(split.kept, split.kept)] = inner
     return covariance

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
@@ -98,12 +99,10 @@ def _beyond(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatAr
 
 def _chance(sizes: FloatArray, covariance: FloatArray, freedom: int) -> float:
     """Return the probability that Hotelling's statistic is as large if the true sizes are zero."""
-    from scipy.special import fdtrc
-
     count = len(sizes)
     statistic = float(sizes @ np.linalg.solve(covariance, sizes))
     second = freedom - count + 1
-    return float(fdtrc(count, second, statistic * second / (freedom * count)))
+    return float(scipy.special.fdtrc(count, second, statistic * second / (freedom * count)))
 
 
 CHANCE = 1e-4

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 
@@ -59,8 +60,6 @@ def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None
             is independent.
         noise: noise of the columns, which the remainder of an independent column must exceed.
     """
-    from scipy.linalg import solve_triangular
-
     scale = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
     scaled = columns[:, there] / scale[there]
@@ -70,7 +69,7 @@ def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None
     kept, dropped = there[order], np.setdiff1d(there, there[order])
     q, r = np.linalg.qr(scaled[:, order])
     others = np.setdiff1d(np.arange(len(there)), order)
-    shares = solve_triangular(r, q.T @ scaled[:, others])
+    shares = scipy.linalg.solve_triangular(r, q.T @ scaled[:, others])
     shares[np.abs(shares) < CERTAIN * tolerance] = 0.0
     return Independence(
         kept=kept,

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
@@ -188,8 +189,6 @@ def _link_combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool)
 
 def _springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
     """Return spring parameters that predict best, and their errors as sums of independent errors."""
-    from scipy.linalg import block_diag
-
     springs, roots = [], []
     for each in motors:
         assert isinstance(each.system, MotorSystem), "of motors"
@@ -201,7 +200,7 @@ def _springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | 
         values = each.system.of_file(each.predicting)
         springs += [numbers[at]._replace(value=float(values[at])) for at in places]
         roots.append(axes * np.sqrt(np.maximum(powers, 0.0)))
-    return springs, block_diag(*roots) if roots else None
+    return springs, scipy.linalg.block_diag(*roots) if roots else None
 
 
 def _carried(

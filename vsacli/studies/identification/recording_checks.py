@@ -19,6 +19,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray, IndexArray
@@ -251,11 +252,11 @@ def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tup
 
 def without_delay(signals: Signals, late: float) -> Signals:
     """Return the recording with torques advanced by `late` seconds."""
-    from scipy.interpolate import make_interp_spline
-
     torques = signals.tau_motor.copy()
     there = np.isfinite(torques).all(axis=0)
-    shifted: FloatArray = make_interp_spline(signals.time, torques[:, there], k=3)(signals.time + late)
+    shifted: FloatArray = scipy.interpolate.make_interp_spline(signals.time, torques[:, there], k=3)(
+        signals.time + late
+    )
     torques[:, there] = shifted
     return signals._replace(tau_motor=torques)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
@@ -149,14 +150,12 @@ def _grid(columns: Sequence[Column]) -> FloatArray:
 
 def _on_grid(column: Column, time: FloatArray) -> FloatArray:
     """Return values at the times of the grid: samples if they lie on it, otherwise a spline through them."""
-    from scipy.interpolate import make_interp_spline
-
     step = float(time[1] - time[0])
     first = int(np.argmin(np.abs(column.time - time[0])))
     own = column.time[first : first + len(time)]
     if len(own) == len(time) and np.max(np.abs(own - time)) <= EVEN * step:
         return column.values[first : first + len(time)]
-    return np.asarray(make_interp_spline(column.time, column.values, k=INTERPOLATION)(time))
+    return np.asarray(scipy.interpolate.make_interp_spline(column.time, column.values, k=INTERPOLATION)(time))
 
 
 MOST_LISTED = 3

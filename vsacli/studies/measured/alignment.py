@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.studies.measured.likely_causes import exchanged_places
@@ -160,10 +161,8 @@ def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
 
 def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the sums of first[i] second[i + shift] for shifts from 1 - len(first) to len(second) - 1."""
-    from scipy.fft import irfft, next_fast_len, rfft
-
-    size = next_fast_len(len(first) + len(second) - 1, real=True)
-    product = irfft(np.conj(rfft(first, size)) * rfft(second, size), size)
+    size = scipy.fft.next_fast_len(len(first) + len(second) - 1, real=True)
+    product = scipy.fft.irfft(np.conj(scipy.fft.rfft(first, size)) * scipy.fft.rfft(second, size), size)
     return np.concatenate([product[size - len(first) + 1 :], product[: len(second)]])
 
 
@@ -175,8 +174,6 @@ def _refined(
     Returns:
         Unexplained part, refined shift, and pairings with exchanged columns corrected.
     """
-    from scipy.optimize import minimize_scalar
-
     exact = [exactness(tame(each.measured)) for each in pairings]
     thin = [each.thinned() for each in pairings]
     tamed = [tame(each.measured) for each in thin]
@@ -184,7 +181,7 @@ def _refined(
     def left(pairs: Sequence[Pairing], candidate: float) -> float:
         return float(np.mean([_left(*each, candidate) for each in zip(pairs, tamed, exact, strict=True)]))
 
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda at: left(thin, at),
         bounds=(shift - 2 * step, shift + 2 * step),
         method="bounded",

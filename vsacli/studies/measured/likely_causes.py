@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.studies.measured.agreement import Agreement
@@ -59,10 +60,8 @@ def exchanged(
     """
     if len(measured) < 2:
         return []
-    from scipy.optimize import linear_sum_assignment
-
     costs = np.array([_costs(values, exact[row], computed(row)) for row, values in enumerate(measured)])
-    rows, columns = linear_sum_assignment(costs)
+    rows, columns = scipy.optimize.linear_sum_assignment(costs)
     moved = rows != columns
     left, own = costs[rows, columns][moved], np.diag(costs)[moved]
     if not np.all((left <= own - SAVED) & (left <= LEFT)):

@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.studies.measured.agreement import Still
@@ -33,10 +34,8 @@ SAMPLES_A_COSINE = 4
 
 def covariance_of_sum(scores: FloatArray) -> tuple[FloatArray, int]:
     """Return the covariance of the sum of scores, (samples, unknowns), and the number of cosines used."""
-    from scipy.fft import dct
-
     count = count_of_cosines(len(scores))
-    amplitudes = dct(scores, axis=0, norm="ortho")[1 : count + 1]
+    amplitudes = scipy.fft.dct(scores, axis=0, norm="ortho")[1 : count + 1]
     return len(scores) / count * amplitudes.T @ amplitudes, count
 
 

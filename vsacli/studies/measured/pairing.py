@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray
 
@@ -107,13 +108,11 @@ def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Comput
         values: values, (samples,), NaN where there is none.
         largest: largest absolute value of the variable over all joints.
     """
-    from scipy.interpolate import make_interp_spline
-
     known = np.isfinite(values)
     if np.count_nonzero(known) < FEWEST_SAMPLES:
         return Computed(_nowhere, _nowhere, 0.0, 0.0, moves=False)
     stamps, given = time[known], values[known]
-    spline = make_interp_spline(stamps, given, k=3)
+    spline = scipy.interpolate.make_interp_spline(stamps, given, k=3)
     slope, gaps = spline.derivative(), np.where(known, 0.0, np.nan)
 
     def at(times: FloatArray) -> FloatArray:
@@ -135,13 +134,11 @@ def _nowhere(times: FloatArray) -> FloatArray:
 def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
     """Return the rms error of a cubic spline."""
     # a spline through every second sample has a 16 times larger error, which the other samples show
-    from scipy.interpolate import make_interp_spline
-
     rounding = float(np.finfo(float).eps * np.abs(values).max())
     if len(time) < 2 * FEWEST_SAMPLES:
         return rounding
     between = slice(1, len(time) - 1, 2)
-    coarse = make_interp_spline(time[::2], values[::2], k=3)
+    coarse = scipy.interpolate.make_interp_spline(time[::2], values[::2], k=3)
     inside = time[between] <= time[::2][-1]
     apart = coarse(time[between][inside]) - values[between][inside]
     return rounding + float(np.sqrt(np.mean(apart**2))) / 16

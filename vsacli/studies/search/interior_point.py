@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 
@@ -221,11 +222,9 @@ class _Newton:
 
     def step(self, barrier: float) -> _Step:
         """Return the step; multipliers are eliminated, and the Cholesky factor solves for the unknowns."""
-        from scipy.linalg import cho_solve
-
         assert self.factor is not None
         right = -(self._point.gradient + self._point.pull(barrier / self._slack))
-        unknowns = cho_solve(self.factor, right)
+        unknowns = scipy.linalg.cho_solve(self.factor, right)
         multipliers = (
             barrier / self._slack - self._multipliers + self._stiffening * self._point.changes(unknowns)
         )
@@ -242,13 +241,11 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 
     Return None if that fails, because values overflow or nothing depends on some unknown.
     """
-    from scipy.linalg import LinAlgError, cho_factor
-
     matrix, added = point.newton_matrix(multipliers, stiffening, convex=False), 0.0
     while added <= MOST_ADDED and np.isfinite(matrix).all():
         try:
-            return cho_factor(matrix + added * np.diag(np.abs(np.diag(matrix))), lower=True)
-        except LinAlgError:
+            return scipy.linalg.cho_factor(matrix + added * np.diag(np.abs(np.diag(matrix))), lower=True)
+        except scipy.linalg.LinAlgError:
             if not added:
                 matrix = point.newton_matrix(multipliers, stiffening, convex=True)
             added = max(10 * added, 1e-12)

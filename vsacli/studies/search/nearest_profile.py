@@ -12,6 +12,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, evenly
 from vsacli.base.texts import significant
@@ -94,14 +95,12 @@ def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = 
     Raises:
         NoSplineError: the bounds are too narrow or change too fast.
     """
-    from scipy.interpolate import BSpline
-
     knots, free, smoothing = _knots(bounds, smoothing, knots)
     shapes = _shapes(free)
     size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
     scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
     amounts = _least_amounts(scaled, knots, shapes, smoothing)
-    return BSpline(knots, size * (shapes @ amounts), DEGREE)
+    return scipy.interpolate.BSpline(knots, size * (shapes @ amounts), DEGREE)
 
 
 def _knots(
@@ -151,17 +150,15 @@ def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray
 
 def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
     """Return the coefficient of each shape; bounds are added at instants where they are violated."""
-    from scipy.interpolate import BSpline
-
     root = _objective(knots, shapes, smoothing)
     bounding = np.flatnonzero(bounds.excluding_zero)
     watched = bounding[evenly(len(bounding), MOST_COEFFICIENTS)]
     for _ in range(MOST_ROUNDS):
-        rows = BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray() @ shapes
+        rows = scipy.interpolate.BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray() @ shapes
         finite = np.isfinite(bounds.high[watched])
         above = np.concatenate([bounds.low[watched], -bounds.high[watched][finite]])
         amounts = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
-        missed = bounds.missed_by(BSpline(knots, shapes @ amounts, DEGREE)(bounds.time))
+        missed = bounds.missed_by(scipy.interpolate.BSpline(knots, shapes @ amounts, DEGREE)(bounds.time))
         if missed.max() <= BOUND_ACCURACY:
             return amounts
         watched = np.union1d(watched, peaks(missed))
@@ -170,34 +167,29 @@ def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smooth
 
 def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
     """Return upper triangular R such that |R x|^2 is the integral in smoothing times, by Gauss quadrature."""
-    from scipy.interpolate import BSpline
-
     ends = knots[DEGREE:-DEGREE]
     half = np.diff(ends) / 2
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE + 1)
     time = ((ends[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
     share = np.sqrt(half[:, None] * weights / smoothing).ravel()
-    basis = BSpline(knots, shapes, DEGREE)
+    basis = scipy.interpolate.BSpline(knots, shapes, DEGREE)
     rows = [share[:, None] * basis(time), share[:, None] * smoothing**2 * basis(time, nu=2)]
     return np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"), dtype=np.float64)
 
 
 def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> FloatArray:
     """Return the x that minimizes |root x| subject to rows x >= low."""
-    from scipy.linalg import solve_triangular
-    from scipy.optimize import nnls
-
-    distance_rows = solve_triangular(root, rows.T, trans="T")  # rows of y = root x
+    distance_rows = scipy.linalg.solve_triangular(root, rows.T, trans="T")  # rows of y = root x
     problem = np.concatenate([distance_rows, low[None, :]])
     target = np.append(np.zeros(len(root)), 1.0)
     try:
-        multipliers, _ = nnls(problem, target)
+        multipliers, _ = scipy.optimize.nnls(problem, target)
     except RuntimeError as error:  # too many iterations
         raise NoSplineError from error
     residual = problem @ multipliers - target
     if -residual[-1] < BOUND_ACCURACY:
         raise NoSplineError
-    return np.asarray(solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
+    return np.asarray(scipy.linalg.solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
 
 
 def peaks(missed: FloatArray) -> IndexArray:
@@ -239,10 +231,8 @@ class Change:
     @property
     def rms(self) -> float:
         """Root mean square over time, N m/rad (N/m)."""
-        from scipy.integrate import trapezoid
-
         duration = self.time[-1] - self.time[0]
-        return math.sqrt(float(trapezoid(self.rows[0] ** 2, self.time)) / duration)
+        return math.sqrt(float(scipy.integrate.trapezoid(self.rows[0] ** 2, self.time)) / duration)
 
 
 def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: float | None) -> Change:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.studies.search.loads import Ends
@@ -90,12 +91,9 @@ class SplineSpace:
 
     def of_mean(self, mean: float) -> SplineSpace:
         """Return the splines with a given mean over the span, among them the constant."""
-        from scipy.interpolate import BSpline
-        from scipy.linalg import null_space
-
         ends = self.knots[DEGREE], self.knots[-DEGREE - 1]
-        integrals = BSpline(self.knots, self.shapes, DEGREE).integrate(*ends)
-        return replace(self, shapes=self.shapes @ null_space(integrals[None]), offset=mean)
+        integrals = scipy.interpolate.BSpline(self.knots, self.shapes, DEGREE).integrate(*ends)
+        return replace(self, shapes=self.shapes @ scipy.linalg.null_space(integrals[None]), offset=mean)
 
     def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
         """Return a periodic spline over `count` periods."""
@@ -117,20 +115,16 @@ class SplineSpace:
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
         """Return the shapes with their derivatives, (orders, instants, shapes)."""
-        from scipy.interpolate import BSpline
-
-        every = BSpline(self.knots, self.shapes, DEGREE)
+        every = scipy.interpolate.BSpline(self.knots, self.shapes, DEGREE)
         return np.stack([every(time, nu=order) for order in range(orders)])
 
     def offsets(self, orders: int) -> FloatArray:
         """Return the offset with its derivatives, which are zero, (orders,)."""
         return np.append(self.offset, np.zeros(orders - 1))
 
-    def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
+    def spline(self, amounts: FloatArray) -> scipy.interpolate.BSpline[np.float64]:
         """Return the spline with given coefficients of the shapes, (shapes, ...)."""
-        from scipy.interpolate import BSpline
-
-        return BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
+        return scipy.interpolate.BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
         """Return the coefficients of the spline nearest to values, (shapes,), by least squares."""

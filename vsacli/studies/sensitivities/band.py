@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.friction import REST, FrictionLaws
@@ -60,13 +61,11 @@ class Reversals:
             deviation: standard deviations of the speeds, (samples, joints, 2).
             covariance: covariances of speed and torque without sharp friction, (samples, joints, 2).
         """
-        from scipy.special import ndtr
-
         uncertain = deviation > 0
         scale = np.where(uncertain, deviation, 1.0)
         above, below = (speed - REST) / scale, (-speed - REST) / scale
         forward, backward = self._forward, self._backward
-        up, down = ndtr(above), ndtr(below)
+        up, down = scipy.special.ndtr(above), scipy.special.ndtr(below)
         spread = forward**2 * up + backward**2 * down - (forward * up - backward * down) ** 2
         slope = (forward * np.exp(-(above**2) / 2) + backward * np.exp(-(below**2) / 2)) / np.sqrt(2 * np.pi)
         return np.where(uncertain, spread + 2 * covariance / scale * slope, 0.0)

@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -84,9 +85,7 @@ class Tolerance(NamedTuple):
     def below(self, share: float) -> float:
         """Return the quantile: the deviation below which a share of all deviations lies."""
         if self.shape == "normal":
-            from scipy.special import ndtri
-
-            return self.size * float(ndtri(share))
+            return self.size * float(scipy.special.ndtri(share))
         return self.size * (2 * share - 1)
 
 

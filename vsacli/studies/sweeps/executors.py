@@ -7,6 +7,7 @@ reads the study again from its `Job` and returns an `Answer`; rows do not depend
 from __future__ import annotations
 
 import multiprocessing
+import platform
 import signal
 import warnings
 from abc import ABC, abstractmethod
@@ -331,8 +332,6 @@ def _compute() -> Callable[[Sequence[Any], Sequence[int]], Answer]:
     """
 
     def compute(job: Sequence[Any], runs: Sequence[int]) -> Answer:
-        import platform
-
         from vsacli.studies.sweeps.rows import Job, answer
 
         found = answer(Job(*job), runs)
