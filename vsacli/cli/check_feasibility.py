@@ -34,7 +34,6 @@ from vsacli.cli.option_types import SHARE, Whole
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
-    from vsacli.base.outputs import Outputs
     from vsacli.studies.search import Fixes
 
 

@@ -13,7 +13,6 @@ import click
 from vsacli.cli.file_names import FIGURES, NameType, ending_of
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Number, Words
-from vsacli.results.charts.look import STYLES, drawing_with
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -146,6 +145,8 @@ def figure_options(
             _refuse_unused(target, file_format, chosen)
             if target is None:
                 return command(*args, figures=None, **kwargs)
+            from vsacli.results.charts.look import drawing_with
+
             with drawing_with(_look(**chosen)):
                 return command(*args, figures=target, **kwargs)
 
@@ -190,6 +191,8 @@ def _look(
     Raises:
         InputError: a size is out of range.
     """
+    from vsacli.results.charts.look import STYLES
+
     look = STYLES[style]
     with naming_option("--width"):
         look = replace(look, width=width or look.width)

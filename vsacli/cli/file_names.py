@@ -14,7 +14,6 @@ from click.types import StringParamType
 
 if TYPE_CHECKING:
     import click
-    from click.shell_completion import CompletionItem
 
 
 class NameType(StringParamType):

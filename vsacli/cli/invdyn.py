@@ -32,10 +32,8 @@ from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import HDF5_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import RATE, Words
-from vsacli.cli.plot_recording import RECORDING, recording_figure
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
     from vsacli.results.plots import FigureFiles
 
 
@@ -128,6 +126,7 @@ def invdyn(
         report = compute(run, talk, writer)
         if drawn is not None:
             from vsacli.cli.plot import draw_staged
+            from vsacli.cli.plot_recording import recording_figure
 
             draw_staged(file, drawn, talk)
             if inputs.trajectory.estimates:
@@ -153,6 +152,7 @@ def _figures(
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
+    from vsacli.cli.plot_recording import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
     stored = VARIABLES if variables is None else variables

@@ -16,7 +16,6 @@ import click
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
-from vsacli.base.renamed import successor, usage
 from vsacli.base.storage import reason
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
@@ -193,6 +192,8 @@ def _advised(error: click.ClickException) -> click.ClickException:
     Any other error is returned as it is.
     """
     if isinstance(error, click.NoSuchOption) and error.ctx:
+        from vsacli.base.renamed import successor, usage  # loaded for error messages only
+
         options = [name for each in error.ctx.command.params for name in each.opts]
         if new := successor(error.option_name, options):
             return click.UsageError(

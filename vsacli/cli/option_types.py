@@ -13,8 +13,6 @@ from typing import Any
 import click
 from click.types import FloatParamType, StringParamType
 
-from vsacli.base.renamed import successor
-
 
 class Number(FloatParamType):
     """A finite number.
@@ -144,6 +142,7 @@ class Words(click.Choice[str]):
     def _reason(self, value: str) -> str:
         """Return why a word is refused."""
         from vsacli.base.did_you_mean import nearest  # loaded for error messages only
+        from vsacli.base.renamed import successor
 
         if new := successor(value, self.choices):
             return f"{value!r} is now {new!r}"

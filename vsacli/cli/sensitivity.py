@@ -32,7 +32,7 @@ from vsacli.cli.option_types import SHARE, Whole
 from vsacli.results.charts.ranking import Ranking
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs, Staged
+    from vsacli.base.outputs import Staged
     from vsacli.results.store.derived_files import SensitivityWriter
     from vsacli.robot.model import Robot
     from vsacli.studies.sensitivities import Sensitivity, SensitivityRun

@@ -32,7 +32,6 @@ from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, SHARE, Number, Numbers, Whole, Words
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
     from vsacli.base.variables import Variable
     from vsacli.control.gains import Gains
     from vsacli.control.simulation import InitialError, Sensors, SimulationRun

@@ -24,7 +24,6 @@ from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Words
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
     from vsacli.results.plots import TorqueSpeed
     from vsacli.studies.sizing import MotorSizing, Sizing
 
