@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.base.outputs import Outputs, Staged
-from vsacli.base.storage import temporary_folder
+from vsacli.base.outputs import Outputs
 from vsacli.base.texts import joined
 from vsacli.cli.command_parts import (
     compute,
@@ -32,8 +31,6 @@ from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Whole
 
 if TYPE_CHECKING:
-    from vsacli.analysis.report import Report
-    from vsacli.analysis.run import Run
     from vsacli.studies.search import Fixes
 
 
@@ -127,7 +124,9 @@ def check_feasibility(
         if figures is None:
             report = compute(run, talk)
         else:
-            report = _compute_and_draw(run, figures, run_stem(robot, trajectory), outputs, talk)
+            from vsacli.cli.drawings import compute_and_draw
+
+            report = compute_and_draw(run, figures, run_stem(robot, trajectory), outputs, talk)
         found = None
         if list_fixes or output is not None:
             from vsacli.studies.search import fixes
@@ -148,28 +147,6 @@ def _check_fix_options(number: int | None, output: str | None, changes: tuple[st
         raise click.UsageError("-o FILE needs --write-fix N, the number of a fix as --fixes lists it")
     if changes and output is not None:
         raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
-
-
-def _compute_and_draw(run: Run, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> Report:
-    """Compute, and draw the figure from a temporary result file."""
-    from vsacli.results.charts.figures import (
-        FEASIBILITY,
-        FEASIBILITY_VARIABLES,
-        check_drawable,
-        feasibility,
-    )
-    from vsacli.results.charts.stored import StoredCharts
-    from vsacli.results.store.reader import StoredResult
-    from vsacli.results.store.writer import ResultWriter
-
-    check_drawable([joint.actuator_type for joint in run.robot.joints])
-    figures = target.files([FEASIBILITY], stem, outputs)
-    with temporary_folder() as place:
-        file = Staged.unnamed(place / "result.h5")
-        report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
-        with StoredResult.open(file.temporary) as result:
-            figures.save({FEASIBILITY: feasibility(StoredCharts([result]))})
-    return report
 
 
 def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Talk) -> None:

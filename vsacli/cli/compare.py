@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from vsacli.base.outputs import Outputs
-from vsacli.base.texts import one_line
-from vsacli.base.version import __version__
 from vsacli.cli.command_parts import (
     columns_option,
     example,
@@ -24,16 +22,8 @@ from vsacli.cli.input_errors import naming_kind
 from vsacli.cli.option_types import TIME
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from vsacli.base.outputs import Outputs
-    from vsacli.results.charts.measured import MeasuredCurve
-    from vsacli.results.pages.document import InputText
-    from vsacli.studies.measured import Comparison
-
-LARGEST_DRAWN = 1e30
-"""Magnitude to which drawn values are limited: beyond it, axes have no ticks, and single precision
-overflows."""
+    from vsacli.cli.compare_plots import comparison_page, draw_comparison
 
 
 @click.command(
@@ -90,55 +80,9 @@ def compare(
             ):
                 comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
-                page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
+                page.write_text(comparison_page(comparison, [input_text(each) for each in stored.inputs()]))
         if page is None and figures is not None:
-            _draw(comparison, stem, figures, outputs)
+            draw_comparison(comparison, stem, figures, outputs)
     say(comparison, as_json)
     talk.wrote(outputs)
     return Exit.VERDICT if comparison.warnings else Exit.OK
-
-
-def _draw(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outputs) -> None:
-    """Draw a figure for each measured variable."""
-    from vsacli.results.charts.measured import measured_sheet
-
-    curves = _curves(comparison)
-    files = target.files(curves, stem, outputs)
-    recording, result = (Path(path).stem for path in (comparison.recording, comparison.result))
-    title = f"comparison of recording {recording} with {result}"
-    files.save(
-        {variable: measured_sheet(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
-    )
-
-
-def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
-    """Return an HTML page with the report and all variables."""
-    from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import PageTexts, printable, source_text
-
-    report = printable(comparison.as_text())
-    facts = PageTexts(
-        title=report.headline,
-        label=one_line(f"{comparison.result}, {comparison.recording}"),
-        verdict="",
-        tone="",
-        report=report,
-        provenance=[("vsacli version", __version__), ("result", one_line(comparison.result))],
-        inputs=[*inputs, *map(source_text, comparison.sources)],
-    )
-    return measured_page(facts, _curves(comparison))
-
-
-def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
-    """Return the compared signals, by variable."""
-    import numpy as np
-
-    from vsacli.results.charts.measured import MeasuredCurve
-
-    curves: dict[str, list[MeasuredCurve]] = {}
-    for each in comparison.signals:
-        if each.samples:
-            drawn = np.clip(each.measured, -LARGEST_DRAWN, LARGEST_DRAWN)
-            curve = MeasuredCurve(each.column, each.unit, each.rms, each.time, each.computed, drawn)
-            curves.setdefault(each.variable, []).append(curve)
-    return curves

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import wraps
@@ -201,3 +202,37 @@ def _look(
     with naming_option("--font-size"):
         look = replace(look, font_size=font_size or look.font_size)
     return replace(look, title=look.title and not no_title)
+
+
+class FigurePlace(NamedTuple):
+    """The place of the figures, and the output files of the command."""
+
+    place: FigureTarget
+    outputs: Outputs
+
+    def figures(self, names: Iterable[str], stem: str) -> FigureFiles:
+        """Stage the files of figures."""
+        return self.place.files(names, stem, self.outputs)
+
+
+class DrawnPart(NamedTuple):
+    """The selection to draw: joints (all if empty), a time span, and variables (default figures if None)."""
+
+    joints: tuple[str, ...]
+    span: tuple[float, float]
+    variables: tuple[str, ...] | None
+
+    @property
+    def option(self) -> str:
+        """Name of an option that selects something; empty if everything is to be drawn."""
+        first, last = (math.isfinite(end) for end in self.span)
+        given = {
+            "--variables": self.variables is not None,
+            "--joints": self.joints,
+            "--from": first,
+            "--to": last,
+        }
+        return next((option for option, chosen in given.items() if chosen), "")
+
+
+EVERYTHING = DrawnPart((), (-math.inf, math.inf), None)

@@ -21,7 +21,6 @@ from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
-from vsacli.cli.identify_plots import draw_figures, identification_page
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
 
@@ -137,6 +136,7 @@ def identify(
     _check_options({"--duration": duration, "--sensor-noise": sensor_noise, "--seed": seed}, "needs --plan")
     if not recordings:
         raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
+    from vsacli.cli.identify_plots import draw_figures, identification_page
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
     from vsacli.studies.identification.motor_equations import check_fit

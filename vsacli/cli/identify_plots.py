@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
+from vsacli.results.charts.measured import MeasuredCurve, measured_sheet
+from vsacli.results.pages import measured_page
+from vsacli.results.pages.document import PageTexts, printable, source_text, tone_of
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.cli.figure_options import FigureTarget
-    from vsacli.results.charts.measured import MeasuredCurve
     from vsacli.studies.identification import Identification
 
 PREDICTED = "predicted"
@@ -20,8 +22,6 @@ PREDICTED = "predicted"
 
 def draw_figures(found: Identification, robot: str, target: FigureTarget, outputs: Outputs) -> None:
     """Draw a figure for each recording."""
-    from vsacli.results.charts.measured import measured_sheet
-
     curves = _curves(found)
     names = {record: f"{number}-{Path(record).stem}" for number, record in enumerate(curves, 1)}
     files = target.files(names.values(), Path(robot).stem, outputs)
@@ -45,9 +45,6 @@ def identification_page(found: Identification, columns: str | None) -> str:
     Raises:
         InputError: a library that pages need is not installed.
     """
-    from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import PageTexts, printable, source_text, tone_of
-
     report = printable(found.as_text())
     provenance = [
         ("vsacli version", __version__),
@@ -67,8 +64,6 @@ def identification_page(found: Identification, columns: str | None) -> str:
 
 def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:
     """Return the torques of each recording, by its path."""
-    from vsacli.results.charts.measured import MeasuredCurve
-
     curves: dict[str, list[MeasuredCurve]] = {}
     for each in found.torques:
         curve = MeasuredCurve(each.group, each.unit, each.residual, each.time, each.predicted, each.measured)

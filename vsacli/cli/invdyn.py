@@ -125,7 +125,7 @@ def invdyn(
         writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
         report = compute(run, talk, writer)
         if drawn is not None:
-            from vsacli.cli.plot import draw_staged
+            from vsacli.cli.drawings import draw_staged
             from vsacli.cli.plot_recording import recording_figure
 
             draw_staged(file, drawn, talk)

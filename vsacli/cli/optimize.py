@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from typing import TYPE_CHECKING
 
@@ -27,17 +26,7 @@ from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import SHARE, Words
 
 if TYPE_CHECKING:
-    from vsacli.analysis.result import Result
-    from vsacli.base.arrays import FloatArray
-    from vsacli.results.charts.chart import Sheet
-    from vsacli.results.charts.optimum import Moved
-    from vsacli.robot.joint import Joint
     from vsacli.robot.model import Robot
-    from vsacli.studies.search import Optimum
-    from vsacli.trajectory.trajectory import Trajectory
-
-CHANGE, PACE = "optimum", "pace"
-"""Names of the figures."""
 
 
 @click.command(
@@ -106,6 +95,7 @@ def optimize(
     with naming_option("--min-margin"):
         check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
+    from vsacli.cli.optimize_plots import CHANGE, PACE, optimum_sheets
     from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
 
@@ -136,7 +126,7 @@ def optimize(
         if paths and found.trajectory is not None:
             from vsacli.results.plots import FigureFiles
 
-            sheets = _sheets(found, found.trajectory, inputs.trajectory)
+            sheets = optimum_sheets(found, found.trajectory, inputs.trajectory)
             FigureFiles({name: paths[name] for name in sheets}, outputs).save(sheets)
     talk.wrote(outputs)
     say(found, as_json)
@@ -162,51 +152,3 @@ def _check_objective(robot: Robot, minimize: str, vary: str) -> None:
             check_timing_varies(vary)
         else:
             checked_criterion(robot, minimize, varied if vary == "stiffness" else range(len(robot.joints)))
-
-
-def _sheets(found: Optimum, best: Trajectory, asked: Trajectory) -> dict[str, Sheet]:
-    """Return the figures of the changes at each joint, and of the timing if it was varied."""
-    from vsacli.analysis.run import inverse_dynamics
-    from vsacli.results.charts.optimum import JointChange, change_sheet, pace_sheet
-    from vsacli.studies.search.paced_motion import path_at
-
-    before, after = (inverse_dynamics(found.robot, each) for each in (asked, best))
-    place = after.time - best.start
-    if found.pace is not None:
-        place = path_at(place, found.pace, asked.duration)
-    joints = [
-        JointChange(
-            name=joint.name,
-            joint_type=joint.type,
-            before=_moved(before, before.time - asked.start, index),
-            after=_moved(after, place, index),
-            limits=_torque_limits(joint),
-        )
-        for index, joint in enumerate(found.robot.joints)
-    ]
-    title = f"optimum of {found.robot_name}, {found.asked}: {found.words}"
-    change = f"{title}, before and after"
-    sheets = {CHANGE: change_sheet(joints, change, along_path=found.pace is not None)}
-    if found.pace is not None:
-        uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        sheets[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, f"timing of the {title}")
-    return sheets
-
-
-def _moved(result: Result, place: FloatArray, index: int) -> Moved:
-    """Return stiffness, its attainable range, and motor torques of a joint over places along the motion."""
-    from vsacli.results.charts.optimum import Moved
-
-    stiffness, lower, upper = (
-        row[:, index] for row in (result.stiffness, result.stiffness_min, result.stiffness_max)
-    )
-    return Moved(place, stiffness, lower, upper, result.tau_motor[:, index].T)
-
-
-def _torque_limits(joint: Joint) -> FloatArray:
-    """Return the interval (2,) of torque that all motors of a joint allow."""
-    import numpy as np
-
-    ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]
-    lower, upper = zip(*ranges, strict=True) if ranges else ((-np.inf,), (np.inf,))
-    return np.array([max(lower), min(upper)])

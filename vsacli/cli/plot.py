@@ -3,37 +3,28 @@
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.base import file_formats
 from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
-    result_line,
     words_of,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.figure_options import PAGE, FigureTarget, figure_options
+from vsacli.cli.figure_options import EVERYTHING, PAGE, DrawnPart, FigurePlace, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind, naming_option, recognized
+from vsacli.cli.input_errors import naming_kind, recognized
 from vsacli.cli.option_types import TIME
-from vsacli.cli.plot_page import write_page
-from vsacli.cli.plot_recording import RECORDED, RECORDING, draw_recording, has_recording, recording_figure
-from vsacli.cli.plot_robot import draw_robot, write_robot_page
-from vsacli.cli.sensitivity import RANKING
-from vsacli.results.charts.ranking import Ranking
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from vsacli.base.outputs import Outputs
 
-    from vsacli.base.outputs import Outputs, Staged
-    from vsacli.results.plots import FigureFiles
-    from vsacli.results.store.reader import StoredResult
+RECORDED = frozenset({"table", "motor catalog", "trajectory"})
+"""Kinds of files whose recorded signals are drawn; the reader of a catalog says what it is."""
 
 DRAWN = ("robot", "trajectory", "result", "simulation", "table of a study", "table")
 """Kinds of files of which figures are drawn, as in `FileKind`."""
@@ -120,20 +111,24 @@ def plot(
     for a robot its figures and parameters.
     It requires the package bokeh: pip install bokeh.
     """
-    shown = _Shown(joints or (), _span(start, end), variables)
+    shown = DrawnPart(joints or (), _span(start, end), variables)
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise click.UsageError(f"{twice} is given twice; give each result once")
     inputs = [*files, *filter(None, [robot])]
     with naming_kind("FILE", files, DRAWN), Outputs(overwrite=overwrite, inputs=inputs) as outputs:
-        target = _Target(figures, outputs)
+        target = FigurePlace(figures, outputs)
         kinds = set(map(recognized, files))
         if "robot" in kinds:
+            from vsacli.cli.plot_robot import draw_robot, write_robot_page
+
             _check_robot(files, shown, robot)
             if page := figures.page(Path(files[0]).stem, outputs):
                 write_robot_page(files[0], page)
             else:
                 draw_robot(files[0], target.figures, talk)
         elif kinds & RECORDED:
+            from vsacli.cli.plot_recording import draw_recording
+
             _check_recording(files, shown, figures.file_format)
             draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
         elif robot is not None:
@@ -141,22 +136,13 @@ def plot(
                 "--robot is only for recordings; leave it out, results contain their robot"
             )
         else:
-            _draw_computed([Path(file) for file in files], shown, target, talk)
+            from vsacli.cli.drawings import draw_computed
+
+            draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
 
 
-class _Target(NamedTuple):
-    """The place of the figures, and the output files of the command."""
-
-    place: FigureTarget
-    outputs: Outputs
-
-    def figures(self, names: Iterable[str], stem: str) -> FigureFiles:
-        """Stage the files of figures."""
-        return self.place.files(names, stem, self.outputs)
-
-
-def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None) -> None:
+def _check_robot(files: tuple[str, ...], shown: DrawnPart, robot: str | None) -> None:
     """Refuse options that do not apply to figures of robots.
 
     Raises:
@@ -164,13 +150,13 @@ def _check_robot(files: tuple[str, ...], shown: _Shown, robot: str | None) -> No
     """
     if len(files) > 1:
         raise click.UsageError("robots are drawn one at a time; give one robot file and nothing else")
-    if shown != _EVERYTHING:
+    if shown != EVERYTHING:
         raise click.UsageError(f"{shown.option} cannot be used with a robot; leave it out")
     if robot is not None:
         raise click.UsageError("--robot is only for recordings; leave it out")
 
 
-def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:
+def _check_recording(files: tuple[str, ...], shown: DrawnPart, file_format: str) -> None:
     """Refuse options that do not apply to figures of recordings.
 
     Raises:
@@ -185,56 +171,6 @@ def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) ->
         raise click.UsageError(f"{option} needs a result, which `vsacli invdyn` computes from a recording")
 
 
-def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw results, simulations, study tables or a sensitivity analysis."""
-    kind = _kind_of(paths)
-    if kind in (file_formats.STUDY_TABLE, file_formats.SENSITIVITY) and shown != _EVERYTHING:
-        words = "study tables" if kind == file_formats.STUDY_TABLE else "sensitivity files"
-        raise click.UsageError(f"{shown.option} cannot be used with {words}; leave it out")
-    if kind == file_formats.SENSITIVITY:
-        _draw_ranking(paths, target, talk)
-    elif target.place.file_format == PAGE:
-        if (of_times := shown._replace(span=_EVERYTHING.span)) != _EVERYTHING:
-            raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
-        write_page(paths, None if kind == file_formats.STUDY_TABLE else shown.span, *target, talk)
-    elif kind == file_formats.STUDY_TABLE:
-        _draw_studies(paths, target)
-    elif len(paths) == 1:
-        _draw_file(paths[0], shown, target, talk)
-    else:
-        _draw_comparison(paths, shown, target, talk)
-
-
-class _Shown(NamedTuple):
-    """The selection to draw: joints (all if empty), a time span, and variables (default figures if None)."""
-
-    joints: tuple[str, ...]
-    span: tuple[float, float]
-    variables: tuple[str, ...] | None
-
-    @property
-    def option(self) -> str:
-        """Name of an option that selects something; empty if everything is to be drawn."""
-        first, last = (math.isfinite(end) for end in self.span)
-        given = {
-            "--variables": self.variables is not None,
-            "--joints": self.joints,
-            "--from": first,
-            "--to": last,
-        }
-        return next((option for option, chosen in given.items() if chosen), "")
-
-    def of(self, stored: StoredResult) -> StoredResult:
-        """Return the selected part of an open file; the file itself if all of it is selected."""
-        from vsacli.results.store.excerpt import Excerpt
-
-        everything = not self.joints and self.span == _EVERYTHING.span
-        return stored if everything else Excerpt(stored, self.joints, self.span)
-
-
-_EVERYTHING = _Shown((), (-math.inf, math.inf), None)
-
-
 def _span(start: float | None, end: float | None) -> tuple[float, float]:
     """Return the first and the last time to draw.
 
@@ -245,119 +181,3 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
     if not span[0] <= span[1]:
         raise click.UsageError(f"--from {span[0]:g} must be before --to {span[1]:g}")
     return span
-
-
-def _kind_of(paths: list[Path]) -> str | None:
-    """Return the format of the first file; study tables are only drawn among themselves.
-
-    Raises:
-        click.UsageError: some files are study tables, and others are not.
-    """
-    from vsacli.results.store.reader import stored_format
-
-    there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
-    formats = [stored_format(path) for path in there]
-    are = [each == file_formats.STUDY_TABLE for each in formats]
-    if any(are) and not all(are):
-        table, other = there[are.index(True)], there[are.index(False)]
-        raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
-    return formats[0]
-
-
-def _draw_ranking(paths: list[Path], target: _Target, talk: Talk) -> None:
-    """Draw the ranking of a sensitivity file."""
-    from vsacli.results.plots import ranking_figure
-    from vsacli.results.store.damage import reporting_damage
-    from vsacli.results.store.sensitivity_file import StoredSensitivity
-
-    if len(paths) > 1:
-        raise click.UsageError("sensitivity analyses are drawn one at a time")
-    if target.place.file_format == PAGE:
-        raise click.UsageError("--format html is for results, simulations and studies; leave it out")
-    with StoredSensitivity.open(paths[0]) as stored, reporting_damage(paths[0]):
-        talk.detail(result_line(stored))
-        ranking = Ranking.of(stored.report_json, stored.joint_names)
-        if stored.report_json.get("band"):
-            talk.note(f"{paths[0]}: no figure of the tolerance bands: `vsacli sensitivity --plot` draws it")
-    target.figures([RANKING], paths[0].stem).save({RANKING: ranking_figure(ranking)})
-
-
-def _draw_studies(paths: list[Path], target: _Target) -> None:
-    """Draw the figures of a study, or compare the distributions of margins of several studies."""
-    from vsacli.results.charts.comparison import COMPARISON
-    from vsacli.results.plots import compared_studies, study_figures
-    from vsacli.results.store.study_table import StoredStudy
-
-    stem = "-".join(path.stem for path in paths)
-    with ExitStack() as stack:
-        tables = [stack.enter_context(StoredStudy(path)) for path in paths]
-        if len(tables) == 1:
-            figures = study_figures(tables[0])
-        else:
-            figures = {COMPARISON: compared_studies(tables, [path.stem for path in paths])}
-    target.figures(figures, stem).save(figures)
-
-
-def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
-    """Draw the figures of one file, and of the recording that it was computed from."""
-    from vsacli.results.charts.figures import chosen_figures
-    from vsacli.results.store.reader import open_stored
-
-    with open_stored(path) as stored:
-        talk.detail(result_line(stored))
-        part = shown.of(stored)
-        with naming_option("--variables"):
-            names = chosen_figures(part, shown.variables)
-        recorded = shown.variables is None and has_recording(stored, talk)
-        figures = target.figures([*names, RECORDING] if recorded else names, path.stem)
-        _draw(part, path, figures, talk, shown.variables)
-        if recorded:
-            from vsacli.files.repetition import rebuilt
-
-            robot, trajectory = rebuilt(stored)
-            profiles = trajectory.estimates.values()
-            figures.save(recording_figure(robot, profiles, path, shown.joints, shown.span))
-
-
-def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
-    """Draw the figures of a file that this command has written."""
-    from vsacli.results.store.reader import open_stored
-
-    with open_stored(file.temporary) as stored:
-        _draw(stored, file.path, figures, talk)
-
-
-def _draw(
-    stored: StoredResult,
-    path: Path,
-    figures: FigureFiles,
-    talk: Talk,
-    variables: tuple[str, ...] | None = None,
-) -> None:
-    """Draw the figures of an open file; report figures for which variables are missing."""
-    from vsacli.results.charts.figures import drawings_of, omitted_figures
-    from vsacli.results.plots import draw_stored
-
-    if variables is None:
-        for reason in omitted_figures(drawings_of(stored), stored.variables).values():
-            talk.note(f"{path}: {reason}")
-    for name, figure in draw_stored(stored, variables):
-        figures.save({name: figure})
-        del figure  # else it stays in memory while the next one is drawn
-
-
-def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    from vsacli.base.variables import select_variables
-    from vsacli.results.charts.comparison import comparison_names
-    from vsacli.results.plots import compare_files
-    from vsacli.results.store.reader import open_stored
-
-    stem = "-".join(path.stem for path in paths)
-    files = target.figures(comparison_names(shown.variables), stem)
-    with ExitStack() as stack:
-        opened = [stack.enter_context(open_stored(path)) for path in paths]
-        for each in opened:
-            talk.detail(result_line(each))
-        with naming_option("--variables"):
-            select_variables(shown.variables or (), opened[0].declared)
-        files.save(compare_files([shown.of(each) for each in opened], shown.variables))

@@ -8,16 +8,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
+from vsacli.documents.reading import written
+from vsacli.files.repetition import rebuilt
+from vsacli.files.stored_reports import stored_report
+from vsacli.results.pages import FixText, result_page, study_page
+from vsacli.results.store.excerpt import Excerpt
+from vsacli.results.store.reader import open_stored
+from vsacli.results.store.study_table import StoredStudy
+from vsacli.studies.search import fixes
+from vsacli.studies.sweeps import StudySummary
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.base.progress import Bar
     from vsacli.cli.figure_options import FigureTarget
-    from vsacli.results.pages import FixText
     from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
 
@@ -41,11 +50,6 @@ def write_page(
 
 
 def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
-    from vsacli.files.stored_reports import stored_report
-    from vsacli.results.pages import result_page
-    from vsacli.results.store.excerpt import Excerpt
-    from vsacli.results.store.reader import open_stored
-
     with ExitStack() as stack:
         whole = [stack.enter_context(open_stored(path)) for path in paths]
         for each in whole:
@@ -75,11 +79,6 @@ def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
 
 def _fix(result: StoredResult, talk: Talk) -> FixText | None:
     """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
-    from vsacli.base.flags import MIN_MARGIN
-    from vsacli.files.repetition import rebuilt
-    from vsacli.results.pages import FixText
-    from vsacli.studies.search import fixes
-
     try:
         provenance = result.provenance()
         _check_version(provenance["generated_by"], result.path)
@@ -110,9 +109,6 @@ def _check_version(made_by: str, path: Path) -> None:
 
 def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
     """Return announcement and command of the next step: write the first fix, or list all fixes again."""
-    from vsacli.base.flags import MIN_MARGIN
-    from vsacli.documents.reading import written
-
     inputs = result.inputs()
     files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
     parts = ["vsacli", "check-feasibility", *files]
@@ -135,10 +131,6 @@ def _named(path: str) -> str:
 
 
 def _studies(paths: list[Path]) -> str:
-    from vsacli.results.pages import study_page
-    from vsacli.results.store.study_table import StoredStudy
-    from vsacli.studies.sweeps import StudySummary
-
     with ExitStack() as stack:
         tables = [stack.enter_context(StoredStudy(path)) for path in paths]
         return study_page(tables, [StudySummary.of(table).as_text() for table in tables])

@@ -10,6 +10,12 @@ from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import Talk
+from vsacli.documents.source import is_table
+from vsacli.files.placeholder_robot import placeholder_robot
+from vsacli.files.recordings.fit_curves import recorded_curves, table_profiles
+from vsacli.results.plots import recorded_figure
+from vsacli.results.store.excerpt import WHOLE
+from vsacli.trajectory.file import load_trajectory
 
 if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
@@ -21,9 +27,6 @@ if TYPE_CHECKING:
 
 RECORDING = "recording"
 """Name of the figure of recorded signals, with their splines and the noise found in them."""
-
-RECORDED = frozenset({"table", "motor catalog", "trajectory"})
-"""Kinds of files whose recorded signals are drawn; the reader of a catalog says what it is."""
 
 
 def draw_recording(
@@ -49,11 +52,6 @@ def draw_recording(
         InputError: the file cannot be used, or no spline was fitted to it.
         StorageError: the figure cannot be written.
     """
-    from vsacli.documents.source import is_table
-    from vsacli.files.placeholder_robot import placeholder_robot
-    from vsacli.files.recordings.fit_curves import table_profiles
-    from vsacli.trajectory.file import load_trajectory
-
     robot = read_robot(robot_path, argument="--robot") if robot_path else placeholder_robot(path).robot
     figures = staged([RECORDING], Path(path).stem)
     if is_table(path):
@@ -85,10 +83,6 @@ def recording_figure(
     Raises:
         InputError: a joint is unknown, or no sample lies in the span.
     """
-    from vsacli.files.recordings.fit_curves import recorded_curves
-    from vsacli.results.plots import recorded_figure
-    from vsacli.results.store.excerpt import WHOLE
-
     curves = recorded_curves(profiles, robot.joint_types, file, joints, span or WHOLE)
     return {RECORDING: recorded_figure(curves, f"{Path(file).stem}: recorded signals and their splines")}
 

@@ -7,6 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vsacli.cli.console import Talk
+from vsacli.files.info import render
+from vsacli.files.info.robot_info import describe_robot, load_sizes, static_load
+from vsacli.results.charts.arm_chart import arm_chart
+from vsacli.results.charts.robot_charts import actuator_charts
+from vsacli.results.pages import robot_page
+from vsacli.results.pages.document import source_text
+from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
+from vsacli.results.plots.figures import rendered_figure
+from vsacli.robot.file import load_robot
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Staged
@@ -39,8 +48,6 @@ def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk:
         InputError: the robot cannot be used.
         StorageError: a figure cannot be written.
     """
-    from vsacli.robot.file import load_robot
-
     robot = load_robot(path)
     names = _names(robot)
     staged(names, Path(path).stem).save(_figures(robot))
@@ -55,13 +62,6 @@ def write_robot_page(path: str, page: Staged) -> None:
         InputError: the robot cannot be used.
         StorageError: the page cannot be written.
     """
-    from vsacli.files.info import render
-    from vsacli.files.info.robot_info import describe_robot
-    from vsacli.results.pages import robot_page
-    from vsacli.results.pages.document import source_text
-    from vsacli.results.plots.figures import rendered_figure
-    from vsacli.robot.file import load_robot
-
     robot = load_robot(path)
     drawn = {WORDS[name]: rendered_figure(figure, "svg") for name, figure in _figures(robot).items()}
     inputs = [source_text(source) for source in robot.sources]
@@ -75,11 +75,6 @@ def _names(robot: Robot) -> list[str]:
 
 
 def _figures(robot: Robot) -> Figures:
-    from vsacli.files.info.robot_info import load_sizes, static_load
-    from vsacli.results.charts.arm_chart import arm_chart
-    from vsacli.results.charts.robot_charts import actuator_charts
-    from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
-
     figures = {ARM: arm_figure(arm_chart(robot))}
     if _names(robot) != [ARM]:
         charts = actuator_charts(robot, load_sizes(static_load(robot)).tolist())

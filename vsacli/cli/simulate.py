@@ -238,7 +238,7 @@ def simulate(
         writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
         report = _run(run, talk, writer)
         if drawn is not None:
-            from vsacli.cli.plot import draw_staged
+            from vsacli.cli.drawings import draw_staged
 
             draw_staged(file, drawn, talk)
     code = _show(report, as_json)
