@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,10 +19,6 @@ from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind
 from vsacli.cli.option_types import TIME
-
-if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
-    from vsacli.cli.compare_plots import comparison_page, draw_comparison
 
 
 @click.command(
@@ -65,6 +60,7 @@ def compare(
     to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
     that the recording does not fit the result.
     """
+    from vsacli.cli.compare_plots import comparison_page, draw_comparison
     from vsacli.results.pages.document import input_text
     from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare as compared

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -19,9 +18,6 @@ from vsacli.cli.figure_options import EVERYTHING, PAGE, DrawnPart, FigurePlace, 
 from vsacli.cli.file_names import FILE
 from vsacli.cli.input_errors import naming_kind, recognized
 from vsacli.cli.option_types import TIME
-
-if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
 
 RECORDED = frozenset({"table", "motor catalog", "trajectory"})
 """Kinds of files whose recorded signals are drawn; the reader of a catalog says what it is."""

@@ -9,7 +9,7 @@ from vsacli.base.lazy import LazyRegistry
 
 _LINES = LazyRegistry(
     {
-        "robot": "vsacli.files.info.robot_text:robot_lines",
+        "robot": "vsacli.files.info.robot_lines:robot_lines",
         "trajectory": "vsacli.files.info.trajectory_info:trajectory_lines",
         "recording": "vsacli.files.recordings:recording_lines",
         "result": "vsacli.files.info.result_info:result_lines",
