@@ -141,7 +141,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
     noise = followed_noise(part.spline, part.inside, _interval(record), record.order, bandwidth, rings=rings)
     if not (noise.share and part.exact and record.least):
         return noise
-    return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))
+    return noise._replace(share=noise.share * min(1.0, part.size(record.order).item() / record.least))
 
 
 def _interval(record: Record) -> float:
@@ -154,12 +154,7 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     known = part.smoothing
     if known is None or not noise.share or (part.smooth and noise.relative <= known.relative):
         return part
-    return replace(part, smoothing=known.following(noise, _size(part, record.order)), noise=noise)
-
-
-def _size(part: Part, order: int) -> float:
-    """Return the root mean square of a derivative of one component away from the ends."""
-    return float(np.sqrt(np.mean(part.spline(np.linspace(*part.inside, PROBES), nu=order) ** 2)))
+    return replace(part, smoothing=known.following(noise, part.size(record.order).item()), noise=noise)
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:
@@ -277,7 +272,7 @@ def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
         return None
     free = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
     noise = followed_noise(free.spline, free.inside, _interval(record), record.order)
-    explained = noise.share and _size(free, record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
+    explained = noise.share and free.size(record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
     return missed if missed.size > explained else None
 
 
