@@ -105,11 +105,20 @@ def test_ends_at_which_a_filter_rings_are_left_out(seed, rings):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [134, 262, 278, 302, 398])
+@pytest.mark.parametrize("seed", [134, 262, 278, 302, 398, 1270, 2214])
 def test_noise_between_ends_that_ring_counts(seed):
-    """Torques were wrong by 4 to 32 %, and by 24 deviations and more."""
+    """Torques were wrong by 1.3 to 32 %, and by 9 deviations and more."""
     judged = judge_hard(draw_hard(seed))
     assert not judged.wrong
+    assert judged.error < 5 * judged.stated
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1378, 1386, 1410])
+def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(seed):
+    """Torques were wrong by 15 to 82 %, and by up to 18 deviations."""
+    judged = judge_hard(draw_hard(seed))
+    assert judged.error < 0.05
     assert not judged.beyond
 
 
@@ -156,6 +165,8 @@ def test_the_unseen_half_is_right_or_in_doubt(family):
     seeds = [seed for seed in range(1, 200, 2) if FAMILIES[seed // 2 % len(FAMILIES)] == family]
     judged = [judge_hard(draw_hard(seed)) for seed in seeds]
     assert not any(each.wrong for each in judged)
+    # at the edge of a sharp filter noise looks like a line, and so like a motion, in 1 of 25 that ring
+    assert sum(each.beyond for each in judged) <= (family == "ringing")
     within_reach = [each for each in judged if each.attainable <= 0.1]
     assert sum(each.verdict == "ok" for each in within_reach) >= 0.6 * len(within_reach)
     ratios = [each.stated / each.error for each in judged if np.isfinite(each.stated)]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.fits.least_squares import fit_spline, most_spans
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -76,6 +77,14 @@ LINE_RATIO = 30.0
 TAPERED = 10
 """Inverse of the share of a stretch at each end where the window is too small to divide by."""
 
+DEGREE, SPANS_PER_PERIOD = 7, 2.8
+"""Degree of a spline that follows the motion alone, and spans per period of the motion's highest
+frequency. Of such a sine 1 % is left, and of noise most from 1.4 times that frequency on."""
+
+TRANSIENT = 4.0
+"""Duration of the transient of a filter at an end, unless it rings, in periods of the frequency at which the
+density of noise is largest, its cut-off."""
+
 
 WITHIN = 0.99
 """Share of a derivative's power within its band."""
@@ -101,6 +110,11 @@ class FollowedNoise(NamedTuple):
     def relative(self) -> float:
         """Root mean square over that of the derivative without the noise."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
+
+    @property
+    def transient(self) -> float:
+        """Time after which the transient of the filter at an end is over, s; 0 without noise."""
+        return TRANSIENT / self.peak
 
     def covariance(self, orders: int) -> FloatArray:
         """Return the covariance of value and derivatives, (orders, orders), over the highest one's power.
@@ -191,8 +205,18 @@ def followed_noise(
         if steady and peak > (bandwidth or 0) and _is_noise(spectrum, bands, valley, top):
             power = float(np.sum((bands.width * bands.derivative)[valley:])) * len(spectrum.lines)
             above = _end_of_motion(spectrum, bands, valley, top)
-            return max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
-    return found
+            found = max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
+            break
+    if not found.share:
+        return found
+    grid = np.linspace(*inside, SEGMENT_SAMPLES)
+    row = spline(grid, nu=order)[:, 0]
+    spans = min(
+        int(SPANS_PER_PERIOD * found.above * (inside[1] - inside[0])) + 1, most_spans(len(grid), DEGREE)
+    )
+    rest = row - fit_spline(grid, row[None], spans, DEGREE)(grid)[:, 0]
+    # Unlike the window of a spectrum, this includes what a transient of the filter adds near the ends.
+    return found._replace(share=max(found.share, float(np.std(rest) / np.sqrt(np.mean(row**2)))))
 
 
 def motion_band(
