@@ -71,6 +71,11 @@ HIGH = 30.0
 """Smallest rise of a high hump; its square if there is no motion in the bands below. Humps of a smooth motion
 rose by 6, and by 550 beyond the slowest lines."""
 
+EDGE, BEFORE_EDGE, BEYOND_EDGE = 1e-3, 0.93, 1.25
+"""Largest density of the samples beyond the edge of a steep filter, where a hump ends, over that at the edge;
+frequencies before and beyond the edge, over its own. At the edge the filter rings like a sine: lines before
+it decide whether the hump is random."""
+
 LINE_RATIO = 30.0
 """Ratio of the power of a line to the medians near it above which it is motion."""
 
@@ -325,10 +330,18 @@ def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> Float
 
 def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> float:
     """Return the frequency, Hz, of a valley, or of a later line of motion, which medians ignore."""
-    first, last = int(bands.line[valley]), int(bands.line[top]) + 1
+    first, last = int(bands.line[valley]), _before_edge(bands, top) + 1
     power = spectrum.power[:, first:last].mean(axis=0)
     lines = np.flatnonzero(power > LINE_RATIO * _medians(spectrum, bands, first, last))
     return float(spectrum.frequency[first + (int(lines[-1]) if lines.size else 0)])
+
+
+def _before_edge(bands: _Bands, top: int) -> int:
+    """Return the last line of a hump, or the last before the edge of a steep filter that ends it."""
+    line = int(bands.line[top])
+    beyond = int(np.searchsorted(bands.line, BEYOND_EDGE * line))
+    steep = beyond < len(bands.line) and bands.samples[beyond] < EDGE * bands.samples[top]
+    return int(BEFORE_EDGE * line) if steep else line
 
 
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
@@ -337,11 +350,13 @@ def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool
     motion = np.max(density[:valley], initial=0.0)
     rise = density[top] / density[valley]
     high = rise > (HIGH if motion > RISE * density[valley] else HIGH**2)
-    chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
-    first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
+    first, last = int(bands.line[valley]), _before_edge(bands, top)
+    if last == bands.line[top] or last - first < LEAST_LINES:
+        chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
+        first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
+        if (last - first) * len(spectrum.power) < (FEW_LINES if high else FEWEST_LINES):
+            return False
     power = spectrum.power[:, first:last]
-    if (last - first) * len(power) < (FEW_LINES if high else FEWEST_LINES):
-        return False
     medians = _medians(spectrum, bands, first, last)
     scatter = np.std(np.log(np.maximum(power, np.finfo(float).tiny) / medians))
     if np.sum(power) > PEAKED * len(power) * np.sum(medians) or not SCATTER[0] < scatter < SCATTER[1]:
