@@ -190,9 +190,7 @@ def test_velocities_at_the_ends_of_a_recording_have_their_deviation(vsacli, tmp_
 def test_the_unseen_half_is_right_or_in_doubt(family):
     seeds = [seed for seed in range(1, 200, 2) if FAMILIES[seed // 2 % len(FAMILIES)] == family]
     judged = [judge_hard(draw_hard(seed)) for seed in seeds]
-    assert not any(each.wrong for each in judged)
-    # at the edge of a sharp filter noise looks like a line, and so like a motion, in 1 of 25 that ring
-    assert sum(each.beyond for each in judged) <= (family == "ringing")
+    assert not any(each.wrong or each.beyond for each in judged)
     within_reach = [each for each in judged if each.attainable <= 0.1]
     assert sum(each.verdict == "ok" for each in within_reach) >= 0.6 * len(within_reach)
     ratios = [each.stated / each.error for each in judged if np.isfinite(each.stated)]

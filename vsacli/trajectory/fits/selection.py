@@ -135,7 +135,8 @@ def _without_ends(part: Part, record: Record) -> tuple[Part, FollowedNoise]:
     """
     part = replace(part, ringing=ringing_ends(part.spline, part.inside, record.order))
     noise = _noise_of(record, part)
-    part = replace(part, transient=noise.transient)
+    if part.exact or part.smooth:  # a least-squares spline has a cut-off of its own
+        part = replace(part, transient=noise.transient)
     between = _noise_of(record, part) if noise.share else noise
     return part, between if between.share else noise
 
