@@ -23,7 +23,7 @@ def stepwise():
 def test_a_component_that_is_not_resolved_has_no_covariance_but_a_bound(stepwise):
     (part,) = stepwise.parts
     assert not part.smoothing.resolved
-    time = np.linspace(*part.inside, 500)
+    time = np.linspace(*part.inside, 4000)
     assert np.isnan(stepwise.covariance(time)).all()
     ((members, bound),) = unresolved(stepwise, 5)
     size = np.sqrt(np.mean(part.at(time, 5)[4] ** 2))

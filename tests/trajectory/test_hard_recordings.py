@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from samples.hard_recordings import FAMILIES, draw_hard, judge_hard, pendulum_motion
 from samples.marks import slow
+from samples.random_recordings import fourier_series
 from samples.recorded_torques import MOTOR, lifting
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, ellip, sosfiltfilt, sosfreqz
 
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.rigid import Rigid
@@ -105,12 +106,46 @@ def test_ends_at_which_a_filter_rings_are_left_out(seed, rings):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [134, 262, 278, 302, 398])
+@pytest.mark.parametrize("seed", [134, 262, 278, 302, 398, 1270, 2214])
 def test_noise_between_ends_that_ring_counts(seed):
-    """Torques were wrong by 4 to 32 %, and by 24 deviations and more."""
+    """Torques were wrong by 1.3 to 32 %, and by 9 deviations and more."""
     judged = judge_hard(draw_hard(seed))
     assert not judged.wrong
+    assert judged.error < 5 * judged.stated
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1378, 1386, 1410])
+def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(seed):
+    """Torques were wrong by 15 to 82 %, and by up to 18 deviations."""
+    judged = judge_hard(draw_hard(seed))
+    assert judged.error < 0.05
     assert not judged.beyond
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [20008, 20018, 20020])
+def test_noise_counts_up_to_a_sharp_edge_at_which_the_filter_rings_like_a_sine(seed):
+    """Fourth derivatives were off by 48 to 187 deviations, accelerations by 467 to 2715."""
+    rng, rate = np.random.default_rng(seed), 1000.0
+    time = np.arange(int(rate * rng.uniform(8, 14))) / rate
+    period = 2 * (len(time) - 1)
+    series = fourier_series(rng, "faster sines", period, rate, rng.uniform(1, 2))
+    values = np.fft.irfft(series, period)
+    series *= min(rng.uniform(0.3, 3) / np.ptp(values), 8 / np.abs(np.diff(values)).max() / rate)
+    exact = np.fft.irfft(series, period)[: len(time)]
+    order, cutoff, level = int(rng.integers(5, 8)), rng.uniform(4, 5), rng.uniform(1e-3, 2e-3)
+    sections = ellip(order, 0.5, 40, cutoff, fs=rate, output="sos")
+    recorded = sosfiltfilt(sections, exact + level * rng.standard_normal(len(exact)))
+    gain = np.abs(sosfreqz(sections, np.linspace(0, np.pi, len(exact)))[1]) ** 2
+    fit = fit_samples(time, recorded[None], 7, 4, None)
+    inside = (time >= fit.parts[0].inside[0]) & (time <= fit.parts[0].inside[1])
+    for derivative in (2, 4):
+        turn = 2j * np.pi * np.fft.rfftfreq(period, 1 / rate)
+        truth = np.fft.irfft(turn**derivative * gain * series, period)[: len(time)]
+        error = np.sqrt(np.mean((fit.at(time, 5)[derivative, 0] - truth)[inside] ** 2))
+        stated = np.sqrt(np.mean(fit.covariance(time)[0, derivative, derivative][inside]))
+        assert 0.3 < stated / error < 3
 
 
 def test_motions_that_begin_and_end_at_once_do_not_ring():
@@ -155,7 +190,7 @@ def test_velocities_at_the_ends_of_a_recording_have_their_deviation(vsacli, tmp_
 def test_the_unseen_half_is_right_or_in_doubt(family):
     seeds = [seed for seed in range(1, 200, 2) if FAMILIES[seed // 2 % len(FAMILIES)] == family]
     judged = [judge_hard(draw_hard(seed)) for seed in seeds]
-    assert not any(each.wrong for each in judged)
+    assert not any(each.wrong or each.beyond for each in judged)
     within_reach = [each for each in judged if each.attainable <= 0.1]
     assert sum(each.verdict == "ok" for each in within_reach) >= 0.6 * len(within_reach)
     ratios = [each.stated / each.error for each in judged if np.isfinite(each.stated)]

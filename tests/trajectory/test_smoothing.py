@@ -165,7 +165,7 @@ def test_estimate_is_that_of_dense_algebra(degree):
     row = np.sin(3 * time) + 0.01 * np.random.default_rng(2).standard_normal(300)
     bins = Bins.of(Moments.of(time, row, 40, degree))
     penalties = np.geomspace(1e-3, 1e2, bins.coefficients - degree)
-    model = Model(bins, 0.4, penalties, 1)
+    model = Model(bins, bins.whitened(0.4), penalties, 1)
     lag = 0.4**bins.gaps
     differences = np.eye(len(bins.means))
     differences[np.arange(1, len(lag) + 1), np.arange(len(lag))] = -lag

@@ -6,7 +6,7 @@ unknowns and their covariances.
 
 from __future__ import annotations
 
-from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,9 @@ from vsacli.base.arrays import FloatArray, IndexArray
 BLOCK = 12
 """Number of unknowns of a block, and largest width of a row. A row of B-splines of degree 7 has eight
 coefficients; the difference of two neighboring rows, at most two spans apart, has more."""
+
+LOWER = np.tri(BLOCK)
+"""Mask of the lower triangle of a block."""
 
 
 class Rows(NamedTuple):
@@ -33,25 +36,30 @@ class Rows(NamedTuple):
 
 
 class Factor(NamedTuple):
-    """The block-bidiagonal triangular factors of several estimations (candidates), and their residuals.
+    """A block-bidiagonal triangular factor, and its residual.
 
     Attributes:
-        diagonal: diagonal blocks, (candidates, blocks, `BLOCK`, `BLOCK`).
+        diagonal: diagonal blocks, (blocks, `BLOCK`, `BLOCK`).
         upper: blocks to the right of these, same shape.
-        right: transformed right-hand side, (candidates, blocks, `BLOCK`).
-        rest: residual sum of squares, (candidates,).
+        right: transformed right-hand side, (blocks, `BLOCK`).
+        rest: residual sum of squares.
     """
 
     diagonal: FloatArray
     upper: FloatArray
     right: FloatArray
-    rest: FloatArray
+    rest: float
 
     @property
-    def log_determinants(self) -> FloatArray:
-        """Logarithms of the determinants of the Gram matrices, (candidates,)."""
-        pivots = np.abs(np.diagonal(self.diagonal, axis1=2, axis2=3))
-        return np.asarray(2 * np.sum(np.log(np.maximum(pivots, np.finfo(float).tiny)), axis=(1, 2)))
+    def rows(self) -> FloatArray:
+        """Rows as in `Rows.blocks`, (blocks, `BLOCK`, 2 `BLOCK`), which say the same as those factorized."""
+        return np.concatenate([self.diagonal, self.upper], axis=2)
+
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the Gram matrix."""
+        pivots = np.abs(np.diagonal(self.diagonal, axis1=1, axis2=2))
+        return 2 * float(np.sum(np.log(np.maximum(pivots, np.finfo(float).tiny))))
 
 
 def block_count(unknowns: int) -> int:
@@ -76,33 +84,28 @@ def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
     return Rows(blocks, block, place)
 
 
-def factorize(data: FloatArray, target: FloatArray, prior: FloatArray, weights: FloatArray) -> Factor:
-    """Return the triangular factors of data and prior.
+def factorize(rows: FloatArray, target: FloatArray) -> Factor:
+    """Return the triangular factor of rows.
 
     Args:
-        data: data rows, (blocks, rows, 2 `BLOCK`).
-        target: right-hand side of the data rows, (blocks, rows).
-        prior: prior rows, whose right-hand side is zero, (blocks, `BLOCK`, 2 `BLOCK`).
-        weights: weights of the prior rows, (candidates, blocks, `BLOCK`).
+        rows: rows, (blocks, rows, 2 `BLOCK`).
+        target: right-hand side, (blocks, rows).
     """
-    candidates, count = weights.shape[:2]
-    diagonal = np.empty((candidates, count, BLOCK, BLOCK))
-    upper, right, rest = np.empty_like(diagonal), np.empty(diagonal.shape[:3]), np.zeros(candidates)
-    work = np.zeros((candidates, 2 * BLOCK + data.shape[1], 2 * BLOCK + 1))
-    for k in range(count):
-        work[:, BLOCK : 2 * BLOCK, :-1] = weights[:, k, :, None] * prior[k]
-        work[:, BLOCK : 2 * BLOCK, -1] = 0
-        work[:, 2 * BLOCK :, :-1] = data[k]
-        work[:, 2 * BLOCK :, -1] = target[k]
-        triangle = _triangle(work)
-        diagonal[:, k] = triangle[:, :BLOCK, :BLOCK]
-        upper[:, k] = triangle[:, :BLOCK, BLOCK:-1]
-        right[:, k] = triangle[:, :BLOCK, -1]
-        rest += triangle[:, 2 * BLOCK, -1] ** 2
-        work[:, :BLOCK, :BLOCK] = triangle[:, BLOCK : 2 * BLOCK, BLOCK:-1]
-        work[:, :BLOCK, BLOCK:-1] = 0
-        work[:, :BLOCK, -1] = triangle[:, BLOCK : 2 * BLOCK, -1]
-    return Factor(diagonal, upper, right, rest + np.sum(work[:, :BLOCK, -1] ** 2, axis=1))
+    from scipy.linalg.lapack import dgeqrf
+
+    count, height = target.shape
+    # Columns lie one after the other, as LAPACK overwrites them; the first rows come from the block before.
+    work = np.zeros((count + 1, 2 * BLOCK + 1, max(BLOCK + height, 2 * BLOCK + 1)))
+    work[:-1, :-1, BLOCK : BLOCK + height] = np.swapaxes(rows, 1, 2)
+    work[:-1, -1, BLOCK : BLOCK + height] = target
+    for block, following in pairwise(work):
+        dgeqrf(block.T, overwrite_a=True)
+        np.multiply(block[BLOCK:-1, BLOCK : 2 * BLOCK], LOWER, out=following[:BLOCK, :BLOCK])
+        following[-1, :BLOCK] = block[-1, BLOCK : 2 * BLOCK]
+    triangle = np.swapaxes(work[:-1], 1, 2)
+    rest = np.sum(triangle[:, 2 * BLOCK, -1] ** 2) + np.sum(work[-1, -1, :BLOCK] ** 2)
+    diagonal, upper = LOWER.T * triangle[:, :BLOCK, :BLOCK], triangle[:, :BLOCK, BLOCK:-1].copy()
+    return Factor(diagonal, upper, triangle[:, :BLOCK, -1].copy(), float(rest))
 
 
 class Posterior:
@@ -115,13 +118,17 @@ class Posterior:
             diagonal: diagonal blocks of the factor, (blocks, `BLOCK`, `BLOCK`).
             upper: blocks to the right of these, same shape.
         """
+        from scipy.linalg.lapack import dgeqrf
+
         self._inverse, self._upper = np.linalg.inv(diagonal), upper
         self._roots = np.zeros((len(diagonal) + 1, BLOCK, BLOCK))
         """Square roots of the covariances of the blocks; zero after the last."""
         passed = -self._inverse @ upper
+        roots = np.concatenate([self._inverse, passed], axis=2)
         for k in range(len(diagonal) - 1, -1, -1):
-            root = np.hstack([self._inverse[k], passed[k] @ self._roots[k + 1]])
-            self._roots[k] = _triangle(root.T).T
+            roots[k, :, BLOCK:] = passed[k] @ self._roots[k + 1]
+            dgeqrf(roots[k].T, overwrite_a=True)
+            np.multiply(roots[k, :, :BLOCK], LOWER, out=self._roots[k])
 
     def unknowns(self, right: FloatArray) -> FloatArray:
         """Return the most probable values of the unknowns.
@@ -148,20 +155,3 @@ class Posterior:
     def variances(self, blocks: FloatArray) -> FloatArray:
         """Return variances of values, (blocks, rows), given by rows as in `Rows.blocks`."""
         return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))
-
-
-def _triangle(rows: FloatArray) -> FloatArray:
-    """Return the triangular factor of rows, (..., rows, columns), in half the time of `qr` with mode "r"."""
-    from scipy.linalg.lapack import dgeqrf
-
-    if rows.ndim > 2 and len(rows) > 1:
-        reflected = np.swapaxes(np.linalg.qr(rows, mode="raw")[0], -1, -2)
-    else:  # LAPACK without NumPy's overhead per call
-        reflected = dgeqrf(rows.reshape(rows.shape[-2:]))[0].reshape(rows.shape)
-    height, width = min(rows.shape[-2:]), rows.shape[-1]
-    return np.asarray(reflected[..., :height, :] * _upper(height, width))
-
-
-@cache
-def _upper(height: int, width: int) -> FloatArray:
-    return np.triu(np.ones((height, width)))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import block_count, sort_rows
+from vsacli.trajectory.fits.banded_qr import Factor, block_count, factorize, sort_rows
 
 BLOCK_SAMPLES = 65536
 """Samples processed at a time; a block that fits into the cache is twice as fast."""
@@ -85,17 +85,17 @@ not be wider than a block of unknowns."""
 
 
 class Whitened(NamedTuple):
-    """Rows with independent errors of the same size.
+    """Means with independent errors of the same size.
 
     Attributes:
-        rows: rows, (blocks, rows, columns), see `banded_qr.Rows`.
-        target: right-hand side, (blocks, rows).
+        correlation: correlation of the errors of two means one bin apart.
+        factor: factor of their rows, which takes their place.
         log_scale: minus the logarithm of the determinant of the correlation matrix of the errors.
         variance: variance of the errors; None if that of samples is unknown.
     """
 
-    rows: FloatArray
-    target: FloatArray
+    correlation: float
+    factor: Factor
     log_scale: float
     variance: float | None
 
@@ -202,7 +202,8 @@ class Bins:
         target = np.zeros(here.shape[:2])
         target[block, place] = scale * (self.means - lag * np.append(0.0, self.means[:-1]))
         variance = self._noise_variance(correlation)
-        return Whitened(rows, target, 2 * float(np.sum(np.log(scale))), variance)
+        log_scale = 2 * float(np.sum(np.log(scale)))
+        return Whitened(correlation, factorize(rows, target), log_scale, variance)
 
     @cached_property
     def _linked_rows(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 ORDERS = {7: 5, 5: 3}
 """Number of functions that are needed, value and derivatives, by the degree of the splines."""
 
-PROBES = 500
-"""Number of times for root mean squares."""
+PROBES = 4000
+"""Number of times for root mean squares: of 500, impulses of a long recording fall between two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,7 @@ class Part:
         noise: filtered, and so smooth, noise that the spline follows; the deviation in `smoothing` includes
             it.
         ringing: times after the start and before the end in which a filter rings, s.
+        transient: time after the start and before the end in which the transient of a filter lasts, s.
         left_out: motion that a fit chosen by the user leaves out; None if its residual looks like noise.
     """
 
@@ -55,6 +56,7 @@ class Part:
     smooth: bool = False
     noise: FollowedNoise | None = None
     ringing: tuple[float, float] = (0.0, 0.0)
+    transient: float = 0.0
     left_out: LeftOutMotion | None = None
 
     @property
@@ -66,13 +68,13 @@ class Part:
     def unreliable(self) -> tuple[float, float]:
         """Times after the start and before the end with unreliable derivatives, s.
 
-        They are (degree + 1)/2 knot spans, or longer where a filter rings. Beyond, noise in the highest
-        derivative that is needed is less than 1.4 times that anywhere inside; at the ends it is up to 850
-        times that.
+        They are (degree + 1)/2 knot spans, or longer while a filter rings or its transient lasts. Beyond,
+        noise in the highest derivative that is needed is less than 1.4 times that anywhere inside; at the
+        ends it is up to 850 times that.
         """
         spans, (start, end) = (self.spline.k + 1) // 2, self.ringing
         first, last = float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
-        return max(first, start), max(last, end)
+        return max(first, start, self.transient), max(last, end, self.transient)
 
     @property
     def inside(self) -> tuple[float, float]:
@@ -107,15 +109,16 @@ class Part:
                 row += taylor[order + power - 1]
         return rows
 
-    def mean_square(self, order: int) -> FloatArray:
-        """Return the mean square of a derivative away from the ends, (members,)."""
-        return np.asarray(np.mean(self.spline(np.linspace(*self.inside, PROBES), nu=order) ** 2, axis=0))
+    def size(self, order: int) -> FloatArray:
+        """Return the root mean square of a derivative away from the ends, (members,)."""
+        derivative = self.spline(np.linspace(*self.inside, PROBES), nu=order)
+        return np.asarray(np.sqrt(np.mean(derivative**2, axis=0)))
 
     def further_errors(self, orders: int) -> FloatArray:
         """Return covariances of noise that is followed and of motion left out, (members, orders, orders)."""
         found = np.zeros((len(self.members), orders, orders))
         if self.noise is not None and self.noise.share:
-            found += self.mean_square(orders - 1)[:, None, None] * self.noise.covariance(orders)
+            found += self.size(orders - 1)[:, None, None] ** 2 * self.noise.covariance(orders)
         if self.left_out is not None:
             found += self.left_out.covariance(orders)
         return found
@@ -138,12 +141,17 @@ class Part:
         knots = stretch(self.spline.t, self.knots[0], factor)
         known = None if self.smoothing is None else self.smoothing.stretched(factor)
         noise = None if self.noise is None else self.noise.stretched(factor)
-        spline, ringing = (
-            BSpline(knots, self.spline.c, self.spline.k),
-            (factor * self.ringing[0], factor * self.ringing[1]),
-        )
+        spline, (start, end) = BSpline(knots, self.spline.c, self.spline.k), self.ringing
         left_out = None if self.left_out is None else self.left_out.stretched(factor)
-        return replace(self, spline=spline, smoothing=known, noise=noise, ringing=ringing, left_out=left_out)
+        return replace(
+            self,
+            spline=spline,
+            smoothing=known,
+            noise=noise,
+            ringing=(factor * start, factor * end),
+            transient=factor * self.transient,
+            left_out=left_out,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +324,7 @@ def unresolved(fit: Fit, orders: int) -> Iterator[tuple[IndexArray, FloatArray]]
             caution = CAUTION if known.spread else SMOOTH_CAUTION
             bound = caution**2 * known.disagreement + part.further_errors(orders)
             shortest = max(SHORTEST_IMPULSE, fit.step)
-            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.mean_square(orders - 1)
+            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.size(orders - 1) ** 2
             yield part.members, bound
 
 

@@ -31,10 +31,10 @@ ROUNDING = 10 * np.finfo(float).eps
 """Share of the largest value below which differences count as rounding."""
 
 
-EQUAL_STRIDES = 1.25
+EQUAL_STRIDES = 1.3
 """Largest ratio of the differences of neighboring samples to those of every second one for white noise. Their
-medians differ by some 10 % in 500 samples; for noise with a correlation of 0.5 from sample to sample the
-ratio is 1.34."""
+medians differ by some 10 % in 500 samples, and of rounded samples they are multiples of a step, such as 11
+and 14; for noise with a correlation of 0.5 from sample to sample the ratio is 1.34."""
 
 FEWEST_DIFFERENCES = 16
 """Fewest samples, in orders of the differences, with which their medians are certain to some 10 %."""
@@ -98,7 +98,8 @@ def white_noise_level(time: FloatArray, row: FloatArray, order: int) -> float | 
     """Return the standard deviation of white noise that hides the motion in the differences of a row.
 
     It is known if differences of every second sample are as large: those of a motion are 2^order times, and
-    those of noise that a filter made smooth are larger, too.
+    those of noise that a filter made smooth are larger, too. Those of a fast motion may exceed the noise from
+    there on; then they grow on like a motion.
 
     Args:
         time: times, (samples,), s.
@@ -110,9 +111,12 @@ def white_noise_level(time: FloatArray, row: FloatArray, order: int) -> float | 
     """
     if len(time) < FEWEST_DIFFERENCES * order:
         return None
-    nearest, second = (float(_typical(time, row[None], order, stride)[0]) for stride in (1, 2))
-    equal = second / EQUAL_STRIDES <= nearest <= second * EQUAL_STRIDES
-    return nearest if nearest > ROUNDING * np.abs(row).max() and equal else None
+    nearest, second, fourth = (float(_typical(time, row[None], order, stride)[0]) for stride in (1, 2, 4))
+    if not ROUNDING * np.abs(row).max() < nearest <= EQUAL_STRIDES * second:
+        return None
+    moves = second < SLOW_GROWTH * nearest and SLOW_GROWTH * second < fourth
+    fast = moves and not filtered_noise(time, row[None], order)[0]
+    return nearest if fast or second <= EQUAL_STRIDES * nearest else None
 
 
 def _strides(samples: int, order: int) -> list[int]:

@@ -6,6 +6,7 @@ variance is the inverse penalty. Its posterior gives spline and variances.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,13 +44,13 @@ class Model:
 
     Attributes:
         bins: means of the recording.
-        correlation: correlation of the noise of neighboring means.
+        whitened: these means with independent errors, for a correlation of the noise of neighboring means.
         penalties: penalty of each difference of coefficients, relative to 1/variance of the noise.
         segments: number of segments in which penalties are constant.
     """
 
     bins: Bins
-    correlation: float
+    whitened: Whitened
     penalties: FloatArray
     segments: int
 
@@ -63,34 +64,29 @@ class Model:
         return self.penalties[np.searchsorted(self._segment, np.arange(self.segments))]
 
     @cached_property
-    def whitened(self) -> Whitened:
-        """Means with independent errors."""
-        return self.bins.whitened(self.correlation)
-
-    @cached_property
     def _factor(self) -> Factor:
-        return _factors(self.bins, self.whitened, self.penalties[None])
+        return _factor(self.bins, self.whitened, self.penalties)
 
     @cached_property
     def deviance(self) -> float:
         """Minus twice the logarithm of the restricted likelihood, without its constant."""
-        return float(deviances([evidence(self.bins, self.whitened, self.penalties[None], self._factor)])[0])
+        return deviance([evidence(self.bins, self.whitened, self.penalties, self._factor)])
 
     @cached_property
     def noise_variance(self) -> float:
         """Variance of a whitened mean: known, or else of maximum likelihood."""
         known = self.whitened.variance
-        return float(self._factor.rest[0]) / _freedom(self.bins) if known is None else known
+        return self._factor.rest / _freedom(self.bins) if known is None else known
 
     @cached_property
     def posterior(self) -> Posterior:
         """Posterior of the coefficients, with variances in units of the noise variance."""
-        return Posterior(self._factor.diagonal[0], self._factor.upper[0])
+        return Posterior(self._factor.diagonal, self._factor.upper)
 
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients of the spline."""
-        return self.posterior.unknowns(self._factor.right[0])[: self.bins.coefficients]
+        return self.posterior.unknowns(self._factor.right)[: self.bins.coefficients]
 
     @property
     def spline(self) -> BSpline[np.float64]:
@@ -123,7 +119,7 @@ class Model:
         change = np.log(free * self.noise_variance / np.maximum(found, np.finfo(float).tiny))
         change = step * np.clip(change, -LARGEST_STEP, LARGEST_STEP)
         penalties = np.clip(self.penalties * np.exp(change[segment]), LEAST_PENALTY, LARGEST_PENALTY)
-        return Model(self.bins, self.correlation, penalties, self.segments)
+        return Model(self.bins, self.whitened, penalties, self.segments)
 
     @cached_property
     def cautious(self) -> Posterior:
@@ -136,12 +132,12 @@ class Model:
             return self.posterior
         each = np.pad(self.each_penalty, 1, constant_values=np.inf)
         least = np.minimum(np.minimum(each[:-2], each[1:-1]), each[2:])
-        factor = _factors(self.bins, self.whitened, least[self._segment][None])
-        return Posterior(factor.diagonal[0], factor.upper[0])
+        factor = _factor(self.bins, self.whitened, least[self._segment])
+        return Posterior(factor.diagonal, factor.upper)
 
     def stiffened(self, logarithm: float) -> Model:
         """Return the model with all penalties multiplied by the exponential of a number."""
-        return Model(self.bins, self.correlation, self.penalties * np.exp(logarithm), self.segments)
+        return Model(self.bins, self.whitened, self.penalties * np.exp(logarithm), self.segments)
 
     def variances(self, order: int, posterior: Posterior | None = None) -> FloatArray:
         """Return the variances of a derivative in the middle of both bins of each span, (2 spans,).
@@ -184,44 +180,46 @@ def segment_of(count: int, segments: int) -> IndexArray:
 
 
 class Evidence(NamedTuple):
-    """The terms of the restricted likelihood of several candidates, for a recording or a stretch of it.
+    """The terms of the restricted likelihood for a recording or a stretch of it.
 
     Attributes:
-        rest: residual sum of squares, penalties included, (candidates,).
-        volume: logarithms of the determinants, (candidates,).
+        rest: residual sum of squares, penalties included.
+        volume: logarithm of the determinants.
         freedom: number of means minus that of coefficients of the polynomial without penalty.
         variance: variance of a whitened mean; None if unknown.
     """
 
-    rest: FloatArray
-    volume: FloatArray
+    rest: float
+    volume: float
     freedom: int
     variance: float | None
 
 
 def evidence(bins: Bins, whitened: Whitened, penalties: FloatArray, factor: Factor | None = None) -> Evidence:
-    """Return the evidence for penalties of several candidates, (candidates, differences)."""
-    factor = factor or _factors(bins, whitened, penalties)
-    volume = factor.log_determinants - np.sum(np.log(penalties), axis=1) - whitened.log_scale
+    """Return the evidence for penalties, (differences,)."""
+    factor = factor or _factor(bins, whitened, penalties)
+    volume = factor.log_determinant - float(np.sum(np.log(penalties))) - whitened.log_scale
     return Evidence(factor.rest, volume, _freedom(bins), whitened.variance)
 
 
-def deviances(stretches: Sequence[Evidence]) -> FloatArray:
-    """Return minus twice the log restricted likelihoods of all stretches together, (candidates,)."""
-    rest = np.sum([each.rest for each in stretches], axis=0)
+def deviance(stretches: Sequence[Evidence]) -> float:
+    """Return minus twice the log restricted likelihood of all stretches together."""
+    rest = sum(each.rest for each in stretches)
     freedom, known = sum(each.freedom for each in stretches), stretches[0].variance
     if known is None:
-        size = freedom * np.log(np.maximum(rest, np.finfo(float).tiny) / freedom)
+        size = freedom * math.log(max(rest, np.finfo(float).tiny) / freedom)
     else:
-        size = freedom * (np.log(known) - 1) + rest / known
-    return np.asarray(size + np.sum([each.volume for each in stretches], axis=0))
+        size = freedom * (math.log(known) - 1) + rest / known
+    return size + sum(each.volume for each in stretches)
 
 
-def _factors(bins: Bins, whitened: Whitened, penalties: FloatArray) -> Factor:
-    weights = np.ones((len(penalties), len(bins.differences) * BLOCK))
-    weights[:, : penalties.shape[1]] = np.sqrt(penalties)
-    shaped = weights.reshape(len(penalties), -1, BLOCK)
-    return factorize(whitened.rows, whitened.target, bins.differences, shaped)
+def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> Factor:
+    differences, samples = bins.differences, whitened.factor
+    weights = np.ones(differences.shape[:2])
+    weights.ravel()[: len(penalties)] = np.sqrt(penalties)
+    rows = np.concatenate([weights[..., None] * differences, samples.rows], axis=1)
+    found = factorize(rows, np.concatenate([np.zeros_like(weights), samples.right], axis=1))
+    return found._replace(rest=found.rest + samples.rest)
 
 
 def _freedom(bins: Bins) -> int:

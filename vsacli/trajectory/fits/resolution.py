@@ -15,7 +15,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
 from vsacli.trajectory.fits.noise_floor import enough_spans
-from vsacli.trajectory.fits.penalized import Model, deviances, evidence, segment_of
+from vsacli.trajectory.fits.penalized import Model, deviance, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
 """Correlations of the noise of neighboring means in the first search."""
@@ -88,7 +88,7 @@ def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
     level = np.zeros(1)
     if coarser is None:
         return [_Grid(tried, level, FIRST_DECADES)]
-    near = np.abs(np.arctanh(tried) - np.arctanh(coarser.correlation)) <= NEAR_CORRELATION
+    near = np.abs(np.arctanh(tried) - np.arctanh(coarser.whitened.correlation)) <= NEAR_CORRELATION
     found = np.log10(coarser.each_penalty if _long(bins) else coarser.penalties)
     shape = found if _long(bins) else np.mean(found, keepdims=True)
     # With half the span, differences of order n shrink by 2^n, noise of a mean grows by 2^(1/2).
@@ -104,17 +104,15 @@ def _best_of_grids(bins: Bins, grids: Sequence[_Grid]) -> Model:
     spans = MOST_SPANS_OF_GRID // STRETCHES if _long(bins) else bins.spans
     firsts = np.linspace(0, bins.spans - spans, STRETCHES if _long(bins) else 1).astype(int).tolist()
     stretches = [(bins.stretch(first, spans), slice(first, first + spans)) for first in firsts]
-    best, least = Model(bins, 0.0, np.ones(differences), 1), np.inf
+    tried = []
     for grid in grids:
-        penalties = grid.penalties(differences)
         for correlation in grid.correlations.tolist():
-            found = deviances(
-                [evidence(part, part.whitened(correlation), penalties[:, of]) for part, of in stretches]
-            )
-            i = int(np.argmin(found))
-            if found[i] < least:
-                best, least = Model(bins, correlation, penalties[i], len(grid.shape)), found[i]
-    return best
+            parts = [(part, part.whitened(correlation), of) for part, of in stretches]
+            for penalties in grid.penalties(differences):
+                fit = deviance([evidence(part, whitened, penalties[of]) for part, whitened, of in parts])
+                tried.append((fit, correlation, penalties, len(grid.shape)))
+    _, correlation, penalties, segments = min(tried, key=lambda each: each[0])
+    return Model(bins, bins.whitened(correlation), penalties, segments)
 
 
 def _long(bins: Bins) -> bool:
@@ -146,7 +144,7 @@ def _segmented(model: Model) -> Model:
     most = min(MOST_SEGMENTS, len(model.penalties) // FEWEST_DIFFERENCES)
     trial = model
     while 2 * trial.segments <= most and trial.segments <= 2 * model.segments:
-        trial = _improved(Model(model.bins, model.correlation, trial.penalties, 2 * trial.segments))
+        trial = _improved(Model(model.bins, model.whitened, trial.penalties, 2 * trial.segments))
         if trial.deviance < model.deviance - (trial.segments - model.segments) - 1:
             model = trial
     return model
@@ -154,9 +152,9 @@ def _segmented(model: Model) -> Model:
 
 def _recorrelated(model: Model) -> Model:
     """Return the model with the most likely correlation near its own."""
-    center = np.arctanh(model.correlation)
-    candidates = np.clip(np.tanh(center + FINER_CORRELATIONS), -0.6, 0.985)
-    models = [Model(model.bins, each, model.penalties, model.segments) for each in candidates.tolist()]
+    bins, center = model.bins, np.arctanh(model.whitened.correlation)
+    candidates = np.clip(np.tanh(center + FINER_CORRELATIONS), -0.6, 0.985).tolist()
+    models = [Model(bins, bins.whitened(each), model.penalties, model.segments) for each in candidates]
     return min(models, key=lambda each: each.deviance)
 
 

@@ -74,8 +74,8 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
     if found is None:
         return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
     spline, smoothing = found
-    part = _without_ringing(Part(members, spline, exact=False, smoothing=smoothing, smooth=True), record)
-    return _following(part, _noise_of(record, part), record)
+    part = Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
+    return _following(*_without_ends(part, record), record)
 
 
 def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
@@ -102,9 +102,8 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     """Return the replacement of a component of a part; None if it needs no assessment, or has none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
-    single = _without_ringing(part.of_columns(np.array([column])), record)
+    single, noise = _without_ends(part.of_columns(np.array([column])), record)
     unjudged = single if any(single.ringing) else None
-    noise = _noise_of(record, single)
     filtered = bool(record.filtered[member]) or noise.share > SUSPECT
     if part.exact and record.spoilt[member] <= SUSPECT and not filtered and not wanted:
         return replace(single, noise=noise) if noise.share > record.spoilt[member] else unjudged
@@ -129,9 +128,17 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     return unjudged
 
 
-def _without_ringing(part: Part, record: Record) -> Part:
-    """Return a part of one component whose unreliable ends include those at which a filter rings."""
-    return replace(part, ringing=ringing_ends(part.spline, part.inside, record.order))
+def _without_ends(part: Part, record: Record) -> tuple[Part, FollowedNoise]:
+    """Return a part of one component with the ends at which a filter rings, or its transient lasts.
+
+    Also returns the filtered noise that it follows between them.
+    """
+    part = replace(part, ringing=ringing_ends(part.spline, part.inside, record.order))
+    noise = _noise_of(record, part)
+    if part.exact or part.smooth:  # a least-squares spline has a cut-off of its own
+        part = replace(part, transient=noise.transient)
+    between = _noise_of(record, part) if noise.share else noise
+    return part, between if between.share else noise
 
 
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
@@ -141,7 +148,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
     noise = followed_noise(part.spline, part.inside, _interval(record), record.order, bandwidth, rings=rings)
     if not (noise.share and part.exact and record.least):
         return noise
-    return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))
+    return noise._replace(share=noise.share * min(1.0, part.size(record.order).item() / record.least))
 
 
 def _interval(record: Record) -> float:
@@ -154,12 +161,7 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     known = part.smoothing
     if known is None or not noise.share or (part.smooth and noise.relative <= known.relative):
         return part
-    return replace(part, smoothing=known.following(noise, _size(part, record.order)), noise=noise)
-
-
-def _size(part: Part, order: int) -> float:
-    """Return the root mean square of a derivative of one component away from the ends."""
-    return float(np.sqrt(np.mean(part.spline(np.linspace(*part.inside, PROBES), nu=order) ** 2)))
+    return replace(part, smoothing=known.following(noise, part.size(record.order).item()), noise=noise)
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:
@@ -277,7 +279,7 @@ def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
         return None
     free = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
     noise = followed_noise(free.spline, free.inside, _interval(record), record.order)
-    explained = noise.share and _size(free, record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
+    explained = noise.share and free.size(record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
     return missed if missed.size > explained else None
 
 

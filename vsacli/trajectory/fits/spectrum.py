@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.fits.least_squares import fit_spline, most_spans
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -70,11 +71,24 @@ HIGH = 30.0
 """Smallest rise of a high hump; its square if there is no motion in the bands below. Humps of a smooth motion
 rose by 6, and by 550 beyond the slowest lines."""
 
+EDGE, BEFORE_EDGE, BEYOND_EDGE = 1e-3, 0.93, 1.25
+"""Largest density of the samples beyond the edge of a steep filter, where a hump ends, over that at the edge;
+frequencies before and beyond the edge, over its own. At the edge the filter rings like a sine: lines before
+it decide whether the hump is random."""
+
 LINE_RATIO = 30.0
 """Ratio of the power of a line to the medians near it above which it is motion."""
 
 TAPERED = 10
 """Inverse of the share of a stretch at each end where the window is too small to divide by."""
+
+DEGREE, SPANS_PER_PERIOD = 7, 2.8
+"""Degree of a spline that follows the motion alone, and spans per period of the motion's highest
+frequency. Of such a sine 1 % is left, and of noise most from 1.4 times that frequency on."""
+
+TRANSIENT = 4.0
+"""Duration of the transient of a filter at an end, unless it rings, in periods of the frequency at which the
+density of noise is largest, its cut-off."""
 
 
 WITHIN = 0.99
@@ -101,6 +115,11 @@ class FollowedNoise(NamedTuple):
     def relative(self) -> float:
         """Root mean square over that of the derivative without the noise."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
+
+    @property
+    def transient(self) -> float:
+        """Time after which the transient of the filter at an end is over, s; 0 without noise."""
+        return TRANSIENT / self.peak
 
     def covariance(self, orders: int) -> FloatArray:
         """Return the covariance of value and derivatives, (orders, orders), over the highest one's power.
@@ -191,8 +210,18 @@ def followed_noise(
         if steady and peak > (bandwidth or 0) and _is_noise(spectrum, bands, valley, top):
             power = float(np.sum((bands.width * bands.derivative)[valley:])) * len(spectrum.lines)
             above = _end_of_motion(spectrum, bands, valley, top)
-            return max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
-    return found
+            found = max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
+            break
+    if not found.share:
+        return found
+    grid = np.linspace(*inside, SEGMENT_SAMPLES)
+    row = spline(grid, nu=order)[:, 0]
+    spans = min(
+        int(SPANS_PER_PERIOD * found.above * (inside[1] - inside[0])) + 1, most_spans(len(grid), DEGREE)
+    )
+    rest = row - fit_spline(grid, row[None], spans, DEGREE)(grid)[:, 0]
+    # Unlike the window of a spectrum, this includes what a transient of the filter adds near the ends.
+    return found._replace(share=max(found.share, float(np.std(rest) / np.sqrt(np.mean(row**2)))))
 
 
 def motion_band(
@@ -301,10 +330,18 @@ def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> Float
 
 def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> float:
     """Return the frequency, Hz, of a valley, or of a later line of motion, which medians ignore."""
-    first, last = int(bands.line[valley]), int(bands.line[top]) + 1
+    first, last = int(bands.line[valley]), _before_edge(bands, top) + 1
     power = spectrum.power[:, first:last].mean(axis=0)
     lines = np.flatnonzero(power > LINE_RATIO * _medians(spectrum, bands, first, last))
     return float(spectrum.frequency[first + (int(lines[-1]) if lines.size else 0)])
+
+
+def _before_edge(bands: _Bands, top: int) -> int:
+    """Return the last line of a hump, or the last before the edge of a steep filter that ends it."""
+    line = int(bands.line[top])
+    beyond = int(np.searchsorted(bands.line, BEYOND_EDGE * line))
+    steep = beyond < len(bands.line) and bands.samples[beyond] < EDGE * bands.samples[top]
+    return int(BEFORE_EDGE * line) if steep else line
 
 
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
@@ -313,11 +350,13 @@ def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool
     motion = np.max(density[:valley], initial=0.0)
     rise = density[top] / density[valley]
     high = rise > (HIGH if motion > RISE * density[valley] else HIGH**2)
-    chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
-    first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
+    first, last = int(bands.line[valley]), _before_edge(bands, top)
+    if last == bands.line[top] or last - first < LEAST_LINES:
+        chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
+        first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
+        if (last - first) * len(spectrum.power) < (FEW_LINES if high else FEWEST_LINES):
+            return False
     power = spectrum.power[:, first:last]
-    if (last - first) * len(power) < (FEW_LINES if high else FEWEST_LINES):
-        return False
     medians = _medians(spectrum, bands, first, last)
     scatter = np.std(np.log(np.maximum(power, np.finfo(float).tiny) / medians))
     if np.sum(power) > PEAKED * len(power) * np.sum(medians) or not SCATTER[0] < scatter < SCATTER[1]:
