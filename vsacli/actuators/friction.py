@@ -14,7 +14,8 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, check_fields, number, value
+from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, number, value
+from vsacli.documents.record_checks import DeclaredRecord
 
 REST = 1e-10
 """Largest speed, rad/s (m/s), that counts as rest. At the ends of rest-to-rest motions of the bundled robots,
@@ -22,7 +23,7 @@ rounding leaves 1e-13. At 1e-10 a turn takes two thousand years."""
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(DeclaredRecord):
     """Dry friction: a torque against the motion that hardly depends on its velocity."""
 
     coulomb: tuple[float, float] = value(
@@ -37,9 +38,6 @@ class Friction:
         check=NON_NEGATIVE,
         default=0.0,
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:

@@ -16,8 +16,9 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
+from vsacli.documents.fields import POSITIVE, REQUIRED, Name, number, value
 from vsacli.documents.reading import ChangeError, Changes, changed, read_document, written
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_values import numbers
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -38,7 +39,7 @@ DEFAULT_RATE = 1000.0
 
 
 @dataclass(frozen=True)
-class TrajectoryFile:
+class TrajectoryFile(DeclaredRecord):
     """The content of a trajectory file.
 
     The declaration of each signal is an attribute named by its key; see `content`.
@@ -70,8 +71,9 @@ class TrajectoryFile:
     untaken: ClassVar[tuple[Signal, ...]] = ()
     """Signals of devices that are on no joint of the robot."""
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._time_problems(), *self._device_problems())
+    def record_problems(self) -> Iterator[FieldProblem]:
+        """See `DeclaredRecord.record_problems`."""
+        yield from (*self._time_problems(), *self._device_problems())
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
@@ -114,7 +116,7 @@ class TrajectoryFile:
                 yield FieldProblem(("duration",), "the times come from the CSV file; leave this key out")
         elif self.lasts is None:
             yield FieldProblem((), "missing key 'duration' (s)")
-        elif all(given is None or POSITIVE.holds(given) for given in (self.lasts, self.rate, self.slow_down)):
+        else:
             try:
                 _uniform_times(self.lasts * self.slow_down, self.rate)
             except InputError as error:

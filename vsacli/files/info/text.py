@@ -12,8 +12,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, together
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
-from vsacli.documents.field_kinds import Field, variant_inside
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import Field, declared, variant_inside
 from vsacli.documents.reading import written
 from vsacli.files import recordings
 from vsacli.files.info.describe import KIND, study_lines

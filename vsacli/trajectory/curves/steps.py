@@ -171,7 +171,8 @@ class Steps(Formula):
             "transition": number(units.TIME, "duration of each change", check=POSITIVE),
         }
 
-    def _problems(self) -> Iterator[FieldProblem]:
+    def record_problems(self) -> Iterator[FieldProblem]:
+        """See `DeclaredRecord.record_problems`."""
         if len(self.times) != len(self.levels) - 1:
             expected = f"{len(self.levels) - 1}, one for each level but the first"
             yield FieldProblem(("times",), f"expected {expected}, found {len(self.times)}")

@@ -270,7 +270,8 @@ class Via(Formula):
         vanishing = "All derivatives up to (degree-1)/2 vanish at both ends"
         return f"{what}.\n\n{vanishing}, those up to degree-1 are continuous."
 
-    def _problems(self) -> Iterator[FieldProblem]:
+    def record_problems(self) -> Iterator[FieldProblem]:
+        """See `DeclaredRecord.record_problems`."""
         if not 2 <= len(self.points) <= MAX_POINTS:
             message = f"expected 2 to {MAX_POINTS} points, found {len(self.points)}"
             yield FieldProblem(("points",), message)

@@ -15,7 +15,7 @@ from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_warnings, worst_
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError, Problem
+from vsacli.base.errors import FieldProblem, InputError, Problem
 from vsacli.documents.fields import TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
@@ -169,11 +169,13 @@ class Cam(PreloadedCam):
         "CSV file with the header deflection,lift in rad,m (m,m), path relative to the robot file",
     )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        problems = list(_problems(self.profile)) or list(self._misfits())
-        if problems:
-            raise InputError(problems)
+    def record_problems(self) -> list[FieldProblem]:
+        """Refuse a table that is no profile, too; see `DeclaredRecord.record_problems`."""
+        of_fields = super().record_problems()
+        of_table = [] if of_fields else list(_problems(self.profile)) or list(self._misfits())
+        if of_table:
+            raise InputError(of_table)
+        return of_fields
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
