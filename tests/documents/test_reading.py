@@ -34,7 +34,7 @@ class Wheel(DeclaredRecord):
 
     not_yet = ("tyre",)
 
-    def record_problems(self):
+    def _problems(self):
         return [FieldProblem(("radius",), "is a bad omen")] if self.radius == 13 else []
 
 

@@ -52,8 +52,7 @@ class Antagonistic(Actuator):
     commanded = ("stiffness",)
     integrable = True
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         yield from (*self.pair.problems(), *self._coupling_problems())
 
     def _coupling_problems(self) -> Iterator[FieldProblem]:

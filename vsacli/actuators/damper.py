@@ -36,8 +36,7 @@ class Damper(DeclaredRecord):
         """Return plausible values of the fields, for a new robot file."""
         return {"location": "link", "range": [0, 5] if joint_type == "revolute" else [0, 50]}
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         lower, upper = self.range
         if not (lower >= 0 and math.isfinite(upper)):
             reason = f"must be [lower, upper] with 0 <= lower, such as [0, {abs(upper):g}]"

@@ -44,8 +44,7 @@ class Elastic(Actuator):
         "stiffness": "its actuator is elastic, with the spring that the robot file says"
     }
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if self.stiffness is None and self.spring is None:
             yield FieldProblem((), "missing key 'stiffness' (of a linear spring) or 'spring' (of any law)")
         elif self.stiffness is not None and self.spring is not None:

@@ -15,7 +15,7 @@ import numpy as np
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, number, value
-from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 
 REST = 1e-10
 """Largest speed, rad/s (m/s), that counts as rest. At the ends of rest-to-rest motions of the bundled robots,
@@ -50,20 +50,17 @@ class Friction(DeclaredRecord):
         return self.width == 0 and any(self.coulomb)
 
     def geared(self, ratio: float) -> Friction:
-        """Return the friction on the joint side of a gear whose shaft turns `ratio` times."""
+        """Return the friction on the joint side of a gear whose shaft turns `ratio` times.
+
+        It is not checked: values were checked on the shaft, or are duals.
+        """
         backward, forward = (abs(ratio) * size for size in self.coulomb)
-        return _Geared(
-            coulomb=(backward, forward) if ratio > 0 else (forward, backward),
-            offset=ratio * self.offset or 0.0,
-            width=self.width / abs(ratio),
-        )
-
-
-class _Geared(Friction):
-    """Friction on the joint side of a gear, unchecked: its values were checked on the shaft, or are duals."""
-
-    def __post_init__(self) -> None:
-        pass
+        geared = {
+            "coulomb": (backward, forward) if ratio > 0 else (forward, backward),
+            "offset": ratio * self.offset or 0.0,
+            "width": self.width / abs(ratio),
+        }
+        return construct_unchecked(Friction, geared)
 
 
 NO_FRICTION = Friction(coulomb=(0.0, 0.0))

@@ -148,8 +148,7 @@ class Motor(DeclaredRecord):
     unit_variants = MappingProxyType({SHAFT: "revolute"})
     required_unless = MappingProxyType({"side": ("gear_ratio", 1)})
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         yield from (*self._gear_problems(), *self._missing())
 
     def _gear_problems(self) -> Iterator[FieldProblem]:

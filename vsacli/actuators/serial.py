@@ -55,8 +55,7 @@ class Serial(Actuator):
     branch_field = "mechanism.branch"
     integrable = True
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         first, second = (motor.inertia for motor in self.motors)
         largest = largest_coupling(first, second)
         if not abs(self.coupled_rotors) < largest:

@@ -32,8 +32,7 @@ class JointPoles(DeclaredRecord):
         "poles of the stiffness error, 1/s; one number applies to all poles", default=DEFAULT
     )
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         for name in ("position", "stiffness"):
             try:
                 for pole in parse_poles(getattr(self, name)):

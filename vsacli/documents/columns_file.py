@@ -82,8 +82,7 @@ class ColumnSource(DeclaredRecord, MappedColumn):
         ColumnName(), "column of nanoseconds that is added to a `time` in whole seconds", default=None
     )
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if self.unit is not None and {"[", "]"} & set(self.unit):
             yield FieldProblem(("unit",), f"is written without brackets, not {self.unit!r}")
         if self.nanoseconds is not None and (self.unit or self.factor != 1):
@@ -181,8 +180,7 @@ class ColumnsFile(DeclaredRecord):
         RATE, "sampling rate of recordings without a time column", check=POSITIVE, default=None
     )
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not (self.columns or self.ignore or self.skip_rows or self.rate):
             yield FieldProblem((), "says nothing: give columns, ignore, skip_rows or rate")
 

@@ -9,7 +9,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InvalidRecordError
@@ -48,23 +48,36 @@ class DeclaredRecord:
     """A record of declared fields, a frozen dataclass that its constructor checks.
 
     Raises:
-        InvalidRecordError: with each invalid field, or with the problems of the record as a whole.
+        InvalidRecordError: with each invalid field, or else with the problems of the record as a whole.
     """
 
     def __post_init__(self) -> None:
-        problems = list(field_problems(type(self), vars(self))) or list(self.record_problems())
-        if problems:
-            raise InvalidRecordError(type(self).__name__, problems)
+        _refuse(self, field_problems(type(self), vars(self)))
+        _refuse(self, self._problems())
 
-    def record_problems(self) -> Iterable[FieldProblem]:
-        """Return the problems between fields, each of which is valid by itself.
-
-        Subclasses state their conditions here rather than in `__post_init__`, which readers of files skip.
+    @classmethod
+    def of_valid_fields(cls, values: Mapping[str, Any]) -> Self:
+        """Return the record of values that were checked each by itself, by a reader that knows their lines.
 
         Raises:
+            InvalidRecordError: the values do not go together.
             InputError: a file that the record refers to has problems.
         """
+        record = construct_unchecked(cls, values)
+        _refuse(record, record._problems())
+        return record
+
+    def _problems(self) -> Iterable[FieldProblem]:
+        """Return the problems between fields, each of which is valid by itself.
+
+        Subclasses state their conditions here: in `__post_init__`, a reader of files would not ask for them.
+        """
         return ()
+
+
+def _refuse(record: DeclaredRecord, problems: Iterable[FieldProblem]) -> None:
+    if refused := list(problems):
+        raise InvalidRecordError(type(record).__name__, refused)
 
 
 def construct_unchecked(cls: type[_Record], values: Mapping[str, Any]) -> _Record:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vsacli.base.did_you_mean import did_you_mean, nearest
-from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
 from vsacli.base.texts import counted
 from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
 from vsacli.documents import tree
@@ -47,7 +47,6 @@ from vsacli.documents.number import BOOLEANS, DECIMAL, PER_CENT, evaluate, expec
 from vsacli.documents.record_checks import (
     DeclaredRecord,
     already_used,
-    construct_unchecked,
     field_problems,
     repetitions,
     unknown_word,
@@ -80,8 +79,13 @@ def read_record(
         _note_of_fields(problems, fields, node, scope)
     if problems or len(valid) < len(values) or not mistyped.isdisjoint(fields):
         return INVALID
-    record = construct_unchecked(cls, valid)
-    return record if _check_as_whole(record, node, prefix, scope) else INVALID
+    try:
+        return cls.of_valid_fields(valid)
+    except InvalidRecordError as error:
+        _note_of_record(error.fields, node, prefix, scope)
+    except InputError as error:
+        scope.problems.include(error)
+    return INVALID
 
 
 def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
@@ -143,18 +147,12 @@ def _of_joints(joints: Sequence[str], members: Sequence[str]) -> str:
     return f" of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}"
 
 
-def _check_as_whole(record: DeclaredRecord, node: tree.Mapping, prefix: str, scope: Scope) -> bool:
-    """Note the problems of a record whose fields are valid; return whether it has none."""
-    try:
-        problems = list(record.record_problems())
-    except InputError as error:
-        scope.problems.include(error)
-        return False
+def _note_of_record(problems: Iterable[FieldProblem], node: tree.Mapping, prefix: str, scope: Scope) -> None:
+    """Note the problems of a record whose fields are valid."""
     for problem in problems:
         message = problem.in_units(scope.variant).in_file(list(scope.members))
         fault = f"{prefix}{problem.path} {problem.joint} {problem.message}"
         scope.problems.add(line_along(problem.path, node, scope), f"{prefix}{message}", fault)
-    return not problems
 
 
 def line_along(path: FieldPath, node: Node, scope: Scope) -> int:

@@ -76,8 +76,7 @@ class Inertia(DeclaredRecord):
     xz: float = number(units.INERTIA, "tensor entry -integral(x z dm)", default=0.0)
     yz: float = number(units.INERTIA, "tensor entry -integral(y z dm)", default=0.0)
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         smallest = self.principal_moments[0]
         if smallest < -INERTIA_ROUNDING * np.abs(self.tensor).max():
             problem = f"the tensor has the negative eigenvalue {smallest:.4g} kg m^2, which no body has"
@@ -136,8 +135,7 @@ class Joint(DeclaredRecord):
 
     unit_variant = "type"
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not self.actuator.sprung and self.limits.stiffness != UNBOUNDED:
             reason = f"a joint with a {self.actuator_type} actuator has no stiffness to limit; leave it out"
             yield FieldProblem(("limits", "stiffness"), reason)

@@ -71,8 +71,7 @@ class TrajectoryFile(DeclaredRecord):
     untaken: ClassVar[tuple[Signal, ...]] = ()
     """Signals of devices that are on no joint of the robot."""
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         yield from (*self._time_problems(), *self._device_problems())
 
     @property
@@ -118,7 +117,7 @@ class TrajectoryFile(DeclaredRecord):
             yield FieldProblem((), "missing key 'duration' (s)")
         else:
             try:
-                _uniform_times(self.lasts * self.slow_down, self.rate)
+                UniformTimes(self.lasts * self.slow_down, self.rate or DEFAULT_RATE)
             except InputError as error:
                 yield FieldProblem((self._longest,), str(error))
             else:
@@ -310,7 +309,7 @@ def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str)
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
-    return _uniform_times(document.lasts, document.rate)
+    return UniformTimes(document.lasts, document.rate or DEFAULT_RATE)
 
 
 def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
@@ -324,10 +323,6 @@ def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
-
-
-def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
-    return UniformTimes(duration, DEFAULT_RATE if rate is None else rate)
 
 
 def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_names: Sequence[str]) -> None:

@@ -88,9 +88,8 @@ class MeasuredSpring(SpringLaw):
 
     examples: ClassVar = {"revolute": {"file": "measured_spring.csv"}}  # the bundled table is in rad and N m
 
-    def record_problems(self) -> tuple[()]:
-        """Refuse a table that is no spring; see `DeclaredRecord.record_problems`."""
-        problems = list(_problems(self.file))
+    def _problems(self) -> tuple[()]:
+        problems = list(_table_problems(self.file))
         if problems:
             raise InputError(problems)
         return ()
@@ -215,7 +214,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
         yield Problem(path, table.line_of(steps[0] + 1), message)
 
 
-def _problems(table: Table) -> Iterator[Problem]:
+def _table_problems(table: Table) -> Iterator[Problem]:
     """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path

@@ -37,8 +37,7 @@ class ShiftedCams(Mechanism):
     )
     branch: str = choice(BRANCHES, "sign of theta_2 on the branch that is used", default="positive")
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         yield from self._cams.problems()
         for side, law in enumerate(self.spring):
             if math.isfinite(law.max_deflection):  # of the rotation of a cam, which is no variable to flag

@@ -91,8 +91,7 @@ class CatalogMotor(DeclaredRecord):
     )
     mass: float | None = number(units.MASS, "mass of the motor with its gear", check=POSITIVE, default=None)
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         yield from (*self._missing(), *self._stuck())
 
     def _missing(self) -> Iterator[FieldProblem]:

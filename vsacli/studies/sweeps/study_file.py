@@ -202,8 +202,7 @@ class Optimized(DeclaredRecord):
     )
     seed: int = integer("seed of the random initial guesses", check=_SEED, default=0)
 
-    def record_problems(self) -> list[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> list[FieldProblem]:
         if (self.minimize, self.vary) == (TIME, STIFFNESS):
             return [FieldProblem(("vary",), "for the sake of time it is `timing` or `both` that varies")]
         return []
@@ -303,8 +302,7 @@ class StudyFile(DeclaredRecord):
         "decimation factor of these variables: one of this many samples is kept", check=_COUNT, default=1
     )
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if self.method != GRID and self.samples is None:
             reason = f"the number of runs that the method {self.method} draws"
             yield FieldProblem((), f"missing key 'samples': {reason}")

@@ -186,8 +186,7 @@ class Recorded(Declaration):
             )
         return fields
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         from vsacli.trajectory.fits import SMOOTH
 
         if self.bandwidth is not None and self.fit not in (None, SMOOTH):

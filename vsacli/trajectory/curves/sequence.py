@@ -153,9 +153,8 @@ class ViaPart(Via, _Standalone):
         """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
-        yield from super().record_problems()
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from super()._problems()
         if self.duration is None and self.times is None:
             yield FieldProblem((), "missing key 'duration' or 'times' (s)")
         elif self.duration is not None and self.times and not same_time(self.duration, self.times[-1]):
@@ -168,7 +167,7 @@ class ViaPart(Via, _Standalone):
     def lasts(self) -> float:
         """Duration, s."""
         duration = self.duration if self.times is None else self.times[-1]
-        assert duration is not None, "see `record_problems`"
+        assert duration is not None, "see `_problems`"
         return duration
 
 
@@ -214,8 +213,7 @@ class Sequence(Formula):
         """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
-    def record_problems(self) -> list[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> list[FieldProblem]:
         unfit = [
             problem.inside("parts", index)
             for index, part in enumerate(self.parts)

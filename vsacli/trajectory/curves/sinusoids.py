@@ -221,8 +221,7 @@ class SumOfSinusoids(Formula):
         positive = ", and must stay positive" if use.signal.positive else ""
         return f"A sum of sinusoids as above{positive}. Without `ramp` it does not start at rest."
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not (self.sine or self.cosine):
             yield FieldProblem((), "missing key 'sine' or 'cosine' (amplitudes)")
         for name in ("sine", "cosine"):

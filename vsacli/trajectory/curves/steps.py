@@ -171,8 +171,7 @@ class Steps(Formula):
             "transition": number(units.TIME, "duration of each change", check=POSITIVE),
         }
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if len(self.times) != len(self.levels) - 1:
             expected = f"{len(self.levels) - 1}, one for each level but the first"
             yield FieldProblem(("times",), f"expected {expected}, found {len(self.times)}")

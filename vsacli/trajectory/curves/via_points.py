@@ -270,8 +270,7 @@ class Via(Formula):
         vanishing = "All derivatives up to (degree-1)/2 vanish at both ends"
         return f"{what}.\n\n{vanishing}, those up to degree-1 are continuous."
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not 2 <= len(self.points) <= MAX_POINTS:
             message = f"expected 2 to {MAX_POINTS} points, found {len(self.points)}"
             yield FieldProblem(("points",), message)

@@ -153,8 +153,7 @@ class Potential(Mechanism):
         curves = LevelCurves(self._potential, self.range.phi, self.range.theta_2)
         return Branch(curves, self.start.theta_1, self.start.theta_2)
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of the energy; without any, those of the branch."""
         found = [*self._word_problems(), *self._range_problems()]
         yield from found or self._branch_problems()

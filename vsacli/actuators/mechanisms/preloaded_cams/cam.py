@@ -169,10 +169,9 @@ class Cam(PreloadedCam):
         "CSV file with the header deflection,lift in rad,m (m,m), path relative to the robot file",
     )
 
-    def record_problems(self) -> list[FieldProblem]:
-        """Refuse a table that is no profile, too; see `DeclaredRecord.record_problems`."""
-        of_fields = super().record_problems()
-        of_table = [] if of_fields else list(_problems(self.profile)) or list(self._misfits())
+    def _problems(self) -> list[FieldProblem]:
+        of_fields = super()._problems()
+        of_table = [] if of_fields else list(_profile_problems(self.profile)) or list(self._misfits())
         if of_table:
             raise InputError(of_table)
         return of_fields
@@ -224,7 +223,7 @@ class Cam(PreloadedCam):
         return Lift(*self._fitted.curve(from_rest, 0, 4))
 
 
-def _problems(table: Table) -> Iterator[Problem]:
+def _profile_problems(table: Table) -> Iterator[Problem]:
     """Yield why the rows are no profile with one minimum, with the lines."""
     deflection, lift = table.values.T
     if problems := list(wrong_rows(table)):

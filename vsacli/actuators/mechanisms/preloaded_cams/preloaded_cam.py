@@ -36,8 +36,7 @@ class PreloadedCam(Mechanism):
         units.LENGTH, "smallest and largest compression of the spring at rest, zero or above"
     )
 
-    def record_problems(self) -> list[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> list[FieldProblem]:
         low, high = self.pretension
         if 0 <= low < high < math.inf:
             return []
@@ -110,9 +109,8 @@ class Maccepa(PreloadedCam):
 
     joint_types = ("revolute",)
 
-    def record_problems(self) -> list[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
-        problems = super().record_problems()
+    def _problems(self) -> list[FieldProblem]:
+        problems = super()._problems()
         if self.b == self.c:
             problems.append(FieldProblem(("c",), "must differ from b: equal levers have a kink at rest"))
         return problems

@@ -158,8 +158,7 @@ class Awas(SineRatio):
     arm: tuple[float, float] = interval(units.LENGTH, "shortest and longest arm, above zero")
     lead: float = number(units.LEAD, "change of the arm length per theta_2", check=NON_ZERO)
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not 0 < self.arm[0] < self.arm[1] < np.inf:
             yield FieldProblem(("arm",), "must have two ends above zero, the shorter one first")
 
@@ -206,8 +205,7 @@ class Lever(SineRatio):
     )
     lead: float = number(units.LEAD, "displacement of the pivot per theta_2", check=NON_ZERO)
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not 0 < self.pivot[0] < self.pivot[1] < self.length:
             reason = (
                 f"must have two ends between zero and the length {self.length:g} m, the smaller one first"

@@ -71,8 +71,7 @@ class VariableRatio(Mechanism):
     )
     torque: SpringLaw | Sine = value(OneOf(TORQUES), "torque g over the deflection, for K = 1")
 
-    def record_problems(self) -> Iterator[FieldProblem]:
-        """See `DeclaredRecord.record_problems`."""
+    def _problems(self) -> Iterator[FieldProblem]:
         if not -np.inf < self.setting[0] < self.setting[1] < np.inf:
             yield FieldProblem(("setting",), "must have two ends, the smaller one first")
         else:
