@@ -5,7 +5,6 @@ The keys are used in trajectory files, and in files for recordings alone, `vsacl
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -33,7 +32,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.number import evaluate
 from vsacli.documents.reading import read_document
-from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 from vsacli.documents.record_reader import read_record, read_text
 from vsacli.documents.time_column import TIME
 from vsacli.documents.tree import INVALID, Node, Scope
@@ -102,7 +101,9 @@ class Columns(OwnKind):
         if INVALID in found.values():
             return INVALID
         return {
-            name: dataclasses.replace(source, place=(scope.problems.file, node.key_lines[name]))
+            name: construct_unchecked(
+                ColumnSource, {**vars(source), "place": (scope.problems.file, node.key_lines[name])}
+            )
             for name, source in found.items()
         }
 
