@@ -170,11 +170,9 @@ def line_along(path: FieldPath, node: Node, scope: Scope) -> int:
 
 def read_value(kind: Kind, node: Node, label: str, scope: Scope) -> Any:
     """Return the value of a node, named `label` in messages; INVALID after noting a problem."""
-    return (
-        kind.read(node, label, scope)
-        if isinstance(kind, OwnKind)
-        else _READERS[type(kind)](kind, node, label, scope)
-    )
+    if isinstance(kind, OwnKind):
+        return kind.read(node, label, scope)
+    return _READERS[type(kind)](kind, node, label, scope)
 
 
 def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
