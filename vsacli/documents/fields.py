@@ -24,7 +24,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from vsacli.base.errors import FieldProblem
-from vsacli.base.units import DIMENSIONLESS, Quantity
+from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
 
 if TYPE_CHECKING:
     from vsacli.documents.tree import Node, Scope
@@ -166,6 +166,8 @@ class Interval(Kind):
 
 class NamedNumbers(Kind):
     """A mapping from user-defined names to numbers in SI units, read as pairs; angles may be in degrees."""
+
+    number = Number(ANY_SI_UNIT)
 
 
 class Items(Kind):

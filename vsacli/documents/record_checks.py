@@ -28,7 +28,6 @@ from vsacli.documents.fields import (
     Kind,
     Name,
     NamedNumbers,
-    Number,
     OwnKind,
     Pair,
     Text,
@@ -41,7 +40,6 @@ _Record = TypeVar("_Record", bound="DeclaredRecord")
 
 _ANY = Check(lambda _: True, "any number")
 _WITHOUT_UNIT = {str(DIMENSIONLESS), str(ANY_SI_UNIT)}
-_OF_NAMED = Number(ANY_SI_UNIT)
 
 
 class DeclaredRecord:
@@ -111,7 +109,7 @@ def value_problems(kind: Kind, check: Check | None, content: Any, path: FieldPat
         yield from _repeated_entries(kind.unique, content, path)
     elif isinstance(kind, NamedNumbers):
         for name, entry in content:
-            yield from _number_problems(_OF_NAMED, check, entry, (*path, name))
+            yield from _number_problems(kind.number, check, entry, (*path, name))
     elif isinstance(content, tuple) or isinstance(kind, Items | Pair):
         for index, entry in enumerate(content):
             yield from value_problems(kind.item or kind, check, entry, (*path, index))

@@ -14,7 +14,7 @@ from typing import Any
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
 from vsacli.base.texts import counted
-from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
+from vsacli.base.units import DIMENSIONLESS
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
@@ -54,6 +54,7 @@ from vsacli.documents.record_checks import (
 from vsacli.documents.tree import INVALID, NULLS, Node, Scalar, Scope, all_valid, quoted
 
 TRUTHS = ("true", "false")
+WITHOUT_UNIT = Number(DIMENSIONLESS)
 NOT_TEXTS = BOOLEANS | NULLS
 """Words without quotes that are no texts in YAML, in lower case."""
 
@@ -176,18 +177,14 @@ def read_value(kind: Kind, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
-    return _number(node, kind.unit, scope.variant, label, scope)
-
-
-def _number(node: Node, quantity: Quantity, variant: str | None, label: str, scope: Scope) -> Any:
-    """Return the number of a node in SI units; an unknown variant, itself a problem, counts as revolute."""
+    """Return the number in SI units; an unknown variant, itself a problem, counts as revolute."""
     if (
         isinstance(node, Scalar)
         and DECIMAL.fullmatch(node.text)
         and math.isfinite(decimal := float(node.text))
     ):
         return decimal
-    unit = quantity.unit(variant or "revolute")
+    unit = kind.unit.unit(scope.variant or "revolute")
     if not isinstance(node, Scalar) or node.is_null:
         return scope.unexpected(node, expected_number(unit), label)
     try:
@@ -206,7 +203,7 @@ def _read_share(kind: Share, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_integer(_kind: Integer, node: Node, label: str, scope: Scope) -> Any:
-    number = _number(node, DIMENSIONLESS, None, label, scope)
+    number = _read_number(WITHOUT_UNIT, node, label, scope)
     if number is INVALID or number.is_integer():
         return number if number is INVALID else int(number)
     return scope.unexpected(node, "a whole number", label)
@@ -268,11 +265,11 @@ def _read_interval(kind: Interval, node: Node, label: str, scope: Scope) -> Any:
     return scope.unexpected(node, "[lower, upper] or one number", label)
 
 
-def _read_named_numbers(_kind: NamedNumbers, node: Node, label: str, scope: Scope) -> Any:
+def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Mapping):
         return scope.unexpected(node, "a mapping from names to numbers", label)
     numbers = all_valid(
-        _number(entry, ANY_SI_UNIT, None, f"{label}.{name}", scope) for name, entry in node.entries.items()
+        _read_number(kind.number, entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
     )
     return numbers if numbers is INVALID else tuple(zip(node.entries, numbers, strict=True))
 
@@ -336,8 +333,8 @@ def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any
     return all_valid(
         _no_number(nodes.get(name), name, exempt[name], label, scope)
         if name in exempt
-        else _number(nodes[name], kind.unit, variant, label, scope)
-        for name, variant in scope.members.items()
+        else _read_number(kind.item, nodes[name], label, scope.of_member(name))
+        for name in scope.members
     )
 
 

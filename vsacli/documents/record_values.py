@@ -10,8 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.base.texts import on_one_line
-from vsacli.base.units import ANY_SI_UNIT, Quantity
-from vsacli.documents import fields
+from vsacli.base.units import Quantity
 from vsacli.documents.fields import (
     Items,
     Kind,
@@ -63,7 +62,7 @@ def arrays(
             yield from of_record(content)
         case NamedNumbers():
             for name, entry in content:
-                yield _single(fields.Number(ANY_SI_UNIT), entry)._replace(path=(name,))
+                yield _single(kind.number, entry)._replace(path=(name,))
         case Pair(item, dim):
             yield from _stacked(dim, (arrays(item, side, of_record) for side in content))
         case Items(item=item, records=records) if records:
