@@ -30,7 +30,7 @@ class RobotFile(Robot):
     )
 
     def robot(self, source: Source) -> Robot:
-        """Return the robot with standard rows and link frames, converted if the file has modified ones."""
+        """Return the robot of a source, with standard rows and link frames, converted from modified ones."""
         content = {name: getattr(self, name) for name in declared(Robot)}
         robot = construct_unchecked(Robot, {**content, "sources": (source, *self.spring_sources)})
         if self.convention == "standard":
