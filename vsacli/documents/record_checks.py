@@ -161,8 +161,40 @@ def already_used(word: str, where: str) -> str:
 
 def fault_of(kind: Kind, content: Any) -> str | None:
     """Return the problem of a value as a whole, apart from the condition on its numbers, or None."""
-    fault = _FAULTS.get(type(kind))
-    return None if fault is None else fault(kind, content)
+    match kind:
+        case Boolean() if not isinstance(content, bool):
+            return f"must be true or false, not {content!r}"
+        case Name() if not 1 <= len(content) <= MOST_LETTERS:
+            return f"must have 1 to {MOST_LETTERS} letters, not {len(content)}"
+        case Text(identifier=True) if not IDENTIFIER.fullmatch(content):
+            requirement = "letters, digits, _ and -, beginning with a letter or _"
+            return f"must be made of {requirement}, not {quoted(content)}"
+        case Text():
+            return _unprintable(content, allowed="" if isinstance(kind, Name) else "\n")
+        case Choice(options=options) if content not in options:
+            return unknown_word(content, options, kind.not_yet)
+        case Vector(length=length) if len(content) != length:
+            return f"expected {length} numbers in {{}}, found {len(content)}"
+        case Interval() if not content[0] <= content[1]:
+            (lower, upper), unit = content, " {}" if _has_unit(kind) else ""
+            return f"the lower limit {lower:g}{unit} exceeds the upper limit {upper:g}{unit}; swap them"
+    return None
+
+
+def _unprintable(content: str, allowed: str) -> str | None:
+    """Return the problem of a text with control characters or writing-direction marks; None without one."""
+    for letter in content:
+        if not (letter.isprintable() or letter in allowed):
+            what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
+            return f"{what}, which cannot be printed in one line; remove it"
+    return None
+
+
+def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
+    """Return the problem of a word that is not among the options."""
+    if word in not_yet:
+        return f"{word!r} is not supported yet"
+    return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
 
 
 def fault_of_number(number: float, check: Check) -> str | None:
@@ -174,62 +206,3 @@ def fault_of_number(number: float, check: Check) -> str | None:
     if 0 < abs(number) < SMALLEST and not check.holds(0.0):
         return f"must be at least {SMALLEST:g} in size, not {number:g}"
     return None
-
-
-def _fault_of_boolean(_kind: Boolean, content: Any) -> str | None:
-    return None if isinstance(content, bool) else f"must be true or false, not {content!r}"
-
-
-def _fault_of_text(kind: Text, content: str) -> str | None:
-    if kind.identifier and not IDENTIFIER.fullmatch(content):
-        requirement = "letters, digits, _ and -, beginning with a letter or _"
-        return f"must be made of {requirement}, not {quoted(content)}"
-    return _unprintable(content, allowed="\n")
-
-
-def _fault_of_name(_kind: Name, content: str) -> str | None:
-    if not 1 <= len(content) <= MOST_LETTERS:
-        return f"must have 1 to {MOST_LETTERS} letters, not {len(content)}"
-    return _unprintable(content)
-
-
-def _unprintable(content: str, allowed: str = "") -> str | None:
-    """Return the problem of a text with control characters or writing-direction marks; None without one."""
-    for letter in content:
-        if not (letter.isprintable() or letter in allowed):
-            what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
-            return f"{what}, which cannot be printed in one line; remove it"
-    return None
-
-
-def _fault_of_choice(kind: Choice, content: str) -> str | None:
-    return None if content in kind.options else unknown_word(content, kind.options, kind.not_yet)
-
-
-def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
-    """Return the problem of a word that is not among the options."""
-    if word in not_yet:
-        return f"{word!r} is not supported yet"
-    return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
-
-
-def _fault_of_vector(kind: Vector, content: tuple[float, ...]) -> str | None:
-    count = len(content)
-    return None if count == kind.length else f"expected {kind.length} numbers in {{}}, found {count}"
-
-
-def _fault_of_interval(kind: Interval, content: tuple[float, float]) -> str | None:
-    if content[0] <= content[1]:
-        return None
-    unit = " {}" if _has_unit(kind) else ""
-    return f"the lower limit {content[0]:g}{unit} exceeds the upper limit {content[1]:g}{unit}; swap them"
-
-
-_FAULTS: Mapping[type[Kind], Callable[[Any, Any], str | None]] = {
-    Boolean: _fault_of_boolean,
-    Text: _fault_of_text,
-    Name: _fault_of_name,
-    Choice: _fault_of_choice,
-    Vector: _fault_of_vector,
-    Interval: _fault_of_interval,
-}
