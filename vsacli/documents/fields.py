@@ -208,7 +208,8 @@ class PerJoint(Kind):
     per_joint = True
 
     def __init__(self, unit: Quantity, purpose: str = "") -> None:
-        self.unit, self.purpose, self.item = unit, purpose, Number(unit)
+        self.unit, self.purpose = unit, purpose
+        self.item: Number = Number(unit)
 
 
 class Record(Kind):
