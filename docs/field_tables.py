@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 from vsacli.base.texts import MOST_LETTERS, on_one_line
 from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.field_kinds import Field
 from vsacli.documents.fields import (
     FINITE,
     REQUIRED,
     Boolean,
     Choice,
+    Field,
     Integer,
     Interval,
     Items,

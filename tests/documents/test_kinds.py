@@ -33,25 +33,22 @@ from vsacli.documents.fields import (
     TableFile,
     Text,
     Vector,
-    check_fields,
     choice,
     declared,
     number,
     text,
     value,
 )
+from vsacli.documents.record_checks import DeclaredRecord, value_problems
 from vsacli.documents.record_values import ResolvedField, arrays, json_value
 
 
 @dataclass(frozen=True)
-class Wheel:
+class Wheel(DeclaredRecord):
     radius: float = number(LENGTH, "radius", check=NON_NEGATIVE)
     name: str = text("name", default="")
 
     not_yet = ("tyre",)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -163,7 +160,7 @@ def test_kinds_without_arrays_say_so(kind: Kind) -> None:
 )
 def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem: str) -> None:
     check = None if isinstance(kind, Interval | Text | Choice | Boolean) else NON_NEGATIVE
-    (found,) = kind.problems(("x",), check, content)
+    (found,) = value_problems(kind, check, content, ("x",))
     assert found.path == path
     assert found.message.startswith(problem)
 
@@ -245,5 +242,5 @@ def test_named_numbers_are_pairs_that_go_by_their_names():
     assert json_value(kind, content) == {"k": 3.0, "turn": math.inf}
     found = arrays(kind, content, lambda _: iter(()))
     assert [(field.path, float(field.values)) for field in found] == [(("k",), 3.0), (("turn",), math.inf)]
-    problems = list(kind.problems(("constants",), FINITE, content))
+    problems = list(value_problems(kind, FINITE, content, ("constants",)))
     assert [str(problem) for problem in problems] == ["constants.turn: must be finite, not inf"]

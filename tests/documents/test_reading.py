@@ -10,12 +10,13 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.documents.fields import (
     NON_NEGATIVE,
+    Check,
     Items,
     OneOf,
     PerJoint,
     Record,
-    check_fields,
     choice,
+    declared,
     integer,
     interval,
     number,
@@ -23,21 +24,22 @@ from vsacli.documents.fields import (
     value,
 )
 from vsacli.documents.reading import read_document
+from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.files.file_kinds import DOCUMENTS
 
 
 @dataclass(frozen=True)
-class Wheel:
+class Wheel(DeclaredRecord):
     radius: float = number(units.POSITION, "radius")
 
     not_yet = ("tyre",)
 
-    def __post_init__(self):
-        further = [FieldProblem(("radius",), "is a bad omen")] if self.radius == 13 else []
-        check_fields(self, *further)
+    def _problems(self):
+        return [FieldProblem(("radius",), "is a bad omen")] if self.radius == 13 else []
 
 
 @dataclass(frozen=True)
-class Cart:
+class Cart(DeclaredRecord):
     name: str = text("name", identifier=True)
     kind: str = choice(("revolute", "prismatic"), "kind", default="prismatic", not_yet=("spherical",))
     part: object = value(OneOf({"wheel": Wheel}, not_yet=("ski",)), "part", default=None)
@@ -48,9 +50,6 @@ class Cart:
 
     unit_variant = "kind"
     not_yet = ("brake",)
-
-    def __post_init__(self):
-        check_fields(self)
 
 
 @pytest.fixture
@@ -136,3 +135,50 @@ def test_units_of_per_joint_values_follow_each_joint(read):
 def test_a_bad_value_does_not_hide_the_others_of_its_record(read):
     lines = problems(read, "count: -1\nloads: [1, x]\nspan: [2, 1]\nwheels: [{radius: 13}, {}]\n")
     assert [line.split(":")[1] for line in lines] == ["3", "4", "5", "6", "6"]
+
+
+def test_a_value_is_checked_once_in_a_file_and_in_a_constructor(tmp_path):
+    checked = []
+    once = Check(lambda mass: checked.append(mass) or mass > 0, "positive")
+
+    @dataclass(frozen=True)
+    class Stone(DeclaredRecord):
+        mass: float = number(units.MASS, "mass", check=once)
+
+    @dataclass(frozen=True)
+    class Heap(DeclaredRecord):
+        stones: tuple = value(Items(Record(Stone)), "stones")
+
+    path = tmp_path / "heap.yaml"
+    path.write_text("format: heap/1\nstones: [{mass: 1}, {mass: 2}]\n")
+    heap, _ = read_document(path, Heap, "heap/1")
+    assert checked == [1, 2]
+    assert heap == Heap(stones=(Stone(mass=1.0), Stone(mass=2.0)))
+    assert checked == [1, 2, 1, 2]
+
+
+def test_a_constructor_refuses_what_a_file_may_not_have(read):
+    for radius in (math.nan, math.inf, 1e31, 13.0):
+        with pytest.raises(InputError) as constructed:
+            Wheel(radius=radius)
+        assert str(constructed.value).startswith("Wheel: radius: ")
+    assert problems(read, "kind: prismatic\nwheels: [{radius: 1e31}]") == [
+        "cart.yaml:4: radius: must be at most 1e+30 in size, not 1e+31 m"
+    ]
+    with pytest.raises(InputError, match="must be at most 1e\\+30 in size, not 1e\\+31 rad"):
+        Wheel(radius=1e31)
+
+
+def records_in(cls, seen):
+    if cls not in seen:
+        seen.add(cls)
+        for field, _ in declared(cls).values():
+            for record in field.kind.records.values():
+                records_in(record, seen)
+    return seen
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_no_record_of_a_file_has_checks_that_only_its_constructor_runs(document):
+    records = records_in(DOCUMENTS[document].record, set())
+    assert {cls.__post_init__ for cls in records} == {DeclaredRecord.__post_init__}

@@ -6,18 +6,16 @@ import pytest
 
 from vsacli.base import units
 from vsacli.base.errors import InputError
-from vsacli.documents.fields import POSITIVE, Name, check_fields, number, value
+from vsacli.documents.fields import POSITIVE, Name, number, value
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_table import read_records
 
 
 @dataclass(frozen=True)
-class Fruit:
+class Fruit(DeclaredRecord):
     name: str = value(Name(), "what it is called")
     mass: float = number(units.MASS, "mass", check=POSITIVE)
     speed: float | None = number(units.VELOCITY, "speed", check=POSITIVE, default=None)
-
-    def __post_init__(self):
-        check_fields(self)
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
 from vsacli.base.variables import MOTORS, SPRINGS, Variable
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 
 
@@ -97,7 +98,7 @@ class SpringLoad(NamedTuple):
     max_deflection: float
 
 
-class Actuator(ABC):
+class Actuator(DeclaredRecord, ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.

@@ -25,7 +25,7 @@ from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import OneOf, Pair, Record, check_fields, choice, value
+from vsacli.documents.fields import OneOf, Pair, Record, choice, value
 from vsacli.documents.source import Source
 
 
@@ -52,8 +52,8 @@ class Antagonistic(Actuator):
     commanded = ("stiffness",)
     integrable = True
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self.pair.problems(), *self._coupling_problems())
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from (*self.pair.problems(), *self._coupling_problems())
 
     def _coupling_problems(self) -> Iterator[FieldProblem]:
         """Yield a problem if the law or the limit of the coupling bounds its deflection."""

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import check_fields, choice, interval, number
+from vsacli.documents.fields import choice, interval, number
+from vsacli.documents.record_checks import DeclaredRecord
 
 LOCATIONS = ("link", "transmission")
 
 
 @dataclass(frozen=True)
-class Damper:
+class Damper(DeclaredRecord):
     """A damper whose damping a trajectory commands as it does a stiffness."""
 
     location: str = choice(LOCATIONS, "location: between the links of the joint, or parallel to its springs")
@@ -34,13 +36,11 @@ class Damper:
         """Return plausible values of the fields, for a new robot file."""
         return {"location": "link", "range": [0, 5] if joint_type == "revolute" else [0, 50]}
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         lower, upper = self.range
         if not (lower >= 0 and math.isfinite(upper)):
             reason = f"must be [lower, upper] with 0 <= lower, such as [0, {abs(upper):g}]"
-            problems.append(FieldProblem(("range",), reason))
+            yield FieldProblem(("range",), reason)
         if self.start is not None and self.location == "link":
             reason = "a damper between the links moves with them; leave it out"
-            problems.append(FieldProblem(("start",), reason))
-        check_fields(self, *problems)
+            yield FieldProblem(("start",), reason)

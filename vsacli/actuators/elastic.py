@@ -22,7 +22,7 @@ from vsacli.base import units
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag, has
-from vsacli.documents.fields import POSITIVE, OneOf, Record, check_fields, number, value
+from vsacli.documents.fields import POSITIVE, OneOf, Record, number, value
 from vsacli.documents.source import Source
 
 EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
@@ -44,16 +44,12 @@ class Elastic(Actuator):
         "stiffness": "its actuator is elastic, with the spring that the robot file says"
     }
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         if self.stiffness is None and self.spring is None:
-            problems.append(
-                FieldProblem((), "missing key 'stiffness' (of a linear spring) or 'spring' (of any law)")
-            )
+            yield FieldProblem((), "missing key 'stiffness' (of a linear spring) or 'spring' (of any law)")
         elif self.stiffness is not None and self.spring is not None:
             reason = "the law of `spring` says already how stiff it is; leave out one of both"
-            problems.append(FieldProblem(("stiffness",), reason))
-        check_fields(self, *problems)
+            yield FieldProblem(("stiffness",), reason)
 
     @cached_property
     def law(self) -> SpringLaw:

@@ -14,7 +14,8 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, check_fields, number, value
+from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, number, value
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 
 REST = 1e-10
 """Largest speed, rad/s (m/s), that counts as rest. At the ends of rest-to-rest motions of the bundled robots,
@@ -22,7 +23,7 @@ rounding leaves 1e-13. At 1e-10 a turn takes two thousand years."""
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(DeclaredRecord):
     """Dry friction: a torque against the motion that hardly depends on its velocity."""
 
     coulomb: tuple[float, float] = value(
@@ -38,9 +39,6 @@ class Friction:
         default=0.0,
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
         """Return plausible values of the fields, for a new robot file."""
@@ -52,20 +50,17 @@ class Friction:
         return self.width == 0 and any(self.coulomb)
 
     def geared(self, ratio: float) -> Friction:
-        """Return the friction on the joint side of a gear whose shaft turns `ratio` times."""
+        """Return the friction on the joint side of a gear whose shaft turns `ratio` times.
+
+        It is not checked: values were checked on the shaft, or are duals.
+        """
         backward, forward = (abs(ratio) * size for size in self.coulomb)
-        return _Geared(
-            coulomb=(backward, forward) if ratio > 0 else (forward, backward),
-            offset=ratio * self.offset or 0.0,
-            width=self.width / abs(ratio),
-        )
-
-
-class _Geared(Friction):
-    """Friction on the joint side of a gear, unchecked: its values were checked on the shaft, or are duals."""
-
-    def __post_init__(self) -> None:
-        pass
+        geared = {
+            "coulomb": (backward, forward) if ratio > 0 else (forward, backward),
+            "offset": ratio * self.offset or 0.0,
+            "width": self.width / abs(ratio),
+        }
+        return construct_unchecked(Friction, geared)
 
 
 NO_FRICTION = Friction(coulomb=(0.0, 0.0))

@@ -22,11 +22,11 @@ from vsacli.documents.fields import (
     POSITIVE,
     POSITIVE_OR_INFINITE,
     Record,
-    check_fields,
     choice,
     number,
     value,
 )
+from vsacli.documents.record_checks import DeclaredRecord, fault_of_number
 
 JOINT, SHAFT = "joint", "shaft"
 """Sides of a gear."""
@@ -86,7 +86,7 @@ class JointMotor:
 
 
 @dataclass(frozen=True)
-class Motor:
+class Motor(DeclaredRecord):
     """A motor as declared: on the joint side of its gear, or with `side: shaft` on its own shaft."""
 
     inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_ON_SIDE}", check=POSITIVE)
@@ -148,18 +148,18 @@ class Motor:
     unit_variants = MappingProxyType({SHAFT: "revolute"})
     required_unless = MappingProxyType({"side": ("gear_ratio", 1)})
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._gear_problems(), *self._missing())
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from (*self._gear_problems(), *self._missing())
 
     def _gear_problems(self) -> Iterator[FieldProblem]:
         ratio = self.gear_ratio
-        if ratio is None or NON_ZERO.problem(ratio):
+        if ratio is None:
             return
         if self.side is None and ratio != 1:
             yield self._without_side(ratio)
             return
         inertia = self.at_joint.inertia
-        if POSITIVE.problem(inertia) and not POSITIVE.problem(self.inertia):
+        if fault_of_number(inertia, POSITIVE):
             reason = f"makes the inertia on the joint side {inertia:g}, too far from anything built"
             yield FieldProblem(("gear_ratio",), reason)
 

@@ -13,7 +13,7 @@ from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, single_motor
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
-from vsacli.documents.fields import Record, check_fields, value
+from vsacli.documents.fields import Record, value
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,6 @@ class Rigid(Actuator):
 
     sprung = False
     uncommanded: ClassVar[Mapping[str, str]] = {"stiffness": "its actuator is rigid and has no stiffness"}
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:  # noqa: ARG003

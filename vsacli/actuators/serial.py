@@ -5,7 +5,7 @@ The mechanism defines the potential of the springs, from which the counterparts 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -25,7 +25,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.variables import Variable
-from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, value
+from vsacli.documents.fields import OneOf, Pair, Record, number, value
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
@@ -55,8 +55,7 @@ class Serial(Actuator):
     branch_field = "mechanism.branch"
     integrable = True
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         first, second = (motor.inertia for motor in self.motors)
         largest = largest_coupling(first, second)
         if not abs(self.coupled_rotors) < largest:
@@ -64,8 +63,7 @@ class Serial(Actuator):
                 f"is {self.coupled_rotors:g} on the joint side of the gears; its size must be below "
                 f"{largest:.4g}, the root of the product of both inertias, or B is not positive definite"
             )
-            problems.append(FieldProblem(("coupled_inertia",), reason))
-        check_fields(self, *problems)
+            yield FieldProblem(("coupled_inertia",), reason)
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:

@@ -79,8 +79,9 @@ class _JointType(_ActuatorType):
             expected = "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever"
             self.fail(f"{expected}, found {value!r}", param, ctx)
         from vsacli.documents.fields import Text
+        from vsacli.documents.record_checks import fault_of
 
-        if fault := Text(identifier=True).fault(name):
+        if fault := fault_of(Text(identifier=True), name):
             self.fail(f"the name {fault}", param, ctx)
         return _JointOption(name, super().convert(actuator, param, ctx))
 

@@ -11,8 +11,9 @@ from vsacli.base import file_formats
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
-from vsacli.documents.fields import Items, Record, check_fields, text, value
+from vsacli.documents.fields import Items, Record, text, value
 from vsacli.documents.reading import read_document
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.robot.model import Robot
 
 DEFAULT = "-20"
@@ -22,7 +23,7 @@ Poles = tuple[complex, ...]
 
 
 @dataclass(frozen=True)
-class JointPoles:
+class JointPoles(DeclaredRecord):
     """Poles of the errors of a joint."""
 
     name: str = text("name of the joint", identifier=True)
@@ -31,10 +32,7 @@ class JointPoles:
         "poles of the stiffness error, 1/s; one number applies to all poles", default=DEFAULT
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._pole_problems())
-
-    def _pole_problems(self) -> Iterator[FieldProblem]:
+    def _problems(self) -> Iterator[FieldProblem]:
         for name in ("position", "stiffness"):
             try:
                 for pole in parse_poles(getattr(self, name)):
@@ -44,13 +42,10 @@ class JointPoles:
 
 
 @dataclass(frozen=True)
-class PolesFile:
+class PolesFile(DeclaredRecord):
     """The content of a poles file."""
 
     joints: tuple[JointPoles, ...] = value(Items(Record(JointPoles), unique="name"), "poles of each joint")
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 def parse_poles(written: str, alternative: str = "") -> Poles:

@@ -5,7 +5,6 @@ The keys are used in trajectory files, and in files for recordings alone, `vsacl
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -18,21 +17,24 @@ from vsacli.base.units import DIMENSIONLESS, RATE
 from vsacli.documents import tree
 from vsacli.documents.column_mapping import AS_NAMED, REST, ColumnMapping, MappedColumn
 from vsacli.documents.expression import ExpressionError
-from vsacli.documents.field_kinds import Check, OwnKind, Refer, Schema, Text
 from vsacli.documents.fields import (
     LARGEST,
     NON_ZERO,
     POSITIVE,
+    FieldPath,
     Integer,
     Items,
-    check_fields,
+    OwnKind,
+    Refer,
+    Schema,
     number,
     text,
     value,
 )
-from vsacli.documents.nested import read_record
 from vsacli.documents.number import evaluate
 from vsacli.documents.reading import read_document
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
+from vsacli.documents.record_reader import read_record, read_text
 from vsacli.documents.time_column import TIME
 from vsacli.documents.tree import INVALID, Node, Scope
 
@@ -46,11 +48,12 @@ class ColumnName(OwnKind):
         """Return a text, or an integer if the node is a whole number without quotes."""
         if isinstance(node, tree.Scalar) and node.plain and node.text.isdecimal():
             return int(node.text)
-        return Text().read(node, label, scope)
+        return read_text(self, node, label, scope)
 
-    def fault(self, content: Any) -> str | None:
-        """See `Kind.fault`."""
-        return "columns are counted from 1" if content == 0 else None
+    def problems(self, path: FieldPath, content: Any) -> Iterator[FieldProblem]:
+        """See `OwnKind.problems`."""
+        if content == 0:
+            yield FieldProblem(path, "columns are counted from 1")
 
     def schema(self, _refer: Refer) -> Schema:
         """See `OwnKind.schema`."""
@@ -58,7 +61,7 @@ class ColumnName(OwnKind):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ColumnSource(MappedColumn):
+class ColumnSource(DeclaredRecord, MappedColumn):
     """A column of a table, with unit and factor of its numbers."""
 
     column: str | int = value(ColumnName(), "name or number of the column")
@@ -76,9 +79,6 @@ class ColumnSource(MappedColumn):
     nanoseconds: str | int | None = value(
         ColumnName(), "column of nanoseconds that is added to a `time` in whole seconds", default=None
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
 
     def _problems(self) -> Iterator[FieldProblem]:
         if self.unit is not None and {"[", "]"} & set(self.unit):
@@ -100,7 +100,9 @@ class Columns(OwnKind):
         if INVALID in found.values():
             return INVALID
         return {
-            name: dataclasses.replace(source, place=(scope.problems.file, node.key_lines[name]))
+            name: construct_unchecked(
+                ColumnSource, {**vars(source), "place": (scope.problems.file, node.key_lines[name])}
+            )
             for name, source in found.items()
         }
 
@@ -112,8 +114,8 @@ class Columns(OwnKind):
             return scope.unexpected(node, "a column, counted from 1", label)
         return column if column is INVALID else ColumnSource(column=column)
 
-    def problems(self, path: Any, _check: Check | None, content: Any) -> Iterator[FieldProblem]:
-        """See `Kind.problems`; each entry has been checked on construction."""
+    def problems(self, path: FieldPath, content: Any) -> Iterator[FieldProblem]:
+        """See `OwnKind.problems`; each entry has been checked on construction."""
         for name, source in content.items():
             if source.nanoseconds is not None and name != TIME:
                 yield FieldProblem((*path, name), f"only {TIME} may have a column of nanoseconds")
@@ -168,7 +170,7 @@ def skip_rows_field() -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ColumnsFile:
+class ColumnsFile(DeclaredRecord):
     """The content of a columns file: the keys of a trajectory file that concern its recordings."""
 
     columns: Mapping[str, MappedColumn] | None = columns_field()
@@ -178,10 +180,9 @@ class ColumnsFile:
         RATE, "sampling rate of recordings without a time column", check=POSITIVE, default=None
     )
 
-    def __post_init__(self) -> None:
-        nothing = FieldProblem((), "says nothing: give columns, ignore, skip_rows or rate")
-        stated = self.columns or self.ignore or self.skip_rows or self.rate
-        check_fields(self, *([] if stated else [nothing]))
+    def _problems(self) -> Iterator[FieldProblem]:
+        if not (self.columns or self.ignore or self.skip_rows or self.rate):
+            yield FieldProblem((), "says nothing: give columns, ignore, skip_rows or rate")
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:

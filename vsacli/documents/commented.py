@@ -10,16 +10,19 @@ from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.base.texts import on_one_line
 from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents.field_kinds import (
+from vsacli.documents.fields import (
     REQUIRED,
     Choice,
     Field,
     Interval,
+    Items,
     Kind,
+    OneOf,
+    Pair,
+    Record,
     declared,
     variant_inside,
 )
-from vsacli.documents.nested import Items, OneOf, Pair, Record
 
 Values: TypeAlias = Mapping[str, Any]
 """Values to write, by key: numbers, texts, lists of these, and nested mappings for records."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
-from vsacli.documents.field_kinds import (
+from vsacli.documents.fields import (
     IDENTIFIER,
     LARGEST,
     REQUIRED,
@@ -23,18 +23,23 @@ from vsacli.documents.field_kinds import (
     Field,
     Integer,
     Interval,
+    Items,
     Kind,
     Name,
     NamedNumbers,
     Number,
+    OneOf,
+    OneOrMore,
     OwnKind,
+    Pair,
+    PerJoint,
+    Record,
     Schema,
     Share,
     Text,
     Vector,
     declared,
 )
-from vsacli.documents.nested import Items, OneOf, OneOrMore, Pair, PerJoint, Record
 from vsacli.documents.number import ANGLES, MAX_LENGTH
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

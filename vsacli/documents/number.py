@@ -20,7 +20,12 @@ BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
 """Words that are booleans in YAML 1.1, in lower case."""
 
 _GRAMMAR = Grammar(names=("pi",), functions=(), powers=False, max_length=MAX_LENGTH)
-_DECIMAL = re.compile(rf"[+-]?(?!0\d){NUMBER}", re.ASCII)
+DECIMAL = re.compile(rf"[+-]?(?!0\d){NUMBER}", re.ASCII)
+"""Regular expression of a number that `float` reads."""
+
+PER_CENT = re.compile(r"(?P<number>.*\S)\s*%")
+"""Regular expression of a share in percent."""
+
 _DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{NUMBER}|\(.*\))\s*deg", re.ASCII)
 _WITH_UNIT = re.compile(rf"(?P<number>[+-]?(?!0\d){NUMBER})\s*(?P<unit>[^\W\d_].*)", re.ASCII)
 _WORD = re.compile(r"[^\W\d]\w*")
@@ -84,8 +89,6 @@ def _degrees(text: str) -> float:
 
 
 def _expression(text: str) -> float:
-    if _DECIMAL.fullmatch(text):
-        return float(text)
     try:
         return float(parse(text, _GRAMMAR).value({"pi": math.pi}, {}))
     except ZeroDivisionError:

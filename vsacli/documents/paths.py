@@ -14,8 +14,8 @@ from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
-from vsacli.documents.field_kinds import Kind, declared
-from vsacli.documents.nested import Items, Pair, scope_inside
+from vsacli.documents.fields import Items, Kind, Pair, declared, variant_inside
+from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import Scope
@@ -196,16 +196,18 @@ class _Replacement(NamedTuple):
     def in_record(self, record: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return a record with the replacement in it."""
         word, *rest = words
-        fields = declared(type(record))
+        cls: type = type(record)
+        fields = declared(cls)
         if word not in fields:
             raise _nowhere(word, fields, place)
         kind = fields[word][0].kind
-        inside = self._replace(scope=scope_inside(self.scope, type(record), _written(record)))
+        chosen = getattr(record, getattr(cls, "unit_variant", ""), None)
+        variant = variant_inside(cls, chosen, self.scope.variant)
+        inside = self._replace(scope=self.scope._replace(variant=variant))
         content = inside.in_value(kind, getattr(record, word), rest, (*place, word))
         try:
             return dataclasses.replace(record, **{word: content})
         except InvalidRecordError as error:
-            variant = inside.scope.variant
             problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None
 
@@ -232,7 +234,7 @@ class _Replacement(NamedTuple):
         if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.Scalar):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
-        content = kind.read(self.node, label, self.scope._replace(problems=problems))
+        content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
         except InputError as error:
@@ -269,13 +271,6 @@ class _Replacement(NamedTuple):
             here = (*place, names[index] or str(index))
             entries[index] = inside.in_value(each, content[index], rest, here)
         return tuple(entries)
-
-
-def _written(record: Any) -> tree.Mapping:
-    """Return the text and number fields of a record as a mapping of a file."""
-    contents = {name: getattr(record, name) for name in declared(type(record))}
-    simple = {name: _node(entry) for name, entry in contents.items() if isinstance(entry, str | int | float)}
-    return tree.Mapping(0, simple, dict.fromkeys(simple, 0))
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -12,11 +12,12 @@ from typing import Any, TypeAlias, TypeVar
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.nested import read_record
+from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source, recognizing_other_formats
 from vsacli.documents.tree import Scope, parse_yaml, quoted
 
-_Document = TypeVar("_Document")
+_Document = TypeVar("_Document", bound=DeclaredRecord)
 
 Changes: TypeAlias = Mapping[str, Any]
 """Replacements by path into a file, applied in order: values in the form used in files."""
@@ -60,7 +61,7 @@ def read_document(
 
 
 def survey_document(
-    path: str | os.PathLike[str], cls: type
+    path: str | os.PathLike[str], cls: type[DeclaredRecord]
 ) -> tuple[tree.Mapping, list[tuple[Quantity, tree.Node]]]:
     """Return the root of a YAML file, and its PerJoint values as written, for any joints.
 

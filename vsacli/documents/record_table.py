@@ -22,14 +22,15 @@ from vsacli.documents.csv_file import (
 )
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.fields import REQUIRED, Kind, Number, declared
-from vsacli.documents.nested import read_record
+from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source
 from vsacli.documents.tree import INVALID, Scope
 
 MAX_BYTES = 50_000_000
 """Largest file in bytes; rows become objects, and a hundred thousand rows have some ten million bytes."""
 
-_Record = TypeVar("_Record")
+_Record = TypeVar("_Record", bound=DeclaredRecord)
 
 
 class RecordTable(NamedTuple, Generic[_Record]):
@@ -116,7 +117,7 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
             columns.places[name] = index
             columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
             if columns.factors[name] != 1 and unit is not None:
-                columns.units[name] = unit, Scope(problems, {}, {}).unit(fields[name][0].quantity)
+                columns.units[name] = unit, fields[name][0].quantity.revolute
         else:
             columns.others.append(name)
             near = nearest(name, fields)
@@ -141,8 +142,7 @@ def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Proble
     try:
         if not isinstance(kind, Number):
             raise InputError.one("holds texts, which have no unit")
-        expected = Scope(problems, {}, {}).unit(kind.unit)
-        return 1.0 if unit == expected else conversion_factor(unit, expected)
+        return 1.0 if unit == kind.unit.revolute else conversion_factor(unit, kind.unit.revolute)
     except InputError as error:
         problems.add(line, f"column {name!r}: {error}")
         return math.nan

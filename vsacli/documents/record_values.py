@@ -10,18 +10,22 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.base.texts import on_one_line
-from vsacli.base.units import ANY_SI_UNIT, Quantity
-from vsacli.documents import field_kinds
-from vsacli.documents.field_kinds import (
+from vsacli.base.units import Quantity
+from vsacli.documents.fields import (
+    Items,
     Kind,
     NamedNumbers,
+    OneOf,
     OwnKind,
+    Pair,
+    PerJoint,
+    Record,
     TableFile,
     Text,
     declared,
     variant_inside,
 )
-from vsacli.documents.nested import Items, OneOf, Pair, PerJoint, Record
+from vsacli.documents.record_checks import DeclaredRecord
 
 
 class ResolvedField(NamedTuple):
@@ -58,7 +62,7 @@ def arrays(
             yield from of_record(content)
         case NamedNumbers():
             for name, entry in content:
-                yield _single(field_kinds.Number(ANY_SI_UNIT), entry)._replace(path=(name,))
+                yield _single(kind.number, entry)._replace(path=(name,))
         case Pair(item, dim):
             yield from _stacked(dim, (arrays(item, side, of_record) for side in content))
         case Items(item=item, records=records) if records:
@@ -104,7 +108,7 @@ def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.nd
     return fitted
 
 
-def json_fields(record: Any) -> dict[str, Any]:
+def json_fields(record: DeclaredRecord) -> dict[str, Any]:
     """Return the declared fields of a record as JSON values, except that numbers may be non-finite."""
     return {
         name: None if (content := getattr(record, name)) is None else json_value(field.kind, content)

@@ -36,6 +36,10 @@ def quoted(text: str) -> str:
     return repr(text) if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]!r}..."
 
 
+NULLS = frozenset({"", "~", "null"})
+"""Texts without quotes that stand for nothing, in lower case."""
+
+
 class Scalar(NamedTuple):
     """A text as written.
 
@@ -56,8 +60,8 @@ class Scalar(NamedTuple):
 
     @property
     def is_null(self) -> bool:
-        """Whether the value is absent: empty, `~` or `null` without quotes."""
-        return self.plain and self.text.lower() in ("", "~", "null")
+        """Whether the value is absent."""
+        return self.plain and self.text.lower() in NULLS
 
 
 class Sequence(NamedTuple):
@@ -118,10 +122,6 @@ class Scope(NamedTuple):
     exempt: AbstractMapping[str, AbstractMapping[str, str]]
     variant: str | None = None
     survey: list[tuple[Quantity, Node]] | None = None
-
-    def unit(self, quantity: Quantity) -> str:
-        """Return the unit of a quantity here; an unknown variant, itself a problem, counts as revolute."""
-        return quantity.unit(self.variant or "revolute")
 
     def of_member(self, name: str) -> Scope:
         """Return the scope of the value of one joint; the same scope if the name is unknown."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from vsacli.base import file_formats
 from vsacli.base.errors import InputError, check_path
 from vsacli.documents.fields import choice, declared
 from vsacli.documents.reading import Changes, changed, read_document
+from vsacli.documents.record_checks import construct_unchecked
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 
@@ -28,9 +28,10 @@ class RobotFile(Robot):
         default="standard",
     )
 
-    def robot(self) -> Robot:
-        """Return the robot with standard rows and link frames, converted if the file has modified ones."""
-        robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
+    def robot(self, source: Source) -> Robot:
+        """Return the robot of a source, with standard rows and link frames, converted from modified ones."""
+        content = {name: getattr(self, name) for name in declared(Robot)}
+        robot = construct_unchecked(Robot, {**content, "sources": (source, *self.spring_sources)})
         if self.convention == "standard":
             return robot
         from vsacli.robot.modified_dh import as_standard
@@ -68,11 +69,10 @@ class ReadRobot(NamedTuple):
         """
         document, source = changed(self.document, self.source, changes)
         try:
-            robot = document.robot()
+            return document.robot(source)
         except InputError as error:
             reason = f"its modified rows have no standard ones: {error}"
             raise InputError.one(reason, source.path) from None
-        return dataclasses.replace(robot, sources=(source, *robot.spring_sources))
 
 
 def read_robot(path: str | os.PathLike[str]) -> ReadRobot:

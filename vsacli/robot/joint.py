@@ -22,7 +22,6 @@ from vsacli.documents.fields import (
     SMALLEST,
     OneOf,
     Record,
-    check_fields,
     choice,
     interval,
     number,
@@ -30,6 +29,7 @@ from vsacli.documents.fields import (
     value,
     vector,
 )
+from vsacli.documents.record_checks import DeclaredRecord
 
 UNBOUNDED = (-math.inf, math.inf)
 INERTIA_ROUNDING = 1e-12
@@ -37,7 +37,7 @@ INERTIA_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class DenavitHartenberg:
+class DenavitHartenberg(DeclaredRecord):
     """Standard Denavit-Hartenberg row: frame i-1 to frame i is Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
 
     a: float = number(units.LENGTH, "distance of the axes z_{i-1} and z_i, along x_i")
@@ -49,12 +49,9 @@ class DenavitHartenberg:
         units.ANGLE, "angle about z_{i-1}; the variable of a revolute joint adds to it", default=0.0
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(DeclaredRecord):
     """The pose of a frame in another one: position, then fixed-axis rotations, like `origin` in URDF."""
 
     xyz: tuple[float, float, float] = vector(
@@ -67,12 +64,9 @@ class Pose:
         default=(0.0, 0.0, 0.0),
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Inertia:
+class Inertia(DeclaredRecord):
     """Central inertia tensor, with the entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
 
     xx: float = number(units.INERTIA, "moment about the x axis")
@@ -82,12 +76,11 @@ class Inertia:
     xz: float = number(units.INERTIA, "tensor entry -integral(x z dm)", default=0.0)
     yz: float = number(units.INERTIA, "tensor entry -integral(y z dm)", default=0.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    def _problems(self) -> Iterator[FieldProblem]:
         smallest = self.principal_moments[0]
         if smallest < -INERTIA_ROUNDING * np.abs(self.tensor).max():
             problem = f"the tensor has the negative eigenvalue {smallest:.4g} kg m^2, which no body has"
-            check_fields(self, FieldProblem((), problem))
+            yield FieldProblem((), problem)
 
     @property
     def tensor(self) -> FloatArray:
@@ -103,19 +96,16 @@ class Inertia:
 
 
 @dataclass(frozen=True)
-class Link:
+class Link(DeclaredRecord):
     """The augmented link: the body with the motors mounted on it, without the inertia of their rotors."""
 
     mass: float = number(units.MASS, "mass of the link with the motors mounted on it", check=NON_NEGATIVE)
     com: tuple[float, float, float] = vector(3, units.LENGTH, "center of mass in the link frame (DH frame i)")
     inertia: Inertia = value(Record(Inertia), "inertia tensor about the center of mass, link axes")
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(DeclaredRecord):
     """Limits of the commanded motion; samples beyond them are computed and flagged."""
 
     position: tuple[float, float] = interval(units.POSITION, "range of the joint position", default=UNBOUNDED)
@@ -124,12 +114,9 @@ class Limits:
         units.STIFFNESS, "range of the joint stiffness", lowest=-math.inf, default=UNBOUNDED
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Joint:
+class Joint(DeclaredRecord):
     """One joint with its link and actuator."""
 
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
@@ -148,18 +135,17 @@ class Joint:
 
     unit_variant = "type"
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         if not self.actuator.sprung and self.limits.stiffness != UNBOUNDED:
             reason = f"a joint with a {self.actuator_type} actuator has no stiffness to limit; leave it out"
-            problems.append(FieldProblem(("limits", "stiffness"), reason))
+            yield FieldProblem(("limits", "stiffness"), reason)
         if not self.actuator.sprung and self.damper is not None:
             reason = f"a joint with a {self.actuator_type} actuator has no springs to calm; leave it out"
-            problems.append(FieldProblem(("damper",), reason))
+            yield FieldProblem(("damper",), reason)
         unfit = self.actuator.unfit_for(self.type)
         if unfit is not None:
-            problems.append(unfit.inside("actuator"))
-        check_fields(self, *problems, *self._friction_problems())
+            yield unfit.inside("actuator")
+        yield from self._friction_problems()
 
     @property
     def is_revolute(self) -> bool:

@@ -18,11 +18,11 @@ from vsacli.documents.fields import (
     Name,
     Record,
     boolean,
-    check_fields,
     text,
     value,
     vector,
 )
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint, Pose
 
@@ -37,7 +37,7 @@ WITHOUT_MASSES = "no link has a mass, so that hardly anything but the motor iner
 
 
 @dataclass(frozen=True, repr=False)
-class Robot:
+class Robot(DeclaredRecord):
     """A serial chain of joints from a fixed base."""
 
     name: str = value(Name(), "name of the robot")
@@ -53,9 +53,6 @@ class Robot:
     tool: Pose = value(Record(Pose), "end effector in the last DH frame (frame N)", default=Pose())
     joints: tuple[Joint, ...] = value(Items(Record(Joint), unique="name"), "joints from the base to the tip")
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def __hash__(self) -> int:
         return self._hash

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple, TypeVar
 
@@ -12,6 +12,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.compute.vector import Scalar
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 from vsacli.documents.record_values import Entry, Number, NumberPath, numbers
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -22,7 +23,7 @@ LIMITS, LARGEST, OF_DAMPER = "limits", "max_", ("damper", "range")
 """Words of paths to numbers that bound results but change none, and so are no parameters: those under
 `limits`, the range of a damper, and names that begin with `max_`."""
 
-_Record = TypeVar("_Record")
+_Record = TypeVar("_Record", bound=DeclaredRecord)
 
 
 class Parameter(NamedTuple):
@@ -146,43 +147,25 @@ def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Sca
 
     Records on the paths are made without their checks, so the robot cannot be checked or written to a file.
     """
-    places = [(parameter.path, value) for parameter, value in zip(chosen, values, strict=True)]
-    other: Robot = _with_numbers(robot, places)
-    return other
+    for parameter, scalar in zip(chosen, values, strict=True):
+        robot = _with_number(robot, parameter.path, scalar)
+    return robot
 
 
-def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> Any:
-    """Return a record or list with other numbers at some paths."""
-    inside: dict[str | int, list[tuple[NumberPath, Scalar]]] = {}
-    for path, scalar in places:
-        if not path:  # a pair of equal numbers is one parameter; set both
-            return (scalar,) * len(content) if isinstance(content, tuple) else scalar
-        word = path[0].number if isinstance(path[0], Entry) else path[0]
-        inside.setdefault(word, []).append((path[1:], scalar))
+def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
+    """Return a record or list with another number at a path, or at both sides of an equal pair."""
     if isinstance(content, tuple):
-        return _in_list(content, inside)
-    fields: dict[str, Any] = {
-        str(word): _with_numbers(getattr(content, str(word)), deeper) for word, deeper in inside.items()
-    }
-    return _remade(content, fields)
-
-
-def _in_list(
-    entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Scalar]]]
-) -> tuple[Any, ...]:
-    """Return a list with entries replaced; a path without an index changes both sides of an equal pair."""
-    both = [
-        ((word, *path), scalar)
-        for word, deeper in inside.items()
-        if isinstance(word, str)
-        for path, scalar in deeper
-    ]
-    if both:
-        return (_with_numbers(entries[0], both),) * len(entries)
-    return tuple(
-        _with_numbers(entry, inside[index]) if index in inside else entry
-        for index, entry in enumerate(entries)
-    )
+        chosen = path[0] if path else ""
+        if not isinstance(chosen, Entry):
+            return (_with_number(content[0], path, scalar),) * len(content)
+        return tuple(
+            _with_number(entry, path[1:], scalar) if index == chosen.number else entry
+            for index, entry in enumerate(content)
+        )
+    if not path:
+        return scalar
+    word = str(path[0])
+    return _remade(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
 
 
 def apart(joint: Joint) -> Joint:
@@ -192,7 +175,6 @@ def apart(joint: Joint) -> Joint:
 
 def _remade(record: _Record, contents: Mapping[str, Any]) -> _Record:
     """Return a record with other values in some fields, without its checks and cached values."""
-    new = object.__new__(type(record))
-    for field in dataclasses.fields(record):  # type: ignore[arg-type]  # declared fields are those of dataclasses
-        object.__setattr__(new, field.name, contents.get(field.name, getattr(record, field.name)))
-    return new
+    fields = dataclasses.fields(record)  # type: ignore[arg-type]  # records are dataclasses
+    same = {field.name: getattr(record, field.name) for field in fields}
+    return construct_unchecked(type(record), {**same, **contents})

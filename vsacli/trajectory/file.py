@@ -16,8 +16,9 @@ from vsacli.base import file_formats, units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
+from vsacli.documents.fields import POSITIVE, REQUIRED, Name, number, value
 from vsacli.documents.reading import ChangeError, Changes, changed, read_document, written
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_values import numbers
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -37,7 +38,7 @@ DEFAULT_RATE = 1000.0
 
 
 @dataclass(frozen=True)
-class TrajectoryFile:
+class TrajectoryFile(DeclaredRecord):
     """The content of a trajectory file.
 
     The declaration of each signal is an attribute named by its key; see `content`.
@@ -69,8 +70,8 @@ class TrajectoryFile:
     untaken: ClassVar[tuple[Signal, ...]] = ()
     """Signals of devices that are on no joint of the robot."""
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._time_problems(), *self._device_problems())
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from (*self._time_problems(), *self._device_problems())
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
@@ -113,9 +114,9 @@ class TrajectoryFile:
                 yield FieldProblem(("duration",), "the times come from the CSV file; leave this key out")
         elif self.lasts is None:
             yield FieldProblem((), "missing key 'duration' (s)")
-        elif all(given is None or POSITIVE.holds(given) for given in (self.lasts, self.rate, self.slow_down)):
+        else:
             try:
-                _uniform_times(self.lasts * self.slow_down, self.rate)
+                UniformTimes(self.lasts * self.slow_down, self.rate or DEFAULT_RATE)
             except InputError as error:
                 yield FieldProblem((self._longest,), str(error))
             else:
@@ -307,7 +308,7 @@ def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str)
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
-    return _uniform_times(document.lasts, document.rate)
+    return UniformTimes(document.lasts, document.rate or DEFAULT_RATE)
 
 
 def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
@@ -321,10 +322,6 @@ def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
-
-
-def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
-    return UniformTimes(duration, DEFAULT_RATE if rate is None else rate)
 
 
 def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_names: Sequence[str]) -> None:

@@ -18,7 +18,8 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.units import POSITION
 from vsacli.compute.control_flow import subroutine
-from vsacli.documents.fields import POSITIVE_OR_INFINITE, check_fields, number
+from vsacli.documents.fields import POSITIVE_OR_INFINITE, number
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 
 
@@ -136,7 +137,7 @@ def same_number(number: float, other: float) -> bool:
 
 
 @dataclass(frozen=True)
-class SpringLaw(ABC):
+class SpringLaw(DeclaredRecord, ABC):
     """A torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.
 
     So sigma > 0 on the domain, and zeta has the sign of phi. The methods take and return arrays of any one
@@ -156,9 +157,6 @@ class SpringLaw(ABC):
         default=math.inf,
         compare=False,
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def domain(self) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.compute.control_flow import subroutine
 from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
+from vsacli.documents.record_checks import fault_of_number
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
 
@@ -87,11 +88,11 @@ class MeasuredSpring(SpringLaw):
 
     examples: ClassVar = {"revolute": {"file": "measured_spring.csv"}}  # the bundled table is in rad and N m
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        problems = list(_problems(self.file))
+    def _problems(self) -> tuple[()]:
+        problems = list(_table_problems(self.file))
         if problems:
             raise InputError(problems)
+        return ()
 
     @cached_property
     def _curve(self) -> SplineCurve:
@@ -213,7 +214,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
         yield Problem(path, table.line_of(steps[0] + 1), message)
 
 
-def _problems(table: Table) -> Iterator[Problem]:
+def _table_problems(table: Table) -> Iterator[Problem]:
     """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path
@@ -240,11 +241,13 @@ def _wrong_sizes(table: Table) -> Iterator[Problem]:
     for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
             yield Problem(
-                table.source.path, table.line_of(int(row)), f"the {name} {FINITE.problem(column[row])}"
+                table.source.path,
+                table.line_of(int(row)),
+                f"the {name} {fault_of_number(column[row], FINITE)}",
             )
         for row in (0, len(column) - 1):
             if 0 < abs(column[row]) < SMALLEST:
-                message = f"the {name} {NON_ZERO.problem(column[row])}"
+                message = f"the {name} {fault_of_number(column[row], NON_ZERO)}"
                 yield Problem(table.source.path, table.line_of(row), message)
 
 

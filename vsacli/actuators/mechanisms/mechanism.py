@@ -13,7 +13,7 @@ from vsacli.actuators.elasticity import ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.documents.fields import check_fields
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 
 
@@ -166,7 +166,7 @@ Range: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Mechanism(ABC):
+class Mechanism(DeclaredRecord, ABC):
     """Springs between motor 1 and the link that motor 2 adjusts; a frozen dataclass of declared fields.
 
     Equal mechanisms must compute the same. If the potential depends only on phi = theta_1 - q and the setting
@@ -185,9 +185,6 @@ class Mechanism(ABC):
             from vsacli.base.renamed import refuse_old_names  # not needed for the mechanisms of this package
 
             refuse_old_names(cls, Mechanism)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @classmethod
     @abstractmethod

@@ -17,7 +17,7 @@ from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import OneOf, Pair, check_fields, choice, value
+from vsacli.documents.fields import OneOf, Pair, choice, value
 from vsacli.documents.source import Source
 
 
@@ -37,13 +37,10 @@ class ShiftedCams(Mechanism):
     )
     branch: str = choice(BRANCHES, "sign of theta_2 on the branch that is used", default="positive")
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._cams.problems(), *self._limit_problems())
-
-    def _limit_problems(self) -> Iterator[FieldProblem]:
-        """Yield a problem if the rotation of a cam is limited: it is no result variable to flag."""
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from self._cams.problems()
         for side, law in enumerate(self.spring):
-            if math.isfinite(law.max_deflection):
+            if math.isfinite(law.max_deflection):  # of the rotation of a cam, which is no variable to flag
                 reason = "is not known of a cam, whose turn is not a variable of results; leave it out"
                 yield FieldProblem(("spring", side, "max_deflection"), reason)
 

@@ -10,8 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, together, warnings_and_notes
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
-from vsacli.documents.field_kinds import Field, variant_inside
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import Field, declared, variant_inside
 from vsacli.files.info.numbers_in_text import row, short, span
 
 Values = Mapping[str, Any]

@@ -21,9 +21,8 @@ from vsacli.base.json_records import Published, named
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
-from vsacli.documents.field_kinds import PER_CENT
 from vsacli.documents.fields import LARGEST
-from vsacli.documents.number import evaluate
+from vsacli.documents.number import PER_CENT, evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import parse_yaml
 from vsacli.dynamics.inverse import compute_block, fitted, usual_block

@@ -14,10 +14,10 @@ from vsacli.documents.fields import (
     POSITIVE,
     Check,
     Name,
-    check_fields,
     number,
     value,
 )
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_table import RecordTable, read_records
 from vsacli.studies.sizing.shaft import Shaft
 
@@ -37,7 +37,7 @@ _NEEDED = {
 
 
 @dataclass(frozen=True)
-class CatalogMotor:
+class CatalogMotor(DeclaredRecord):
     """A motor of a catalog, which may already have a gear."""
 
     name: str = value(Name(), "name of the motor, unique in the file")
@@ -91,8 +91,8 @@ class CatalogMotor:
     )
     mass: float | None = number(units.MASS, "mass of the motor with its gear", check=POSITIVE, default=None)
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._missing(), *self._stuck())
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from (*self._missing(), *self._stuck())
 
     def _missing(self) -> Iterator[FieldProblem]:
         """Yield the columns that others require."""

@@ -15,22 +15,25 @@ from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.field_kinds import OwnKind, Refer, Schema, Share
 from vsacli.documents.fields import (
     Check,
     Choice,
     Items,
     Name,
+    OneOrMore,
+    OwnKind,
     Record,
+    Refer,
+    Schema,
+    Share,
     Text,
-    check_fields,
     choice,
     integer,
     text,
     value,
 )
-from vsacli.documents.nested import OneOrMore
 from vsacli.documents.reading import check_path_of_change
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.tree import INVALID, Node, Scope
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.tolerances import SHAPES
@@ -176,7 +179,7 @@ _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
 
 
 @dataclass(frozen=True)
-class Optimized:
+class Optimized(DeclaredRecord):
     """The optimization of each run, with the names and defaults of the options of `vsacli optimize`."""
 
     minimize: str = choice(
@@ -198,9 +201,6 @@ class Optimized:
         default=MIN_MARGIN,
     )
     seed: int = integer("seed of the random initial guesses", check=_SEED, default=0)
-
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
 
     def _problems(self) -> list[FieldProblem]:
         if (self.minimize, self.vary) == (TIME, STIFFNESS):
@@ -259,7 +259,7 @@ _COUNT = Check(lambda number: number >= 1, "1 or more", {"minimum": 1})
 
 
 @dataclass(frozen=True)
-class StudyFile:
+class StudyFile(DeclaredRecord):
     """The content of a study file."""
 
     name: str = value(Name(), "name of the study")
@@ -300,9 +300,6 @@ class StudyFile:
     every: int = integer(
         "decimation factor of these variables: one of this many samples is kept", check=_COUNT, default=1
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
 
     def _problems(self) -> Iterator[FieldProblem]:
         if self.method != GRID and self.samples is None:

@@ -26,12 +26,12 @@ from vsacli.documents.fields import (
     PerJoint,
     Vector,
     boolean,
-    check_fields,
     choice,
     number,
     text,
     value,
 )
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.trajectory.curves.closed_form import ClosedForm
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def odd(degrees: range, lowest: int, reason: str) -> Check:
     return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
 
 
-class Declaration(ABC):
+class Declaration(DeclaredRecord, ABC):
     """A type of declaration in a trajectory file, with its fields for each use.
 
     Attributes:
@@ -135,12 +135,6 @@ class Declaration(ABC):
         """Return the record class for a use."""
         made: type[Self] = _record(cls, use)
         return made
-
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
-
-    def _problems(self) -> Iterator[FieldProblem]:
-        return iter(())
 
 
 @cache

@@ -11,9 +11,9 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import FieldProblem, InvalidRecordError
+from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import POSITION
-from vsacli.documents.fields import POSITIVE, Items, OneOf, check_fields, integer, number, value
+from vsacli.documents.fields import POSITIVE, Items, OneOf, integer, number, value
 from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, Constant
 from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
 from vsacli.trajectory.curves.polynomial import RestToRest
@@ -167,7 +167,7 @@ class ViaPart(Via, _Standalone):
     def lasts(self) -> float:
         """Duration, s."""
         duration = self.duration if self.times is None else self.times[-1]
-        assert duration is not None, "see _problems"
+        assert duration is not None, "see `_problems`"
         return duration
 
 
@@ -213,19 +213,13 @@ class Sequence(Formula):
         """Return the meaning for users."""
         return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        problems = list(self._problems()) or list(self._discontinuities())
-        if problems:
-            raise InvalidRecordError(type(self).__name__, problems)
-
-    def _problems(self) -> Iterator[FieldProblem]:
+    def _problems(self) -> list[FieldProblem]:
         unfit = [
             problem.inside("parts", index)
             for index, part in enumerate(self.parts)
             for problem in part.own_problems()
         ]
-        yield from unfit or self._order_problems()
+        return unfit or list(self._order_problems()) or list(self._discontinuities())
 
     def _order_problems(self) -> Iterator[FieldProblem]:
         moving = [index for index, part in enumerate(self.parts) if not isinstance(part, Dwell)]

@@ -29,12 +29,12 @@ from vsacli.documents.fields import (
     FINITE,
     NamedNumbers,
     Record,
-    check_fields,
     interval,
     number,
     text,
     value,
 )
+from vsacli.documents.record_checks import DeclaredRecord
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -50,25 +50,19 @@ A counts as singular."""
 
 
 @dataclass(frozen=True)
-class BranchStart:
+class BranchStart(DeclaredRecord):
     """State of the springs that selects the branch."""
 
     theta_1: float = number(units.POSITION, "position of motor 1")
     theta_2: float = number(units.POSITION, "position of motor 2")
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class PotentialRange:
+class PotentialRange(DeclaredRecord):
     """Range of validity of a potential."""
 
     phi: tuple[float, float] = interval(units.POSITION, "deflection theta_1 - q")
     theta_2: tuple[float, float] = interval(units.POSITION, "position of motor 2")
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -86,10 +80,6 @@ class Potential(Mechanism):
     range: PotentialRange = value(
         Record(PotentialRange), "range of validity of the energy; its ends bound the stiffness"
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        check_fields(self, *self._problems())
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_warnings, worst_
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError, Problem
+from vsacli.base.errors import FieldProblem, InputError, Problem
 from vsacli.documents.fields import TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
@@ -169,11 +169,12 @@ class Cam(PreloadedCam):
         "CSV file with the header deflection,lift in rad,m (m,m), path relative to the robot file",
     )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        problems = list(_problems(self.profile)) or list(self._misfits())
-        if problems:
-            raise InputError(problems)
+    def _problems(self) -> list[FieldProblem]:
+        of_fields = super()._problems()
+        of_table = [] if of_fields else list(_profile_problems(self.profile)) or list(self._misfits())
+        if of_table:
+            raise InputError(of_table)
+        return of_fields
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
@@ -222,7 +223,7 @@ class Cam(PreloadedCam):
         return Lift(*self._fitted.curve(from_rest, 0, 4))
 
 
-def _problems(table: Table) -> Iterator[Problem]:
+def _profile_problems(table: Table) -> Iterator[Problem]:
     """Yield why the rows are no profile with one minimum, with the lines."""
     deflection, lift = table.values.T
     if problems := list(wrong_rows(table)):

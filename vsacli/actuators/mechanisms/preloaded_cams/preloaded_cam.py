@@ -19,7 +19,7 @@ from vsacli.actuators.spring_elements import LeverSpring
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import NON_ZERO, POSITIVE, check_fields, interval, number
+from vsacli.documents.fields import NON_ZERO, POSITIVE, interval, number
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,7 @@ class PreloadedCam(Mechanism):
         units.LENGTH, "smallest and largest compression of the spring at rest, zero or above"
     )
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._pretension_problems())
-
-    def _pretension_problems(self) -> list[FieldProblem]:
+    def _problems(self) -> list[FieldProblem]:
         low, high = self.pretension
         if 0 <= low < high < math.inf:
             return []
@@ -112,11 +109,11 @@ class Maccepa(PreloadedCam):
 
     joint_types = ("revolute",)
 
-    def __post_init__(self) -> None:
-        problems = self._pretension_problems()
+    def _problems(self) -> list[FieldProblem]:
+        problems = super()._problems()
         if self.b == self.c:
             problems.append(FieldProblem(("c",), "must differ from b: equal levers have a kink at rest"))
-        check_fields(self, *problems)
+        return problems
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -15,21 +16,19 @@ from vsacli.actuators.mechanisms.ratios.scales import Scale
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import NON_ZERO, POSITIVE, check_fields, interval, number
+from vsacli.documents.fields import NON_ZERO, POSITIVE, interval, number
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
-class Sine:
+class Sine(DeclaredRecord):
     """A softening torque tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2."""
 
     k: float = number(units.STIFFNESS, "stiffness at rest", check=POSITIVE)
     ratio: float = number(
         units.DIMENSIONLESS, "angle of the sine over the deflection", check=POSITIVE, default=2.0
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -159,11 +158,9 @@ class Awas(SineRatio):
     arm: tuple[float, float] = interval(units.LENGTH, "shortest and longest arm, above zero")
     lead: float = number(units.LEAD, "change of the arm length per theta_2", check=NON_ZERO)
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         if not 0 < self.arm[0] < self.arm[1] < np.inf:
-            problems.append(FieldProblem(("arm",), "must have two ends above zero, the shorter one first"))
-        check_fields(self, *problems)
+            yield FieldProblem(("arm",), "must have two ends above zero, the shorter one first")
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
@@ -208,14 +205,12 @@ class Lever(SineRatio):
     )
     lead: float = number(units.LEAD, "displacement of the pivot per theta_2", check=NON_ZERO)
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         if not 0 < self.pivot[0] < self.pivot[1] < self.length:
             reason = (
                 f"must have two ends between zero and the length {self.length:g} m, the smaller one first"
             )
-            problems.append(FieldProblem(("pivot",), reason))
-        check_fields(self, *problems)
+            yield FieldProblem(("pivot",), reason)
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003

@@ -16,7 +16,8 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values, look_up, repeat
 from vsacli.compute.rounding import OfRounding
-from vsacli.documents.fields import NON_ZERO, TableFile, check_fields, number, value
+from vsacli.documents.fields import NON_ZERO, TableFile, number, value
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
 
@@ -79,11 +80,8 @@ class Scale(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ScaleLaw(ABC):
+class ScaleLaw(DeclaredRecord, ABC):
     """K(s) of a variable ratio, a frozen dataclass of declared fields."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def sources(self) -> tuple[Source, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values
-from vsacli.documents.fields import OneOf, check_fields, interval, value
+from vsacli.documents.fields import OneOf, interval, value
 from vsacli.documents.source import Source
 
 TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.ratio:Sine"})
@@ -70,18 +71,16 @@ class VariableRatio(Mechanism):
     )
     torque: SpringLaw | Sine = value(OneOf(TORQUES), "torque g over the deflection, for K = 1")
 
-    def __post_init__(self) -> None:
-        problems = []
+    def _problems(self) -> Iterator[FieldProblem]:
         if not -np.inf < self.setting[0] < self.setting[1] < np.inf:
-            problems.append(FieldProblem(("setting",), "must have two ends, the smaller one first"))
+            yield FieldProblem(("setting",), "must have two ends, the smaller one first")
         else:
-            problems += [FieldProblem(("scale",), each) for each in self.scale.problems(self.setting)]
+            yield from (FieldProblem(("scale",), reason) for reason in self.scale.problems(self.setting))
         if isinstance(self.torque, SpringLaw) and np.isfinite(self.torque.max_deflection):
             reason = (
                 "is not a limit of a serial actuator; delete it (the range of a table already is a limit)"
             )
-            problems.append(FieldProblem(("torque", "max_deflection"), reason))
-        check_fields(self, *problems)
+            yield FieldProblem(("torque", "max_deflection"), reason)
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
