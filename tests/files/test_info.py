@@ -174,7 +174,7 @@ def test_peaks_of_a_polynomial_are_the_published_ones() -> None:
 def test_ranges_go_over_all_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     trajectory = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", ARM)
     whole = describe_trajectory(trajectory, ARM.joint_names)
-    monkeypatch.setattr("vsacli.files.info.describe.BLOCK_SAMPLES", 100)
+    monkeypatch.setattr("vsacli.files.info.trajectory_info.BLOCK_SAMPLES", 100)
     assert describe_trajectory(trajectory, ARM.joint_names) == whole
 
 
