@@ -172,10 +172,11 @@ class DampedSprings:
             return np.where(reached.infeasible, np.nan, np.stack(rows))
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
+        behind = self._behind[:, None] > 0
         return {
             **dict(zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)),
-            "phi": self._actuator.deflections(of_motors(phi)),
-            "dphi": self._actuator.deflections(of_motors(rates)),
+            "phi": np.where(behind, of_motors(phi), np.nan),
+            "dphi": np.where(behind, of_motors(rates), np.nan),
             "theta": of_motors(self._positions(phi, command.q)),
             "dtheta": of_motors(dtheta),
             "ddtheta": of_motors(ddtheta),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -17,19 +18,24 @@ class PairSprings(ElasticState):
     Args:
         one: State of spring 1 (62)-(64), (66).
         two: State of spring 2.
-        energy: Energy of all springs.
-        coupling: State of a spring between the motors, over phi_1 - phi_2, if there is one.
+        energy: Function that returns the energy of all springs, which few callers need.
+        coupling: Function that returns the torque of a spring between the motors and its derivatives up to an
+            order, if there is one.
     """
 
     def __init__(
-        self, one: SpringState, two: SpringState, energy: FloatArray, coupling: SpringState | None = None
+        self,
+        one: SpringState,
+        two: SpringState,
+        energy: Callable[[], FloatArray],
+        coupling: Callable[[int], Sequence[FloatArray]] | None,
     ) -> None:
         self._one, self._two, self._energy, self._coupling = one, two, energy, coupling
 
     @property
     def energy(self) -> FloatArray:
         """Energy of all springs."""
-        return self._energy
+        return self._energy()
 
     @property
     def tau_e(self) -> FloatArray:
@@ -46,7 +52,8 @@ class PairSprings(ElasticState):
         """Torque of each spring, and of the coupling, which acts on the motors in opposite directions."""
         if self._coupling is None:
             return self._one.tau, self._two.tau
-        return self._one.tau + self._coupling.tau, self._two.tau - self._coupling.tau
+        (between,) = self._coupling(0)
+        return self._one.tau + between, self._two.tau - between
 
     @property
     def _matrix(self) -> MotorMatrix:
@@ -79,7 +86,7 @@ class PairSprings(ElasticState):
         of_one, of_two = self._one.sigma * rates[0], self._two.sigma * rates[1]
         if self._coupling is None:
             return of_one, of_two
-        between = self._coupling.sigma * (rates[0] - rates[1])
+        between = self._coupling(1)[1] * (rates[0] - rates[1])
         return of_one + between, of_two - between
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray, ...]:
@@ -123,5 +130,6 @@ class PairElasticity(Elasticity):
         """Return the springs with their derivatives."""
         springs = self._springs.state(phi)
         one, two = (SpringState(*(values[..., side] for values in springs)) for side in range(2))
-        coupling = None if self._coupling is None else self._coupling.state(phi[..., 0] - phi[..., 1])
-        return PairSprings(one, two, self.energy(phi), coupling)
+        law, apart = self._coupling, phi[..., 0] - phi[..., 1]
+        coupling = None if law is None else partial(law.derivatives, apart)
+        return PairSprings(one, two, partial(self.energy, phi), coupling)

@@ -10,7 +10,10 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.reach import OfJoint
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import Flag, has
@@ -141,6 +144,38 @@ class SpringDemand(Published):
         return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
 
 
+class SpringLoad(NamedTuple):
+    """Load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
+
+    Attributes:
+        name: name of the spring.
+        deflection: deflection of the spring, or of a mechanism between motor 1 and link.
+        torque: torque at that deflection.
+        energy: stored energy, J.
+        max_deflection: largest admissible |deflection|.
+    """
+
+    name: str
+    deflection: FloatArray
+    torque: FloatArray
+    energy: FloatArray
+    max_deflection: float
+
+
+def _spring_loads(actuator: Actuator, of_joint: OfJoint) -> Iterator[SpringLoad]:
+    """Yield the loads of the springs from variables of the joint: of a pair each, of others together."""
+    phi, limits = of_joint["phi"], actuator.max_deflections
+    if isinstance(actuator, Antagonistic):
+        springs = [("spring 1", phi[0], limits[0]), ("spring 2", phi[1], limits[1])]
+        springs.append(("coupling", phi[0] - phi[1], math.inf))
+        for element, (name, deflection, limit) in zip(actuator.spring_elements, springs, strict=False):
+            law = element.law
+            yield SpringLoad(name, deflection, law.torque(deflection), law.energy(deflection), limit)
+    elif actuator.sprung:
+        against = of_joint["tau_transmission"][0]
+        yield SpringLoad("springs", phi[0], against, of_joint["elastic_energy"], limits[0])
+
+
 class SpringPeaks:
     """The largest loads of springs over trajectories; `add` their blocks."""
 
@@ -151,7 +186,7 @@ class SpringPeaks:
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
-            for load in joint.actuator.spring_loads(block.of_joint(index)):
+            for load in _spring_loads(joint.actuator, block.of_joint(index)):
                 energy, torque, deflection = (
                     Peak.of(values, block.time, trajectory)
                     for values in (load.energy, load.torque, load.deflection)
