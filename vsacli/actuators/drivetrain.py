@@ -73,19 +73,11 @@ SIDES = 2
 
 
 class _Group(NamedTuple):
-    """Joints of one `Actuator.spring_group`: their springs, and where the joints and motors are.
-
-    Attributes:
-        elasticity: Springs.
-        joints: Indices of the joints.
-        springs: Indices of their sprung motors, (joints, motors).
-        motors: The same for each motor, as slices where they are equally spaced.
-    """
+    """Joints of one `Actuator.spring_group`: their springs, and where the joints and motors are."""
 
     elasticity: Elasticity
     joints: IndexArray
     springs: IndexArray
-    motors: Sequence[IndexArray | slice]
 
 
 class Drivetrain:
@@ -138,10 +130,7 @@ class Drivetrain:
         ]
         springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in indices])
         members = [actuators[joint] for joint in indices]
-        count = springs.shape[1]
-        alone = springs.size == self.spring_joint.size
-        motors = [slice(first, None, count) for first in range(count)] if alone else list(springs.T)
-        return _Group(type(members[0]).elasticity(members), np.array(indices), springs, motors)
+        return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
@@ -231,8 +220,8 @@ class Drivetrain:
         """Return (..., springs) from the parts of the groups, one array (..., joints) for each motor."""
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
-            for motors, of_motor in zip(group.motors, part, strict=True):
-                result[..., motors] = of_motor
+            for springs, of_motor in zip(group.springs.T, part, strict=True):
+                result[..., springs] = of_motor
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:

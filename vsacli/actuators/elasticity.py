@@ -106,9 +106,14 @@ class ElasticState(ABC):
         """Torque against each motor (62)."""
 
     @property
+    def matrix(self) -> MotorMatrix:
+        """The decoupling matrix A of two motors."""
+        raise NotImplementedError(f"{type(self).__name__} has one motor")
+
+    @property
     def determinant(self) -> FloatArray:
-        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
-        return np.full_like(self.tau_e, np.nan)
+        """Det A (67); NaN of one motor."""
+        return self.matrix.determinant
 
     def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         """Return the sizes of tau_e and stiffness, relative to which the self-check's errors are.

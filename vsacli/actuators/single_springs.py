@@ -43,6 +43,11 @@ class SingleSpring(ElasticState):
         """Torque of the spring."""
         return (self._spring.tau,)
 
+    @property
+    def determinant(self) -> FloatArray:
+        """NaN: there is no matrix A."""
+        return np.full_like(self.tau_e, np.nan)
+
     def torque_rate(self, rates: Components) -> FloatArray:
         """Return sigma phi'."""
         return self._spring.sigma * rates[0]

@@ -56,14 +56,9 @@ class PairSprings(ElasticState):
         return self._one.tau + between, self._two.tau - between
 
     @property
-    def _matrix(self) -> MotorMatrix:
+    def matrix(self) -> MotorMatrix:
         """The matrix A: stiffness and slope of each spring."""
         return MotorMatrix(self._one.sigma, self._two.sigma, self._one.zeta, self._two.zeta)
-
-    @property
-    def determinant(self) -> FloatArray:
-        """Det A (67)."""
-        return self._matrix.determinant
 
     def sizes(self, _unknowns: Components) -> tuple[FloatArray, FloatArray]:
         """Return the sum of the sizes of both torques, and the stiffness."""
@@ -91,7 +86,7 @@ class PairSprings(ElasticState):
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray, ...]:
         """Return A^-1 (tau_e', sigma'), (68)."""
-        return self._matrix.solve(dtau_e, dstiffness)
+        return self.matrix.solve(dtau_e, dstiffness)
 
     def motor_accelerations(
         self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -99,7 +94,7 @@ class PairSprings(ElasticState):
         """Return A^-1 beta (72), with the sums (11) and (65)."""
         one, two = self._one, self._two
         squared_1, squared_2 = rates[0] * rates[0], rates[1] * rates[1]
-        return self._matrix.solve(
+        return self.matrix.solve(
             ddtau_e - (one.zeta * squared_1 + two.zeta * squared_2) + (one.sigma + two.sigma) * ddq,  # (70)
             ddstiffness - (one.eta * squared_1 + two.eta * squared_2) + (one.zeta + two.zeta) * ddq,  # (71)
         )

@@ -144,36 +144,22 @@ class SpringDemand(Published):
         return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
 
 
-class SpringLoad(NamedTuple):
-    """Load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
+def _spring_loads(
+    actuator: Actuator, of_joint: OfJoint
+) -> Iterator[tuple[str, float, FloatArray, FloatArray, FloatArray]]:
+    """Yield name, largest admissible deflection, energy, torque and deflection of springs of a joint.
 
-    Attributes:
-        name: name of the spring.
-        deflection: deflection of the spring, or of a mechanism between motor 1 and link.
-        torque: torque at that deflection.
-        energy: stored energy, J.
-        max_deflection: largest admissible |deflection|.
+    Those of a mechanism are taken together: their deflection is that between motor 1 and link.
     """
-
-    name: str
-    deflection: FloatArray
-    torque: FloatArray
-    energy: FloatArray
-    max_deflection: float
-
-
-def _spring_loads(actuator: Actuator, of_joint: OfJoint) -> Iterator[SpringLoad]:
-    """Yield the loads of the springs from variables of the joint: of a pair each, of others together."""
     phi, limits = of_joint["phi"], actuator.max_deflections
     if isinstance(actuator, Antagonistic):
         springs = [("spring 1", phi[0], limits[0]), ("spring 2", phi[1], limits[1])]
         springs.append(("coupling", phi[0] - phi[1], math.inf))
         for element, (name, deflection, limit) in zip(actuator.spring_elements, springs, strict=False):
             law = element.law
-            yield SpringLoad(name, deflection, law.torque(deflection), law.energy(deflection), limit)
+            yield name, limit, law.energy(deflection), law.torque(deflection), deflection
     elif actuator.sprung:
-        against = of_joint["tau_transmission"][0]
-        yield SpringLoad("springs", phi[0], against, of_joint["elastic_energy"], limits[0])
+        yield "springs", limits[0], of_joint["elastic_energy"], of_joint["tau_transmission"][0], phi[0]
 
 
 class SpringPeaks:
@@ -186,15 +172,10 @@ class SpringPeaks:
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
-            for load in _spring_loads(joint.actuator, block.of_joint(index)):
-                energy, torque, deflection = (
-                    Peak.of(values, block.time, trajectory)
-                    for values in (load.energy, load.torque, load.deflection)
-                )
-                new = SpringDemand(
-                    joint.name, joint.type, load.name, energy, torque, deflection, load.max_deflection
-                )
-                key = joint.name, load.name
+            for name, limit, *load in _spring_loads(joint.actuator, block.of_joint(index)):
+                peaks = (Peak.of(values, block.time, trajectory) for values in load)
+                new = SpringDemand(joint.name, joint.type, name, *peaks, limit)
+                key = joint.name, name
                 self._found[key] = _larger(self._found.get(key, new), new)
 
     def report(self) -> tuple[SpringDemand, ...]:
