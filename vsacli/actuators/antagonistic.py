@@ -18,7 +18,7 @@ from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
-from vsacli.actuators.pairs.springs import PairElasticity, PairSprings
+from vsacli.actuators.pairs.pair_springs import PairElasticity, PairSprings
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray

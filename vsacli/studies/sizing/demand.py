@@ -173,8 +173,8 @@ class SpringPeaks:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
             for name, limit, *load in _spring_loads(joint.actuator, block.of_joint(index)):
-                peaks = (Peak.of(values, block.time, trajectory) for values in load)
-                new = SpringDemand(joint.name, joint.type, name, *peaks, limit)
+                energy, torque, deflection = (Peak.of(values, block.time, trajectory) for values in load)
+                new = SpringDemand(joint.name, joint.type, name, energy, torque, deflection, limit)
                 key = joint.name, name
                 self._found[key] = _larger(self._found.get(key, new), new)
 
