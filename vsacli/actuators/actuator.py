@@ -16,7 +16,7 @@ import numpy as np
 from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
-from vsacli.actuators.reach import LimitCheck, OfJoint, within
+from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -162,11 +162,14 @@ class Actuator(ABC):
     def limits(self) -> Iterator[LimitCheck]:
         """Yield all limits of motors and springs, finite or not."""
         for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
-            yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
-            yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
-            yield LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", number, within(motor.max_torque))
-            yield LimitCheck(Flag.CURRENT_LIMIT, "current", number, within(motor.max_current or math.inf))
-            yield LimitCheck(Flag.VOLTAGE_LIMIT, "voltage", number, within(motor.max_voltage or math.inf))
+            for flag, variable, bound in (
+                (Flag.DEFLECTION_LIMIT, "phi", deflection),
+                (Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor.max_velocity),
+                (Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor.max_torque),
+                (Flag.CURRENT_LIMIT, "current", motor.max_current or math.inf),
+                (Flag.VOLTAGE_LIMIT, "voltage", motor.max_voltage or math.inf),
+            ):
+                yield LimitCheck(flag, variable, number, (-bound, bound))
 
     @abstractmethod
     def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
