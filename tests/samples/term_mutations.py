@@ -99,9 +99,9 @@ MUTATIONS = (
     Mutation(
         "det A (67), its first product",
         "pair",
-        f"{MATRIX}.determinant",
-        "self.torque_1 * self",
-        "1.01 * self.torque_1 * self",
+        f"{MATRIX}.__init__",
+        "= torque_1 * stiff",
+        "= 1.01 * torque_1 * stiff",
     ),
     *(
         Mutation(f"A^-1 (68), (72), {place}", "pair", f"{MATRIX}.solve", old, f"1.01 * {old}")

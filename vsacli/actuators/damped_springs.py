@@ -257,8 +257,8 @@ class DampedSprings:
         state = self._state(phi, q)
         if not self._settable:
             return _Springs(state, None)
-        (one, two), of_stiffness = self._behind, state.matrix[2:]
-        return _Springs(state, MotorMatrix(one, two, *of_stiffness))
+        (one, two), decoupling = self._behind, state.matrix
+        return _Springs(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
 
     def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
         theta = self._positions(phi, q)

@@ -220,7 +220,8 @@ class Drivetrain:
         """Return (..., springs) from the parts of the groups, one array (..., joints) for each motor."""
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
-            for springs, of_motor in zip(group.springs.T, part, strict=True):
+            for number, of_motor in enumerate(part):
+                springs = slice(number, None, len(part)) if self._alone else group.springs[:, number]
                 result[..., springs] = of_motor
         return result
 

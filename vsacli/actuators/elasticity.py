@@ -53,26 +53,26 @@ class Elasticity(ABC):
         """Return the springs with their derivatives."""
 
 
-class MotorMatrix(NamedTuple):
+class MotorMatrix:
     """A 2x2 matrix over two motors: a row of the torque and one of the stiffness; arrays of one shape.
 
     The decoupling matrix A = d(tau_e, sigma)/d(theta_1, theta_2) is one.
+
+    Attributes:
+        torque_1, torque_2, stiffness_1, stiffness_2: Entries of the matrix.
+        determinant: Determinant (67); zero where the matrix is singular.
     """
 
-    torque_1: FloatArray
-    torque_2: FloatArray
-    stiffness_1: FloatArray
-    stiffness_2: FloatArray
-
-    @property
-    def determinant(self) -> FloatArray:
-        """Determinant (67); zero where the matrix is singular."""
-        return self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
+    def __init__(
+        self, torque_1: FloatArray, torque_2: FloatArray, stiffness_1: FloatArray, stiffness_2: FloatArray
+    ) -> None:
+        self.torque_1, self.torque_2 = torque_1, torque_2
+        self.stiffness_1, self.stiffness_2 = stiffness_1, stiffness_2
+        self.determinant: FloatArray = torque_1 * stiffness_2 - torque_2 * stiffness_1
 
     def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the inverse times a right-hand side, as in (68) and (72); NaN where there is none."""
-        determinant = self.determinant
-        divisor = np.where(determinant == 0, np.nan, determinant)
+        divisor = np.where(self.determinant == 0, np.nan, self.determinant)
         return (
             (self.stiffness_2 * torque_row - self.torque_2 * stiffness_row) / divisor,
             (self.torque_1 * stiffness_row - self.stiffness_1 * torque_row) / divisor,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
@@ -86,7 +87,7 @@ class DeflectionState(MechanismState):
         """T against motor 1, which carries the load; U_s against motor 2."""
         return self._partials.T, self._partials.setting_torque
 
-    @property
+    @cached_property
     def matrix(self) -> MotorMatrix:
         """Derivatives of T and T_p over phi and s."""
         p = self._partials

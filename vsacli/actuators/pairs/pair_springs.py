@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class PairSprings(ElasticState):
         (between,) = self._coupling(0)
         return self._one.tau + between, self._two.tau - between
 
-    @property
+    @cached_property
     def matrix(self) -> MotorMatrix:
         """The matrix A: stiffness and slope of each spring."""
         return MotorMatrix(self._one.sigma, self._two.sigma, self._one.zeta, self._two.zeta)
