@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -162,13 +162,8 @@ class Drivetrain:
         values[..., self.sprung] = sprung
         return values
 
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi or rates, (..., springs), from those of joints, (..., joints), and sprung motors."""
-        parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
-        return self.of_springs(parts, theta)
-
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates that `domain` bounds, (..., springs), at positions as for `deflections`."""
+        """Return the coordinates that `domain` bounds, (..., springs), at positions of joints and motors."""
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
@@ -190,13 +185,13 @@ class Drivetrain:
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
-        found = self.by_joint([each.state(at).determinant() for each, at in self.at(q, theta)], q)
+        found = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
         return np.where(self.rigid, np.nan, found)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """Return the springs with their derivatives, at positions and velocities of joints and motors."""
         parts = [elasticity.state(at) for elasticity, at in self.at(q, theta)]
-        rates = [rates for _, rates in self.at(dq, dtheta)]
+        rates = [[at[..., number] for number in range(at.shape[-1])] for _, at in self.at(dq, dtheta)]
         return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
@@ -219,6 +214,15 @@ class Drivetrain:
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
             result[..., group.springs] = part
+        return result
+
+    def by_motor(self, parts: Sequence[Components], like: FloatArray) -> FloatArray:
+        """Return (..., springs) from the parts of the groups, one array (..., joints) for each motor."""
+        result = np.empty_like(like)
+        for group, part in zip(self._groups, parts, strict=True):
+            for number, of_motor in enumerate(part):
+                springs = slice(number, None, len(part)) if self._alone else group.springs[:, number]
+                result[..., springs] = of_motor
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
@@ -248,7 +252,7 @@ class DrivetrainState:
         drivetrain: Drivetrain,
         q: FloatArray,
         theta: FloatArray,
-        parts: Sequence[tuple[ElasticState, FloatArray]],
+        parts: Sequence[tuple[ElasticState, Components]],
     ) -> None:
         self._drivetrain, self._q, self._theta, self._parts = drivetrain, q, theta, parts
 
@@ -275,7 +279,7 @@ class DrivetrainState:
     @property
     def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        return self._drivetrain.of_springs([part.tau_transmission for part, _ in self._parts], self._theta)
+        return self._drivetrain.by_motor([part.tau_transmission for part, _ in self._parts], self._theta)
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -292,4 +296,4 @@ class DrivetrainState:
             part.motor_accelerations(rates, *of_part)
             for (part, rates), of_part in zip(self._parts, wanted, strict=True)
         ]
-        return self._drivetrain.of_springs(parts, self._theta)
+        return self._drivetrain.by_motor(parts, self._theta)

@@ -7,11 +7,15 @@ one instant, or samples.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+
+Components: TypeAlias = Sequence[FloatArray] | FloatArray
+"""One array for each motor of a joint, or for each coordinate of its springs; all of one shape."""
 
 
 class Torques(NamedTuple):
@@ -24,21 +28,17 @@ class Torques(NamedTuple):
 class Elasticity(ABC):
     """Springs of joints with one kind of actuator: a potential of q and theta, and its derivatives.
 
-    The state of the springs is phi, one coordinate per motor, linear in q and theta. The methods below take
-    `coordinates`: phi, and further variables that the springs depend on.
+    The methods take `coordinates`, linear in q and theta: the unknowns of the actuator, such as deflections,
+    one per motor, and further variables that the springs depend on.
     """
 
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi from positions, or its rates from velocities; theta - q unless the kind overrides it."""
+    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Return the coordinates, (..., joints, coordinates), or their rates: theta - q by default."""
         return theta - q[..., None]
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates bounded by `Actuator.phi_ranges`, (..., joints, motors): phi by default."""
-        return self.deflections(q, theta)
-
-    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates of the springs, (..., joints, coordinates), or rates: phi by default."""
-        return self.deflections(q, theta)
+        """Return the coordinates bounded by `Actuator.phi_ranges`, (..., joints, motors)."""
+        return self.coordinates(q, theta)
 
     @abstractmethod
     def torques(self, coordinates: FloatArray) -> Torques:
@@ -53,45 +53,101 @@ class Elasticity(ABC):
         """Return the springs with their derivatives."""
 
 
+class MotorMatrix:
+    """A 2x2 matrix over two motors: a row of the torque and one of the stiffness; arrays of one shape.
+
+    The decoupling matrix A = d(tau_e, sigma)/d(theta_1, theta_2) is one.
+
+    Attributes:
+        torque_1, torque_2, stiffness_1, stiffness_2: Entries of the matrix.
+        determinant: Determinant (67); zero where the matrix is singular.
+    """
+
+    def __init__(
+        self, torque_1: FloatArray, torque_2: FloatArray, stiffness_1: FloatArray, stiffness_2: FloatArray
+    ) -> None:
+        self.torque_1, self.torque_2 = torque_1, torque_2
+        self.stiffness_1, self.stiffness_2 = stiffness_1, stiffness_2
+        self.determinant: FloatArray = torque_1 * stiffness_2 - torque_2 * stiffness_1
+
+    def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the inverse times a right-hand side, as in (68) and (72); NaN where there is none."""
+        divisor = np.where(self.determinant == 0, np.nan, self.determinant)
+        return (
+            (self.stiffness_2 * torque_row - self.torque_2 * stiffness_row) / divisor,
+            (self.torque_1 * stiffness_row - self.stiffness_1 * torque_row) / divisor,
+        )
+
+
 class ElasticState(ABC):
-    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions."""
+    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions.
+
+    Values of a joint are arrays of any one shape, those of motors and coordinates sequences of such arrays.
+    """
+
+    @property
+    @abstractmethod
+    def energy(self) -> FloatArray:
+        """Elastic energy, J."""
 
     @property
     @abstractmethod
     def tau_e(self) -> FloatArray:
-        """Elastic torque (6), (..., joints)."""
+        """Elastic torque (6)."""
 
     @property
     @abstractmethod
     def stiffness(self) -> FloatArray:
-        """Stiffness of the joint (11), (..., joints)."""
+        """Stiffness of the joint (11)."""
 
     @property
     @abstractmethod
-    def tau_transmission(self) -> FloatArray:
-        """Torque against each motor (62), (..., joints, motors)."""
+    def tau_transmission(self) -> tuple[FloatArray, ...]:
+        """Torque against each motor (62)."""
+
+    @property
+    def matrix(self) -> MotorMatrix:
+        """The decoupling matrix A of two motors."""
+        raise NotImplementedError(f"{type(self).__name__} has one motor")
+
+    @property
+    def determinant(self) -> FloatArray:
+        """Det A (67); NaN of one motor."""
+        return self.matrix.determinant
+
+    def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        """Return the sizes of tau_e and stiffness, relative to which the self-check's errors are.
+
+        They are sums of absolute values of terms; the one of the stiffness is what a relative change of the
+        unknowns, such as rounding, changes.
+        """
+        return np.abs(self.tau_e), self.stiffness
 
     @abstractmethod
-    def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """Return the rate of the elastic torque (17), (..., joints)."""
+    def torque_rate(self, rates: Components) -> FloatArray:
+        """Return the rate of the elastic torque (17) from the rates of the coordinates."""
 
     @abstractmethod
-    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """Return the rate of the stiffness (18), (..., joints)."""
+    def stiffness_rate(self, rates: Components) -> FloatArray:
+        """Return the rate of the stiffness (18)."""
 
     @abstractmethod
-    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """Return the part x' H x' of the second derivative of the stiffness, (..., joints)."""
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
+        """Return the part x' H x' of the second derivative of the stiffness."""
+
+    @abstractmethod
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray, ...]:
+        """Return the rates of the torques against the motors."""
+
+    @abstractmethod
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
+        """Return the rates of the coordinates for rates of torque and stiffness, (68); NaN as below."""
 
     @abstractmethod
     def motor_accelerations(
-        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
-    ) -> FloatArray:
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> tuple[FloatArray, ...]:
         """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         NaN where there are none, because the decoupling matrix is singular.
         """
-
-    def determinant(self) -> FloatArray:
-        """Return det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
-        return np.full_like(self.tau_e, np.nan)

@@ -97,11 +97,6 @@ class LimitCheck(NamedTuple):
         return np.maximum(self.range[0] - values, values - self.range[1])
 
 
-def within(bound: float) -> tuple[float, float]:
-    """Return the range of a quantity whose absolute value is bounded."""
-    return -bound, bound
-
-
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
     """Return the margin: distance of the stiffness to the nearer end of its attainable range, relative to it.
 

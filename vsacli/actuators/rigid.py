@@ -49,12 +49,10 @@ class Rigid(Actuator):
             ddstiffness=none,
             phi=still,
             dphi=still,
+            theta=command.q,
+            dtheta=command.dq,
             ddtheta=command.ddq,
             tau_transmission=command.tau_e,
             elastic_energy=still * command.tau_e / 2,
             flags=np.zeros(still.shape, dtype=FLAG_TYPE),
         )
-
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return the rate of tau_e, which takes the place of a spring torque."""
-        return of_joint["dtau_e"][None]

@@ -245,7 +245,7 @@ class _Replacement(NamedTuple):
     def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         word, *rest = words
-        if _same(*content):
+        if content[0] == content[1]:
             both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
             return both, both
         if word != ALL:
@@ -271,10 +271,3 @@ class _Replacement(NamedTuple):
             here = (*place, names[index] or str(index))
             entries[index] = inside.in_value(each, content[index], rest, here)
         return tuple(entries)
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Return whether two records agree in every declared field, including fields excluded from equality."""
-    if type(one) is not type(other):
-        return False
-    return one is other or all(getattr(one, name) == getattr(other, name) for name in declared(type(one)))

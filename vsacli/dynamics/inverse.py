@@ -7,20 +7,19 @@ rows, and the results into a `Block`. Before that, `fitted` checks a trajectory 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import LimitCheck, OfJoint
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import MIN_MARGIN
-from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
@@ -81,7 +80,6 @@ class InverseDynamics(RowKernel):
         integrated: Whether deflections are inputs; otherwise (14) is solved for them.
         internal: Joints with damped transmissions, by index; their internal motion is an input.
         driven: Whether only the internal deflections are inputs; their rates then follow from the damping.
-        limits: Limits of each joint; a field, since springs compare equal whatever their limits.
         block: Class of the blocks that hold the results.
     """
 
@@ -93,11 +91,6 @@ class InverseDynamics(RowKernel):
     integrated: bool = False
     internal: tuple[int, ...] = ()
     driven: bool = False
-    limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        limits = tuple(tuple(limit_checks(joint)) for joint in self.robot.joints)
-        object.__setattr__(self, "limits", limits)
 
     @property
     def links(self) -> LinkTorques:
@@ -153,10 +146,10 @@ class InverseDynamics(RowKernel):
             phi = np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None
             internal = self._internal(index, given)
             # Computes drive(joint, ...), (61)-(74). `call` lets equal joints share one recorded body.
-            driving = behind_link(drive, joint, self.limits[index])
+            driving = behind_link(drive, joint, joint.limits)
             driven = call(rows[0], driving, command, self.min_margin, phi, internal)
             found.append({**command.arrays(), **driven})
-            _check_limits(self.limits[index], found[-1])
+            _check_limits(joint, found[-1])
         if self.robot.has(VARIABLES["dissipated_power"]):
             for joint, of_joint in zip(self.robot.joints, found, strict=True):
                 of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
@@ -185,9 +178,9 @@ class InverseDynamics(RowKernel):
         return InternalMotion(deflections, *rates)
 
 
-def _check_limits(limits: Sequence[LimitCheck], of_joint: OfJoint) -> None:
+def _check_limits(joint: Joint, of_joint: OfJoint) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
-    for check in limits:
+    for check in limit_checks(joint):
         if check.variable not in of_joint:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
@@ -235,7 +228,7 @@ def compute_block(
     return block_of(kernel, motion, engine, internal=internal)
 
 
-@cached_by_identity(KEPT_PROGRAMS)
+@lru_cache(KEPT_PROGRAMS)
 def _kernel(robot: Robot, frame: str | None, min_margin: float, internal: tuple[int, ...]) -> InverseDynamics:
     return InverseDynamics(robot, frame, min_margin, internal=internal)
 

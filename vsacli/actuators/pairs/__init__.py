@@ -2,7 +2,7 @@
 
 Equal cubic springs and tendons have closed solutions, in the file of their law. For all others: `balance` has
 the equations and steps, `critical_points` and `folds` the singularities that end a branch, `corridor` the
-attainable range, `solver` the iteration on it. `joints` has the decoupling matrix A of solved pairs.
+attainable range, `solver` the iteration on it. `pair_springs` has the pairs in motion, (62)-(72).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ __all__ = ["make_pair"]
 
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
     """Return the solver of (14) for two laws with phi_1 up: closed if the laws have one, else iterated."""
+    first, second = first.unlimited, second.unlimited
     return first.closed_pair(second) or _iterated(first, second)
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.laws.law import PairSolution, SpringLaw, SpringState
+from vsacli.actuators.laws.law import PairSolution, SpringLaw
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -31,9 +31,9 @@ class PairOnBranch:
 
     @cached_property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
-        """The springs as they act on sides 1 and 2."""
+        """The springs as they act on sides 1 and 2, without their limits."""
         first, second = self.spring
-        return first, second.as_second()
+        return first.unlimited, second.unlimited.as_second()
 
     @property
     def distinct(self) -> tuple[SpringLaw, ...]:
@@ -57,11 +57,6 @@ class PairOnBranch:
         if self.branch == "negative":
             return make_pair(second, first).solve(tau_e, stiffness).exchanged()
         return make_pair(first, second).solve(tau_e, stiffness)
-
-    def states(self, phi_1: FloatArray, phi_2: FloatArray) -> tuple[SpringState, SpringState]:
-        """Return the states of both springs at their deflections."""
-        first, second = self.laws
-        return first.state(phi_1), second.state(phi_2)
 
     @property
     def opposite(self) -> str | None:
