@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 
@@ -91,15 +92,13 @@ def factorize(rows: FloatArray, target: FloatArray) -> Factor:
         rows: rows, (blocks, rows, 2 `BLOCK`).
         target: right-hand side, (blocks, rows).
     """
-    from scipy.linalg.lapack import dgeqrf
-
     count, height = target.shape
     # Columns lie one after the other, as LAPACK overwrites them; the first rows come from the block before.
     work = np.zeros((count + 1, 2 * BLOCK + 1, max(BLOCK + height, 2 * BLOCK + 1)))
     work[:-1, :-1, BLOCK : BLOCK + height] = np.swapaxes(rows, 1, 2)
     work[:-1, -1, BLOCK : BLOCK + height] = target
     for block, following in pairwise(work):
-        dgeqrf(block.T, overwrite_a=True)
+        scipy.linalg.lapack.dgeqrf(block.T, overwrite_a=True)
         np.multiply(block[BLOCK:-1, BLOCK : 2 * BLOCK], LOWER, out=following[:BLOCK, :BLOCK])
         following[-1, :BLOCK] = block[-1, BLOCK : 2 * BLOCK]
     triangle = np.swapaxes(work[:-1], 1, 2)
@@ -118,8 +117,6 @@ class Posterior:
             diagonal: diagonal blocks of the factor, (blocks, `BLOCK`, `BLOCK`).
             upper: blocks to the right of these, same shape.
         """
-        from scipy.linalg.lapack import dgeqrf
-
         self._inverse, self._upper = np.linalg.inv(diagonal), upper
         self._roots = np.zeros((len(diagonal) + 1, BLOCK, BLOCK))
         """Square roots of the covariances of the blocks; zero after the last."""
@@ -127,7 +124,7 @@ class Posterior:
         roots = np.concatenate([self._inverse, passed], axis=2)
         for k in range(len(diagonal) - 1, -1, -1):
             roots[k, :, BLOCK:] = passed[k] @ self._roots[k + 1]
-            dgeqrf(roots[k].T, overwrite_a=True)
+            scipy.linalg.lapack.dgeqrf(roots[k].T, overwrite_a=True)
             np.multiply(roots[k, :, :BLOCK], LOWER, out=self._roots[k])
 
     def unknowns(self, right: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import Posterior
@@ -85,9 +86,7 @@ class Part:
 
     def of_columns(self, columns: IndexArray) -> Part:
         """Return the part with only some members, given by columns of the spline."""
-        from scipy.interpolate import BSpline
-
-        spline = BSpline(self.spline.t, self.spline.c[:, columns], self.spline.k)
+        spline = scipy.interpolate.BSpline(self.spline.t, self.spline.c[:, columns], self.spline.k)
         return replace(self, members=self.members[columns], spline=spline)
 
     def at(self, time: FloatArray, orders: int) -> FloatArray:
@@ -136,12 +135,10 @@ class Part:
 
     def stretched(self, factor: float) -> Part:
         """Return the spline slowed down by a factor, with the same first time."""
-        from scipy.interpolate import BSpline
-
         knots = stretch(self.spline.t, self.knots[0], factor)
         known = None if self.smoothing is None else self.smoothing.stretched(factor)
         noise = None if self.noise is None else self.noise.stretched(factor)
-        spline, (start, end) = BSpline(knots, self.spline.c, self.spline.k), self.ringing
+        spline, (start, end) = scipy.interpolate.BSpline(knots, self.spline.c, self.spline.k), self.ringing
         left_out = None if self.left_out is None else self.left_out.stretched(factor)
         return replace(
             self,

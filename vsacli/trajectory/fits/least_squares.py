@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import BLOCK, Posterior, block_count
@@ -50,13 +51,13 @@ def fit_spline(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> B
         spans: number of knot spans.
         degree: degree of the spline.
     """
-    from scipy.interpolate import make_lsq_spline
-
     try:
         first = _solve(time, rows, spans, degree)
         correction = _solve(time, rows - first(time).T, spans, degree)
     except np.linalg.LinAlgError:  # very uneven times
-        return make_lsq_spline(time, rows.T, _knots(time, spans, degree), k=degree, method="qr")
+        return scipy.interpolate.make_lsq_spline(
+            time, rows.T, _knots(time, spans, degree), k=degree, method="qr"
+        )
     return type(first)(first.t, first.c + correction.c, degree)
 
 
@@ -108,12 +109,9 @@ def _score(
 
 
 def _solve(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpline[np.float64]:
-    from scipy.interpolate import BSpline
-    from scipy.linalg import solveh_banded
-
     knots = _knots(time, spans, degree)
     bands, sums = normal_equations(time, rows, knots, degree)
-    return BSpline(knots, solveh_banded(bands, sums, lower=True), degree)
+    return scipy.interpolate.BSpline(knots, scipy.linalg.solveh_banded(bands, sums, lower=True), degree)
 
 
 def normal_equations(
@@ -147,10 +145,9 @@ def _knots(time: FloatArray, spans: int, degree: int) -> FloatArray:
 
 def _add(bands: FloatArray, sums: FloatArray, time: FloatArray, rows: FloatArray, knots: FloatArray) -> None:
     """Add a block of samples to the lower bands and right-hand sides of the normal equations."""
-    from scipy.interpolate import BSpline
-
     width = len(bands)
-    design = BSpline.design_matrix(time, knots, width - 1, extrapolate=True)  # skips a slow check of the span
+    # Extrapolation skips a slow check of the span.
+    design = scipy.interpolate.BSpline.design_matrix(time, knots, width - 1, extrapolate=True)
     basis = np.ascontiguousarray(design.data.reshape(-1, width).T)
     first = design.indices[::width]
     starts = np.flatnonzero(np.diff(first, prepend=-1))
@@ -240,10 +237,8 @@ def of_least_squares(time: FloatArray, knots: FloatArray, degree: int) -> Poster
     Raises:
         LinAlgError: very uneven times leave coefficients that no sample determines.
     """
-    from scipy.linalg import cholesky_banded
-
     bands, _ = normal_equations(time, np.empty((0, len(time))), knots, degree)
-    bands = cholesky_banded(bands, lower=True)
+    bands = scipy.linalg.cholesky_banded(bands, lower=True)
     unknowns = bands.shape[1]
     count = block_count(unknowns)
     filled = np.zeros((degree + 1, count * BLOCK))

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import BLOCK, Factor, Posterior, factorize, sort_rows
@@ -91,9 +92,7 @@ class Model:
     @property
     def spline(self) -> BSpline[np.float64]:
         """Most probable spline, with one column."""
-        from scipy.interpolate import BSpline
-
-        return BSpline(self.bins.knots, self.coefficients[:, None], self.bins.degree)
+        return scipy.interpolate.BSpline(self.bins.knots, self.coefficients[:, None], self.bins.degree)
 
     @cached_property
     def freedoms(self) -> FloatArray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.progress import Bar, Progress, unseen
@@ -348,9 +349,7 @@ def fit_samples(
 
 
 def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Part:
-    from scipy.interpolate import make_interp_spline
-
-    return Part(members, make_interp_spline(time, values[members].T, k=degree), exact=True)
+    return Part(members, scipy.interpolate.make_interp_spline(time, values[members].T, k=degree), exact=True)
 
 
 def _spoilt(

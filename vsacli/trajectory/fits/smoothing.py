@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.banded_qr import Posterior
@@ -196,8 +197,6 @@ def smoothing_spline(
         The spline, with one column, and its assessment; None if the recording is constant, too short or too
         uneven.
     """
-    from scipy.interpolate import BSpline
-
     offset, scale = float(np.mean(row)), float(np.std(row))
     if scale <= 4 * np.finfo(float).eps * abs(offset):
         return None
@@ -235,7 +234,7 @@ def smoothing_spline(
         scale**2 * disagreement(spline, found.other.spline, probes, order + 1),
         relative,
     )
-    return BSpline(spline.t, scale * spline.c + offset, degree), smoothing
+    return scipy.interpolate.BSpline(spline.t, scale * spline.c + offset, degree), smoothing
 
 
 def disagreement(
