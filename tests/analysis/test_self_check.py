@@ -19,8 +19,8 @@ from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.reach import OfJoint
-from vsacli.analysis.derivative_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.analysis.report import Report
+from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine.engines import Kernel
@@ -165,7 +165,7 @@ def fast_recording(**options: Any) -> Trajectory:
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
     whole = ladder(*load("7R"))
-    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     assert ladder(*load("7R")) == whole
 
 
@@ -204,7 +204,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
     motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
     stiffness = Constant(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
     trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
-    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     tracemalloc.start()
     try:
         ladder(chain, trajectory)

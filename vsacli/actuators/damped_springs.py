@@ -25,7 +25,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import ElasticState
 from vsacli.actuators.reach import OfJoint, Reach, reach
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
 from vsacli.base.signals import DAMPING, STIFFNESS
@@ -37,21 +37,6 @@ NEWTON_STEPS = 4
 
 CONTINUATION_STEPS = 200
 """Steps from the equilibrium to the start of the motion given in the robot file."""
-
-
-class InternalMotion(NamedTuple):
-    """Internal motion of a transmission with a damper.
-
-    Attributes:
-        phi: State of the springs, (2, samples): its spread is used, the rest is a guess from which (14) is
-            solved for the stiffness.
-        velocity: w, the rate of the spread, (samples,); None if it follows from the damping.
-        acceleration: Derivative of w, (samples,); None with `velocity`.
-    """
-
-    phi: FloatArray
-    velocity: FloatArray | None
-    acceleration: FloatArray | None
 
 
 class _Springs(NamedTuple):

@@ -1,4 +1,4 @@
-"""Input and output of `Actuator.transmit`: the command of a joint, and the result variables of one motor."""
+"""Input and output of `Actuator.transmit`: command of a joint, internal motion, results of one motor."""
 
 from __future__ import annotations
 
@@ -52,6 +52,21 @@ class Command(NamedTuple):
     def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name."""
         return {**dict(zip(self._fields[:-1], self[:-1], strict=True)), **self.commanded}
+
+
+class InternalMotion(NamedTuple):
+    """Internal motion of a transmission with a damper.
+
+    Attributes:
+        phi: State of the springs, (2, samples): its spread is used, the rest is a guess from which (14) is
+            solved for the stiffness.
+        velocity: w, the rate of the spread, (samples,); None if it follows from the damping.
+        acceleration: Derivative of w, (samples,); None with `velocity`.
+    """
+
+    phi: FloatArray
+    velocity: FloatArray | None
+    acceleration: FloatArray | None
 
 
 def single_motor(**variables: AnyArray) -> OfJoint:

@@ -1,14 +1,15 @@
 """Balances that every result must satisfy, for the self-check: springs (14), shafts (73)-(74), link energy.
 
 `BalancedDynamics` computes the residuals of springs and shafts with every sample. The energies and powers of
-shafts and links are for `analysis.derivative_check`, which compares an energy's derivative with the power.
+shafts and links are for `analysis.self_check`, which compares an energy's derivative with the power.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import reduce
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,11 +21,11 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
-from vsacli.compute.control_flow import call
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import motor_torques
 from vsacli.dynamics.elastic_torques import link_constants
-from vsacli.dynamics.inverse import InverseDynamics, behind_link, rows_of_joints
+from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
@@ -213,32 +214,46 @@ class BalancedBlock(Block):
     declared: ClassVar[Mapping[str, Variable]] = {**VARIABLES, **BALANCES}
 
 
-class BalancedDynamics(InverseDynamics):
+@dataclass(frozen=True)
+class BalancedDynamics(BlockKernel):
     """Kernel of a run: inverse dynamics with `BALANCES` at each sample.
 
     As part of one program the balances take hardly any time.
+
+    Attributes:
+        dynamics: Inverse dynamics that are balanced.
     """
 
     block = BalancedBlock
 
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of the computed variables at one instant, by name."""
-        motors, damped = (len(self.robot.joints), SIDES), (len(damped_joints(self.robot.joints)),)
-        return {
-            **super().shapes(),
-            **dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True)),
-        }
+    dynamics: InverseDynamics
 
-    def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """Return the rows of each result by name, those of `BALANCES` last."""
-        joints = self.robot.joints
-        passed = [
-            call(rows[0], behind_link(passed_power, joint), of_joint)
-            for joint, of_joint in zip(joints, of_joints, strict=True)
-        ]
+    @property
+    def variables(self) -> frozenset[str]:
+        """See `BlockKernel.variables`."""
+        return self.dynamics.variables
+
+    @property
+    def arguments(self) -> RowLayout:
+        """Layout of the input rows."""
+        return self.dynamics.arguments
+
+    @cached_property
+    def results(self) -> RowLayout:
+        """Layout of the output rows: those of inverse dynamics, then `BALANCES`."""
+        joints = self.dynamics.robot.joints
+        motors, damped = (len(joints), SIDES), (len(damped_joints(joints)),)
+        shapes = dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True))
+        return RowLayout({**self.dynamics.results.shapes, **shapes})
+
+    def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
+        """Run (36)-(74) and the balances."""
+        joints, of_joints = self.dynamics.robot.joints, self.dynamics.at_joints(rows)
+        passed = call_at_joints(rows[0], passed_power, joints, zip(of_joints, strict=True))
         powers, rates = zip(*passed, strict=True)
         by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
-        return {**super().rows_of(rows, of_joints), **by_motor, **balances(joints, of_joints)}
+        computed = self.dynamics.rows_of(rows, of_joints)
+        return self.results.pack({**computed, **by_motor, **balances(joints, of_joints)})
 
 
 def damped_joints(joints: Sequence[Joint]) -> list[int]:
@@ -254,10 +269,10 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
     damper the torque of the springs may pass zero while nothing else is small, so the torque residual is
     returned unscaled, with its size: only the whole run has a scale for it.
     """
-    springs, shafts, missing, sizes = [np.zeros_like(of_joints[0]["tau_e"])], [], [], []
-    for joint, of_joint in zip(joints, of_joints, strict=True):
-        found = call(of_joint["tau_e"], behind_link(_balance, joint), of_joint)
-        of_stiffness, of_torque, size, of_shafts = found
+    row = of_joints[0]["tau_e"]
+    springs, shafts, missing, sizes = [np.zeros_like(row)], [], [], []
+    balanced = call_at_joints(row, _balance, joints, zip(of_joints, strict=True))
+    for of_stiffness, of_torque, size, of_shafts in balanced:
         shafts.append(of_shafts)
         if of_stiffness is not None:
             springs.append(of_stiffness)

@@ -7,7 +7,6 @@ flags of limits.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,17 +15,13 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
-
-if TYPE_CHECKING:
-    from vsacli.actuators.damped_springs import InternalMotion
-
 
 ACTUATED = (
     *("stiffness", "dstiffness", "ddstiffness", "phi", "dphi", "theta", "dtheta", "ddtheta"),
