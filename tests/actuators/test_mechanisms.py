@@ -44,10 +44,6 @@ def states(device: Device, samples: int) -> tuple[FloatArray, FloatArray, FloatA
     return phi[on_branch], s[on_branch], q[on_branch]
 
 
-def coordinates(phi: FloatArray, s: FloatArray, q: FloatArray) -> FloatArray:
-    return np.stack((phi, s, q), axis=-1)
-
-
 def peak(values: FloatArray) -> float:
     return float(np.abs(values).max())
 
@@ -60,28 +56,28 @@ def test_the_state_is_that_of_the_potential(any_device: Device) -> None:
     motion = np.stack([(at, *rng.uniform(-5, 5, (2, len(at)))) for at in (q, q + phi, s)])
     (tau_e, dtau_e, ddtau_e), (sigma, dsigma, ddsigma), *motors = along(any_device.potential, motion)
     (_, dq, ddq), (_, dtheta_1, ddtheta_1), (_, ds, dds) = motion
-    state = any_device.mechanism.state(coordinates(phi, s, q))
-    rates = coordinates(dtheta_1 - dq, ds, dq)
+    state = any_device.mechanism.state(phi, s, q)
+    rates = dtheta_1 - dq, ds, dq
     found = {
         "tau_e": (state.tau_e, tau_e),
         "stiffness": (state.stiffness, sigma),
-        "tau_transmission": (state.tau_transmission.T, np.array([motor[0] for motor in motors])),
+        "tau_transmission": (state.tau_transmission, np.array([motor[0] for motor in motors])),
         "torque_rate": (state.torque_rate(rates), dtau_e),
         "stiffness_rate": (state.stiffness_rate(rates), dsigma),
-        "spring_rates": (state.spring_rates(rates).T, np.array([motor[1] for motor in motors])),
+        "transmission_rates": (state.transmission_rates(rates), np.array([motor[1] for motor in motors])),
     }
     for name, (ours, theirs) in found.items():
         # theta_1 - q rounds to 1e-16 of q, and both texts to a few more
         np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-12 * peak(theirs), err_msg=name)
-    determinant = state.determinant()
+    determinant = state.determinant
     regular = np.abs(determinant) > 1e-3 * peak(determinant)
     back = state.rates(dtau_e, dsigma, dq)
     accelerations = state.motor_accelerations(rates, ddq, ddtau_e, ddsigma)
     for ours, theirs in (
-        (back[..., 0], dtheta_1 - dq),
-        (back[..., 1], ds),
-        (accelerations[..., 0], ddtheta_1),
-        (accelerations[..., 1], dds),
+        (back[0], dtheta_1 - dq),
+        (back[1], ds),
+        (accelerations[0], ddtheta_1),
+        (accelerations[1], dds),
     ):
         # where det A is a thousandth of its peak, rounding is a thousand times as large
         np.testing.assert_allclose(ours[regular], theirs[regular], rtol=0, atol=1e-8 * peak(theirs))
@@ -90,7 +86,7 @@ def test_the_state_is_that_of_the_potential(any_device: Device) -> None:
 def test_the_energy_is_the_potential(any_device: Device) -> None:
     phi, s, q = states(any_device, 50)
     energy = [float(any_device.potential(*at)) for at in zip(q, q + phi, s, strict=True)]
-    np.testing.assert_allclose(any_device.mechanism.state(coordinates(phi, s, q)).energy, energy, rtol=1e-11)
+    np.testing.assert_allclose(any_device.mechanism.state(phi, s, q).energy, energy, rtol=1e-11)
 
 
 def test_there_and_back(device: Device) -> None:
@@ -103,7 +99,7 @@ def test_there_and_back(device: Device) -> None:
     np.testing.assert_allclose(-again.link, tau_e, rtol=1e-11, atol=1e-12 * peak(tau_e))
     np.testing.assert_allclose(again.stiffness, sigma, rtol=1e-11)
     # next to a turning point of the stiffness the states differ by the root of rounding
-    determinant = device.mechanism.state(coordinates(phi, s, q)).determinant()
+    determinant = device.mechanism.state(phi, s, q).determinant
     clear = np.abs(determinant) > 1e-2 * peak(determinant)
     np.testing.assert_allclose(found.phi_1[clear], phi[clear], rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.phi_2[clear], s[clear], rtol=1e-9)

@@ -271,5 +271,5 @@ def test_the_peak_of_the_torque_is_no_singularity():
     found = case.solve(tau_e, stiffness)
     np.testing.assert_array_equal(found.lower, 0)
     assert not found.lower_critical.any()
-    state = case.cam.state(np.stack((found.phi_1, found.phi_2, found.phi_1), axis=-1))
-    assert np.all(np.abs(state.determinant()) > 1e-4)
+    state = case.cam.state(found.phi_1, found.phi_2, found.phi_1)
+    assert np.all(np.abs(state.determinant) > 1e-4)

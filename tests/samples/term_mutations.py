@@ -71,7 +71,8 @@ def _users_of(name: str, function: Any) -> list[Any]:
     return [module for module in modules if vars(module).get(name) is function]
 
 
-BETA, SOLVE = "actuators.pairs.joints:beta", "actuators.pairs.joints:solve_decoupling"
+PAIR, MATRIX = "actuators.pairs.springs:PairSprings", "actuators.elasticity:MotorMatrix"
+BETA = f"{PAIR}.motor_accelerations"
 DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
@@ -79,12 +80,18 @@ RATIO, STATE = (
     "actuators.mechanisms.mechanism:DeflectionState",
 )
 CUBIC, LOSS = "actuators.laws.cubic:Cubic", "dynamics.losses:dissipated_power"
-DAMPER, ELASTIC = "dynamics.drive:_damper_torques", "actuators.elastic:Elastic"
-MOVED = "actuators.antagonistic:Antagonistic._moved"
+DAMPER, ELASTIC = "dynamics.drive:_damper_torques", "actuators.elastic:Elastic.transmit"
+SINGLE = "actuators.single_springs:SingleSpring"
 
 MUTATIONS = (
     Mutation("tau_k (62)", "pair", f"{CUBIC}.torque", "return phi", "return 1.01 * phi"),
-    Mutation("tau_k (62), by the motor alone", "pair", MOVED, "(one.tau,", "(1.01 * one.tau,"),
+    Mutation(
+        "tau_k (62), by the motor alone",
+        "pair",
+        f"{PAIR}.tau_transmission",
+        "return self._one.tau, ",
+        "return 1.01 * self._one.tau, ",
+    ),
     Mutation("sigma_k (63)", "pair", f"{CUBIC}.stiffness", "3 * self", "3.03 * self"),
     Mutation("zeta_k (64)", "pair", f"{CUBIC}.slope", "6 *", "6.06 *"),
     Mutation("eta_k (66)", "pair", f"{CUBIC}.curvature", "6 *", "6.06 *"),
@@ -92,25 +99,25 @@ MUTATIONS = (
     Mutation(
         "det A (67), its first product",
         "pair",
-        "actuators.pairs.joints:determinant",
-        "one.sigma * two",
-        "1.01 * one.sigma * two",
+        f"{MATRIX}.determinant",
+        "self.torque_1 * self",
+        "1.01 * self.torque_1 * self",
     ),
     *(
-        Mutation(f"A^-1 (68), (72), {place}", "pair", SOLVE, old, f"1.01 * {old}")
+        Mutation(f"A^-1 (68), (72), {place}", "pair", f"{MATRIX}.solve", old, f"1.01 * {old}")
         for place, old in {
-            "zeta_2 in row 1": "two.zeta * torque_row",
-            "sigma_2 in row 1": "two.sigma * stiffness_row",
-            "sigma_1 in row 2": "one.sigma * stiffness_row",
-            "zeta_1 in row 2": "one.zeta * torque_row",
+            "zeta_2 in row 1": "self.stiffness_2 * torque_row",
+            "sigma_2 in row 1": "self.torque_2 * stiffness_row",
+            "sigma_1 in row 2": "self.torque_1 * stiffness_row",
+            "zeta_1 in row 2": "self.stiffness_1 * torque_row",
         }.items()
     ),
     Mutation(
         "phi_k + q (69)",
         "pair",
         "actuators.actuator:Actuator.motor_positions",
-        "phi + q",
-        "phi + 1.01 * q",
+        "unknowns + q",
+        "unknowns + 1.01 * q",
     ),
     *(
         Mutation(f"{term} in ({70 + row})", "pair", BETA, old, new)
@@ -141,9 +148,9 @@ MUTATIONS = (
     Mutation(
         "spring between the motors",
         "pair",
-        "actuators.antagonistic:_between",
-        "coupling.t",
-        "1.01 * coupling.t",
+        f"{PAIR}.tau_transmission",
+        "+ self._coupling",
+        "+ 1.01 * self._coupling",
     ),
     Mutation("motor friction", "pair", TORQUES, "+ friction.with", "+ 1.01 * friction.with"),
     Mutation("motor friction, sign", "pair", TORQUES, "+ friction.with", "- friction.with"),
@@ -216,30 +223,20 @@ MUTATIONS = (
         "ddphi + ddq",
         "ddphi + 1.01 * ddq",
     ),
-    Mutation("phi'', one motor", "spring", f"{ELASTIC}._nonlinear", "ddq + ddphi", "ddq + 1.01 * ddphi"),
+    Mutation("phi'', one motor", "spring", ELASTIC, "=ddphi + command", "=1.01 * ddphi + command"),
     Mutation(
-        "zeta phi'^2, one motor", "spring", f"{ELASTIC}._nonlinear", "- spring.zeta", "- 1.01 * spring.zeta"
+        "zeta phi'^2, one motor",
+        "spring",
+        f"{SINGLE}.motor_accelerations",
+        "- self._spring.zeta",
+        "- 1.01 * self._spring.zeta",
+    ),
+    Mutation("sigma phi' = tau_e', one motor", "spring", f"{SINGLE}.rates", "(dtau_e /", "(1.01 * dtau_e /"),
+    Mutation(
+        "tau_e'', one motor", "spring", f"{SINGLE}.motor_accelerations", "((ddtau_e -", "((1.01 * ddtau_e -"
     ),
     Mutation(
-        "sigma phi' = tau_e', one motor",
-        "spring",
-        f"{ELASTIC}._nonlinear",
-        "dphi = command",
-        "dphi = 1.01 * command",
-    ),
-    Mutation(
-        "tau_e''/K, linear spring",
-        "spring",
-        f"{ELASTIC}._linear",
-        "command.ddtau_e /",
-        "1.01 * command.ddtau_e /",
-    ),
-    Mutation(
-        "tau_e, linear spring",
-        "spring",
-        f"{ELASTIC}._linear",
-        "tau_transmission=command",
-        "tau_transmission=1.01 * command",
+        "torque of one motor", "spring", f"{SINGLE}.tau_transmission", "(self._spring", "(1.01 * self._spring"
     ),
     Mutation(
         "tau_e, rigid",

@@ -140,7 +140,7 @@ def serial_command(device, samples=40):
     random = np.random.default_rng(1)
     phi, s = (random.uniform(*ends, 30 * samples) for ends in (device.deflections, device.settings))
     q = random.uniform(-2, 2, len(phi))
-    state = device.mechanism.state(np.stack((phi, s, q), axis=-1))
+    state = device.mechanism.state(phi, s, q)
     found = device.mechanism.solve(state.tau_e, state.stiffness, q)
     gap = margin(state.stiffness, found.lower, found.upper)
     taken = np.flatnonzero(device.on_branch(phi, s) & (state.stiffness > 0) & (gap > 0.05))[:samples]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from vsacli.actuators.elasticity import Elasticity
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck, OfJoint, within
@@ -58,27 +58,6 @@ class PlaceholderConstants(NamedTuple):
         )
 
 
-class Carried(NamedTuple):
-    """Torque and stiffness of springs at given deflections, by their laws; arrays (samples,).
-
-    The self-check compares them with the demand; the sizes are what its errors are relative to.
-
-    Attributes:
-        tau_e: Torque on the link.
-        size: Sum of the absolute values of the terms of tau_e.
-        stiffness: Stiffness of the joint.
-        stiffness_size: Size of the terms of the stiffness; rounding of the deflections changes the stiffness
-            by eps times this.
-        tau_transmission: Torque against each motor, (motors, samples).
-    """
-
-    tau_e: FloatArray
-    size: FloatArray
-    stiffness: FloatArray
-    stiffness_size: FloatArray
-    tau_transmission: FloatArray
-
-
 class SpringLoad(NamedTuple):
     """Load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
 
@@ -101,8 +80,8 @@ class Actuator(ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
-    In all methods phi, (2, samples), is the state of the springs, one coordinate per motor: their
-    deflections, or other unknowns of (14) that the kind chooses.
+    The state of the springs is that of the unknowns of (14), one per motor: their deflections phi, or others
+    that the kind chooses.
 
     Attributes:
         motor_count: Number of motors of the joint, 1 or 2.
@@ -214,22 +193,39 @@ class Actuator(ABC):
         Args:
             command: Motion and elastic torque of the joint; arrays (samples,).
             min_margin: Margin below which a sample is near-singular.
-            integrated: Deflections phi to use instead of those that `solve` finds, NaN where there are none;
-                only for kinds that are `integrable`.
+            integrated: Unknowns to use instead of those that `solve` finds, (2, samples), NaN where there are
+                none; only for kinds with a commanded stiffness.
 
         Returns:
-            The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `ddtheta`,
-            `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and `flags`; NaN
-            for those that the actuator lacks, such as a second motor's.
+            The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `theta`, `dtheta`,
+            `ddtheta`, `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and
+            `flags`; NaN for those that the actuator lacks, such as a second motor's.
         """
 
-    def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Return theta, (2, samples), from phi and joint position, or velocities from their rates (69)."""
-        return phi + q
+    def deflections(self, unknowns: FloatArray) -> FloatArray:
+        """Return phi, (2, samples), from the unknowns, or its rates; NaN for a motor without a deflection."""
+        return unknowns
 
-    @abstractmethod
+    def motor_positions(self, unknowns: Components, q: FloatArray) -> FloatArray:
+        """Return theta, (motors, samples), from the unknowns, or velocities from their rates (69)."""
+        return unknowns + q
+
+    def unknowns(self, phi: FloatArray, theta: FloatArray) -> Components:  # noqa: ARG002
+        """Return the unknowns from deflections and motor positions, (2, samples), or their rates."""
+        return phi[: self.motor_count]
+
+    def springs(self, unknowns: Components, q: FloatArray) -> ElasticState:
+        """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
+        raise NotImplementedError(f"{type(self).__name__} has no springs")
+
+    def springs_of(self, of_joint: OfJoint) -> ElasticState:
+        """Return the springs with their derivatives from the motion of joint and motors."""
+        return self.springs(self.unknowns(of_joint["phi"], of_joint["theta"]), of_joint["q"])
+
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """Return the rates of tau_transmission, (motors, samples), from variables of the joint."""
+        rates = *self.unknowns(of_joint["dphi"], of_joint["dtheta"]), of_joint["dq"]
+        return np.stack(self.springs_of(of_joint).transmission_rates(rates))
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
         """Return the loads of the springs from variables of the joint; those behind motor 1 as one."""
@@ -237,10 +233,6 @@ class Actuator(ABC):
             return ()
         loaded = of_joint["phi"][0], of_joint["tau_transmission"][0], of_joint["elastic_energy"]
         return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
-
-    def carried(self, of_joint: OfJoint) -> Carried:
-        """Return torque and stiffness of the springs by their laws, from the motion of joint and motors."""
-        raise NotImplementedError(f"{type(self).__name__} has no springs")
 
     @property
     def spring_group(self) -> Hashable:
@@ -255,7 +247,7 @@ class Actuator(ABC):
     # Methods of kinds with a commanded stiffness
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
-        """Solve (14): return phi for a torque and a stiffness, on the actuator's branch.
+        """Solve (14): return the unknowns for a torque and a stiffness, on the actuator's branch.
 
         Args:
             tau_e: Elastic torque, (samples,).
@@ -275,14 +267,3 @@ class Actuator(ABC):
     def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Return where the stiffness is attainable on another branch, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
-
-    integrable: ClassVar[bool] = False
-    """Whether phi can be integrated along a trajectory; if so, the kind has the two methods below."""
-
-    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """Return the rates of phi, (2, samples), for commanded rates of tau_e and stiffness, (19)-(20)."""
-        raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")
-
-    def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the determinant of the decoupling matrix A at phi and joint positions, (67)."""
-        raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")

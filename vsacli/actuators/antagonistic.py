@@ -1,6 +1,7 @@
-"""Two motors, each behind a nonlinear spring: (14) solved, then (61)-(72) with the decoupling matrix A.
+"""Two motors, each behind a nonlinear spring.
 
-`transmit` is the path of a run: `solve` (14), `deflections_within_reach` (61), then `_moved` (62)-(72).
+`solve` finds the deflections (14), `springs` is the state of the springs there; `VariableStiffness.transmit`
+calls both for a run.
 """
 
 from __future__ import annotations
@@ -11,18 +12,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
-import numpy as np
-
-from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants, SpringLoad
-from vsacli.actuators.elasticity import Elasticity
+from vsacli.actuators.actuator import PlaceholderConstants, SpringLoad
+from vsacli.actuators.elasticity import Components, Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs.joints import beta, determinant, solve_decoupling
+from vsacli.actuators.motor import Motor
 from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
-from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
+from vsacli.actuators.pairs.springs import PairElasticity, PairSprings
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.spring_elements import SpringElement
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, Pair, Record, check_fields, choice, value
@@ -30,7 +29,7 @@ from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
-class Antagonistic(Actuator):
+class Antagonistic(VariableStiffness):
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
     motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping applies to both")
@@ -47,10 +46,6 @@ class Antagonistic(Actuator):
         "branch of the deflections: positive has phi_1 up and phi_2 down",
         default="positive",
     )
-
-    motor_count = 2
-    commanded = ("stiffness",)
-    integrable = True
 
     def __post_init__(self) -> None:
         check_fields(self, *self.pair.problems(), *self._coupling_problems())
@@ -95,11 +90,6 @@ class Antagonistic(Actuator):
         return cls(motor=(motor, motor), spring=(spring, spring))
 
     @property
-    def motors(self) -> tuple[JointMotor, ...]:
-        """Motors 1 and 2."""
-        return tuple(motor.at_joint for motor in self.motor)
-
-    @property
     def max_deflections(self) -> tuple[float, ...]:
         """Largest deflections of the springs."""
         return tuple(spring.max_deflection for spring in self.spring)
@@ -135,61 +125,15 @@ class Antagonistic(Actuator):
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:
         return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
-        """Compute deflections on the actuator's branch, their rates, and motor accelerations.
-
-        See `Actuator.transmit`.
-        """
-        solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
-        stiffness = command.commanded["stiffness"]
-        phi, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)
-        moved = self._moved(command, solution, reached, phi)
-        if self.coupling is None:
-            return moved
-        return {
-            **moved,
-            "tau_transmission": moved["tau_transmission"] + _between(self.coupling, phi),
-            "elastic_energy": moved["elastic_energy"] + self.coupling.energy(phi[0] - phi[1]),
-        }
-
-    def _moved(self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray) -> OfJoint:
-        """Compute the motion of both motors and the torques of both springs at given deflections, (62)-(72).
-
-        NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
-        """
+    def springs(self, unknowns: Components, _q: FloatArray) -> PairSprings:
+        """Return both springs at their deflections, with the coupling at the difference."""
         (energy_1, one), (energy_2, two) = (
-            law.energy_and_state(side) for law, side in zip(self.laws, phi, strict=True)
+            law.energy_and_state(phi) for law, phi in zip(self.laws, unknowns, strict=True)
         )
-        det_a = determinant(one, two)  # (67)
-        divisor = np.where(reached.singular, np.nan, det_a)
-        dphi = solve_decoupling(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
-        # dphi and ddtheta solve the same system A x = b, (19) and (23).
-        right = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
-        ddtheta = solve_decoupling(one, two, divisor, *right)  # (72)
-        return {
-            "stiffness": command.commanded["stiffness"],
-            "dstiffness": command.commanded["dstiffness"],
-            "ddstiffness": command.commanded["ddstiffness"],
-            "phi": phi,
-            "dphi": np.stack(dphi),
-            "ddtheta": np.stack(ddtheta),
-            "tau_transmission": np.stack((one.tau, two.tau)),
-            "elastic_energy": energy_1 + energy_2,
-            "det_A": det_a,
-            "stiffness_min": solution.lower,
-            "stiffness_max": solution.upper,
-            "flags": reached.flags,
-        }
-
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return sigma_k phi_k' of each side, with the rate +-U_3'' (phi_1' - phi_2') of a coupling."""
-        sides = zip(self.laws, of_joint["phi"], of_joint["dphi"], strict=True)
-        rates = np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
         if self.coupling is None:
-            return rates
-        apart, drifting = (of_joint[name][0] - of_joint[name][1] for name in ("phi", "dphi"))
-        rate: FloatArray = self.coupling.stiffness(apart) * drifting
-        return rates + np.stack((rate, -rate))
+            return PairSprings(one, two, energy_1 + energy_2)
+        energy_3, coupling = self.coupling.energy_and_state(unknowns[0] - unknowns[1])
+        return PairSprings(one, two, energy_1 + energy_2 + energy_3, coupling)
 
     def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
         """Return the load of each spring, including a coupling."""
@@ -203,15 +147,6 @@ class Antagonistic(Actuator):
             for name, law, deflection, bound in springs
         )
 
-    def carried(self, of_joint: OfJoint) -> Carried:
-        """Return the sums over both springs, the right-hand sides of (14)."""
-        sides = list(zip(self.laws, of_joint["phi"], strict=True))
-        tau = np.stack([law.torque(deflection) for law, deflection in sides])
-        sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
-        against = tau if self.coupling is None else tau + _between(self.coupling, of_joint["phi"])
-        stiffness = sigma.sum(axis=0)
-        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), stiffness, stiffness, against)
-
     @property
     def spring_group(self) -> Hashable:
         """Key of joints that are computed together: those with equal couplings."""
@@ -220,10 +155,7 @@ class Antagonistic(Actuator):
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """Return the springs of several joints with equal couplings, as one object."""
-        from vsacli.actuators.pairs.joints import CoupledPairs, PairElasticity
-
-        pairs, coupling = [actuator.laws for actuator in actuators], actuators[0].coupling
-        return PairElasticity(pairs) if coupling is None else CoupledPairs(pairs, coupling)
+        return PairElasticity([actuator.laws for actuator in actuators], actuators[0].coupling)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Solve (14) for the deflections (61) on the actuator's branch."""
@@ -237,19 +169,3 @@ class Antagonistic(Actuator):
     def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
         """See `Actuator.other_branch`."""
         return self.pair.opposite_reaches(tau_e, stiffness)
-
-    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """Return A^-1 (tau_e', sigma'), (19)-(20)."""
-        one, two = self.pair.states(*phi)
-        right = command.dtau_e, command.commanded["dstiffness"]
-        return np.stack(solve_decoupling(one, two, determinant(one, two), *right))
-
-    def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
-        """Return det A (67)."""
-        return determinant(*self.pair.states(*phi))
-
-
-def _between(coupling: SpringLaw, phi: FloatArray) -> FloatArray:
-    """Return the torque of a spring between the motors on each of them, (2, samples)."""
-    torque = coupling.torque(phi[0] - phi[1])
-    return np.stack((torque, -torque))

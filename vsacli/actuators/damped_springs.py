@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import ElasticState
+from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
 from vsacli.actuators.reach import OfJoint, Reach, reach
 from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -43,7 +43,7 @@ class _Springs(NamedTuple):
     """State of the springs at deflections.
 
     Attributes:
-        state: Arrays (samples, 1 joint[, motors]).
+        state: Springs with their derivatives.
         torque: Derivatives of T over each theta, (motors, samples).
         stiffness: Derivatives of sigma over each theta, (motors, samples).
         pivot: Determinant of the matrix that gives the motors' velocities, zero where these do not follow
@@ -58,11 +58,10 @@ class _Springs(NamedTuple):
     @property
     def slope(self) -> FloatArray:
         """dT/d(spread) at constant stiffness, det A/pivot: positive where the internal motion is stable."""
-        slope: FloatArray = self.torque[0]
-        if len(self.torque) > 1:
-            determinant = self.torque[0] * self.stiffness[1] - self.torque[1] * self.stiffness[0]
-            slope = determinant / self.divisor
-        return slope
+        if len(self.torque) == 1:
+            slope: FloatArray = self.torque[0]
+            return slope
+        return MotorMatrix(*self.torque, *self.stiffness).determinant / self.divisor
 
     @property
     def divisor(self) -> FloatArray:
@@ -79,9 +78,8 @@ class DampedSprings:
     def __init__(self, actuator: Actuator) -> None:
         self._actuator = actuator
         self._motors = actuator.motor_count
-        self._elasticity = type(actuator).elasticity([actuator])
         self._settable = STIFFNESS.key in actuator.commanded
-        self._behind = [float(there) for there in actuator.has(VARIABLES["phi"])[: self._motors]]
+        self._behind = np.array(actuator.has(VARIABLES["phi"])[: self._motors], dtype=float)
 
     def spread(self, phi: FloatArray) -> FloatArray:
         """Return the spread: the sum of the deflections parallel to the damper."""
@@ -110,8 +108,8 @@ class DampedSprings:
         along = self._along(spread)
         for _ in range(NEWTON_STEPS):
             springs = self.springs_at(phi, command.q)
-            phi = phi + along * ((stiffness - springs.state.stiffness[..., 0]) / springs.divisor)
-        left = stiffness - self._state(phi, command.q).stiffness[..., 0]
+            phi = phi + along * ((stiffness - springs.state.stiffness) / springs.divisor)
+        left = stiffness - self._state(phi, command.q).stiffness
         return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
 
     def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
@@ -131,9 +129,9 @@ class DampedSprings:
         """Return w = (tau_l - T)/d and w' = (tau_l' - d' w - T')/d at deflections."""
         damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
         springs = self.springs_at(phi, command.q)
-        velocity = (command.tau_e - springs.state.tau_e[..., 0]) / damping
+        velocity = (command.tau_e - springs.state.tau_e) / damping
         dtheta = self._velocities(springs, velocity, command)
-        rate = springs.state.torque_rate(self._coordinates(command.dq, dtheta))[..., 0]
+        rate = springs.state.torque_rate(self._rates(command.dq, dtheta))
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
     def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> OfJoint:
@@ -150,24 +148,25 @@ class DampedSprings:
         lower, upper, reached = self._reach(springs, phi, command, min_margin)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
         dtheta = self._velocities(springs, velocity, command)
-        rates = self._coordinates(command.dq, dtheta)
+        rates = self._rates(command.dq, dtheta)
         ddtheta = self._accelerations(springs, acceleration, rates, command)
         none = np.full_like(command.q, np.nan)
 
-        def of_motors(values: FloatArray) -> FloatArray:
+        def of_motors(values: Components) -> FloatArray:
             rows = [values[0], values[1] if self._motors > 1 else none]
             return np.where(reached.infeasible, np.nan, np.stack(rows))
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
-        energy = self._elasticity.energy(self._at(phi, command.q))[..., 0]
         return {
             **dict(zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)),
-            "phi": of_motors(phi),
-            "dphi": of_motors(self._elasticity.deflections(command.dq[:, None], _columns(dtheta))[:, 0].T),
+            "phi": self._actuator.deflections(of_motors(phi)),
+            "dphi": self._actuator.deflections(of_motors(rates)),
+            "theta": of_motors(self._positions(phi, command.q)),
+            "dtheta": of_motors(dtheta),
             "ddtheta": of_motors(ddtheta),
-            "tau_transmission": of_motors(springs.state.tau_transmission[:, 0].T),
-            "elastic_energy": np.where(reached.infeasible, np.nan, energy),
-            "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant()[..., 0]),
+            "tau_transmission": of_motors(springs.state.tau_transmission),
+            "elastic_energy": np.where(reached.infeasible, np.nan, springs.state.energy),
+            "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant),
             "stiffness_min": lower,
             "stiffness_max": upper,
             "flags": reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
@@ -182,7 +181,7 @@ class DampedSprings:
         if not self._settable:
             return none, none, Reach(lost, never, never, never)
         stiffness = command.commanded[STIFFNESS.key]
-        solution = self._actuator.solve(springs.state.tau_e[..., 0], stiffness, command.q)
+        solution = self._actuator.solve(springs.state.tau_e, stiffness, command.q)
         reached = reach(stiffness, solution, min_margin)
         margin = self._margin(springs, stiffness)
         return (
@@ -198,8 +197,8 @@ class DampedSprings:
 
     def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
         """Return the distance of the stiffness from its extremum at the same spread, relative to itself."""
-        bent = springs.state.stiffness_curvature(self._coordinates(0 * stiffness, self._along(stiffness)))
-        divisor = 2 * stiffness * np.abs(bent[..., 0])
+        bent = springs.state.stiffness_curvature(self._rates(0 * stiffness, self._along(stiffness)))
+        divisor = 2 * stiffness * np.abs(bent)
         margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
         return margin
 
@@ -208,16 +207,16 @@ class DampedSprings:
         return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
 
     def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
-        still = self._coordinates(command.dq, np.zeros_like(springs.torque))
-        rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)[..., 0]
+        still = self._rates(command.dq, np.zeros_like(springs.torque))
+        rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)
         return self._solved(springs, velocity + sum(self._behind) * command.dq, rate)
 
     def _accelerations(
-        self, springs: _Springs, acceleration: FloatArray, rates: FloatArray, command: Command
+        self, springs: _Springs, acceleration: FloatArray, rates: Components, command: Command
     ) -> FloatArray:
-        still = self._coordinates(command.ddq, np.zeros_like(springs.torque))
+        still = self._rates(command.ddq, np.zeros_like(springs.torque))
         state = springs.state
-        bent = state.stiffness_curvature(rates)[..., 0] + state.stiffness_rate(still)[..., 0]
+        bent = state.stiffness_curvature(rates) + state.stiffness_rate(still)
         missing = command.commanded[STIFFNESS.names[2]] - bent
         return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
 
@@ -225,48 +224,36 @@ class DampedSprings:
         """Return the solution of both rows; of the first alone if there is one motor."""
         if self._motors == 1:
             return of_spread[None]
-        (b_1, b_2), (g_1, g_2) = self._behind, springs.stiffness
-        return np.stack(
-            (
-                (g_2 * of_spread - b_2 * of_stiffness) / springs.divisor,
-                (b_1 * of_stiffness - g_1 * of_spread) / springs.divisor,
-            )
-        )
+        return np.stack(MotorMatrix(*self._behind, *springs.stiffness).solve(of_spread, of_stiffness))
 
     def _stiffness(
-        self, springs: _Springs, rates: FloatArray, ddtheta: FloatArray, command: Command
+        self, springs: _Springs, rates: Components, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the commanded stiffness, or that of the springs, with its derivatives."""
         if self._settable:
             stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
             return stiffness, rate, acceleration
-        state, turning = springs.state, self._coordinates(command.ddq, ddtheta)
+        state, turning = springs.state, self._rates(command.ddq, ddtheta)
         bent = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
-        return state.stiffness[..., 0], state.stiffness_rate(rates)[..., 0], bent[..., 0]
+        return state.stiffness, state.stiffness_rate(rates), bent
 
     def springs_at(self, phi: FloatArray, q: FloatArray) -> _Springs:
         """Return the state of the springs at deflections and joint positions."""
         state = self._state(phi, q)
         units = np.eye(self._motors)[:, :, None] + 0 * q
-        turned = [self._coordinates(0 * q, unit) for unit in units]
-        torque = np.stack([state.torque_rate(each)[..., 0] for each in turned])
-        stiffness = np.stack([state.stiffness_rate(each)[..., 0] for each in turned])
+        turned = [self._rates(0 * q, unit) for unit in units]
+        torque = np.stack([state.torque_rate(each) for each in turned])
+        stiffness = np.stack([state.stiffness_rate(each) for each in turned])
         if self._motors == 1:
             return _Springs(state, torque, stiffness, np.ones_like(q))
-        pivot = self._behind[0] * stiffness[1] - self._behind[1] * stiffness[0]
-        return _Springs(state, torque, stiffness, pivot)
+        return _Springs(state, torque, stiffness, MotorMatrix(*self._behind, *stiffness).determinant)
 
     def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
-        return self._elasticity.state(self._at(phi, q))
+        return self._actuator.springs(phi[: self._motors], q)
 
-    def _at(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        return self._coordinates(q, self._actuator.motor_positions(phi, q)[: self._motors])
+    def _positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        return self._actuator.motor_positions(phi[: self._motors], q)
 
-    def _coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates of the springs, (samples, 1 joint, coordinates), or their rates."""
-        return self._elasticity.coordinates(q[:, None], _columns(theta))
-
-
-def _columns(of_motors: FloatArray) -> FloatArray:
-    """Return (samples, 1 joint, motors) from (motors, samples)."""
-    return of_motors.T[:, None]
+    def _rates(self, dq: FloatArray, dtheta: FloatArray) -> Components:
+        """Return the rates of the coordinates of the springs from velocities of joint and motors."""
+        return *self._actuator.unknowns(dtheta - dq, dtheta), dq

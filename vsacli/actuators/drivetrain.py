@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -190,13 +190,13 @@ class Drivetrain:
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
-        found = self.by_joint([each.state(at).determinant() for each, at in self.at(q, theta)], q)
+        found = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
         return np.where(self.rigid, np.nan, found)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """Return the springs with their derivatives, at positions and velocities of joints and motors."""
         parts = [elasticity.state(at) for elasticity, at in self.at(q, theta)]
-        rates = [rates for _, rates in self.at(dq, dtheta)]
+        rates = [[at[..., number] for number in range(at.shape[-1])] for _, at in self.at(dq, dtheta)]
         return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
@@ -248,7 +248,7 @@ class DrivetrainState:
         drivetrain: Drivetrain,
         q: FloatArray,
         theta: FloatArray,
-        parts: Sequence[tuple[ElasticState, FloatArray]],
+        parts: Sequence[tuple[ElasticState, Components]],
     ) -> None:
         self._drivetrain, self._q, self._theta, self._parts = drivetrain, q, theta, parts
 
@@ -275,7 +275,8 @@ class DrivetrainState:
     @property
     def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        return self._drivetrain.of_springs([part.tau_transmission for part, _ in self._parts], self._theta)
+        parts = [np.stack(part.tau_transmission, axis=-1) for part, _ in self._parts]
+        return self._drivetrain.of_springs(parts, self._theta)
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -289,7 +290,7 @@ class DrivetrainState:
         """
         wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
         parts = [
-            part.motor_accelerations(rates, *of_part)
+            np.stack(part.motor_accelerations(rates, *of_part), axis=-1)
             for (part, rates), of_part in zip(self._parts, wanted, strict=True)
         ]
         return self._drivetrain.of_springs(parts, self._theta)

@@ -10,16 +10,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
-from vsacli.actuators.elasticity import Elasticity
+from vsacli.actuators.actuator import Actuator, PlaceholderConstants
+from vsacli.actuators.elasticity import Components, Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution, SpringRows
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck, OfJoint, Reach
+from vsacli.actuators.single_springs import LinearRows, SingleSpring, SingleSprings
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, single_motor
 from vsacli.base import units
-from vsacli.base.arrays import FLAG_TYPE, FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag, has
 from vsacli.documents.fields import POSITIVE, OneOf, Record, check_fields, number, value
@@ -120,54 +121,41 @@ class Elastic(Actuator):
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
     def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
-        """Compute the deflection at which the spring carries tau_e, and its derivatives."""
-        return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
-
-    def _linear(self, command: Command, stiffness: float) -> OfJoint:
-        """Compute a linear spring: phi = tau_e/K, with constant stiffness."""
-        phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
-        return single_motor(
-            stiffness=constant + stiffness,
-            dstiffness=constant,
-            ddstiffness=constant,
-            phi=phi,
-            dphi=command.dtau_e / stiffness,
-            ddtheta=command.ddq + command.ddtau_e / stiffness,
-            tau_transmission=command.tau_e,
-            elastic_energy=phi * command.tau_e / 2,
-            flags=np.zeros(command.q.shape, dtype=FLAG_TYPE),
-        )
-
-    def _nonlinear(self, command: Command) -> OfJoint:
-        """Solve tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
+        """Compute the deflection at which the spring carries tau_e, and its derivatives.
 
         NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
         """
-        law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
-        found = self.solve(command.tau_e, np.full_like(command.tau_e, np.nan), command.q)
-        phi = np.where(infeasible, np.nan, found.phi_1)
-        energy, spring = law.energy_and_state(phi)
+        solution = self.solve(command.tau_e, np.full_like(command.tau_e, np.nan), command.q)
+        phi = np.where(infeasible, np.nan, solution.phi_1)
+        spring = self.springs((phi,), command.q)
+        rates = spring.rates(command.dtau_e, command.q, command.dq)
+        still = np.zeros_like(command.q)
+        (ddphi,) = spring.motor_accelerations(rates, still, command.ddtau_e, still)
         reached = Reach(
             infeasible=infeasible,
-            slack=infeasible & law.pulls_only & (command.tau_e < 0),
-            singular=spring.sigma == 0,
+            slack=infeasible & self.law.pulls_only & (command.tau_e < 0),
+            singular=spring.stiffness == 0,
             near_singular=np.zeros_like(phi, dtype=bool),
         )
-        divisor = np.where(reached.singular, np.nan, spring.sigma)
-        dphi = command.dtau_e / divisor
-        ddphi = (command.ddtau_e - spring.zeta * dphi * dphi) / divisor
         return single_motor(
-            stiffness=spring.sigma,
-            dstiffness=spring.zeta * dphi,
-            ddstiffness=spring.eta * dphi * dphi + spring.zeta * ddphi,
+            stiffness=spring.stiffness,
+            dstiffness=spring.stiffness_rate(rates),
+            ddstiffness=spring.stiffness_curvature(rates) + spring.stiffness_rate((ddphi,)),
             phi=phi,
-            dphi=dphi,
-            ddtheta=command.ddq + ddphi,
-            tau_transmission=spring.tau,
-            elastic_energy=energy,
+            dphi=rates[0],
+            theta=phi + command.q,
+            dtheta=rates[0] + command.dq,
+            ddtheta=ddphi + command.ddq,
+            tau_transmission=spring.tau_transmission[0],
+            elastic_energy=spring.energy,
             flags=reached.flags,
         )
+
+    def springs(self, unknowns: Components, _q: FloatArray) -> SingleSpring:
+        """Return the spring at its deflection."""
+        energy, spring = self.law.energy_and_state(unknowns[0])
+        return SingleSpring(spring, energy)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Return the deflection at which the spring carries the torque; the stiffness cannot be chosen."""
@@ -175,22 +163,9 @@ class Elastic(Actuator):
         deflection = self.law.deflection(tau_e)
         return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
 
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return sigma phi'."""
-        rates: FloatArray = self.law.stiffness(of_joint["phi"][:1]) * of_joint["dphi"][:1]
-        return rates
-
-    def carried(self, of_joint: OfJoint) -> Carried:
-        """Return torque and stiffness by the law."""
-        phi = of_joint["phi"][0]
-        tau_e, stiffness = self.law.torque(phi), self.law.stiffness(phi)
-        return Carried(tau_e, np.abs(tau_e), stiffness, stiffness, tau_e[None])
-
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """Return the springs of several joints."""
-        from vsacli.actuators.single_springs import LinearRows, SingleSprings
-
         linear = [actuator.stiffness for actuator in actuators if actuator.stiffness is not None]
         if len(linear) == len(actuators):
             return SingleSprings(LinearRows(linear))

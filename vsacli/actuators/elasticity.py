@@ -7,11 +7,15 @@ one instant, or samples.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+
+Components: TypeAlias = Sequence[FloatArray] | FloatArray
+"""One array for each motor of a joint, or for each coordinate of its springs; all of one shape."""
 
 
 class Torques(NamedTuple):
@@ -53,45 +57,96 @@ class Elasticity(ABC):
         """Return the springs with their derivatives."""
 
 
+class MotorMatrix(NamedTuple):
+    """A 2x2 matrix over two motors: a row of the torque and one of the stiffness; arrays of one shape.
+
+    The decoupling matrix A = d(tau_e, sigma)/d(theta_1, theta_2) is one.
+    """
+
+    torque_1: FloatArray
+    torque_2: FloatArray
+    stiffness_1: FloatArray
+    stiffness_2: FloatArray
+
+    @property
+    def determinant(self) -> FloatArray:
+        """Determinant (67); zero where the matrix is singular."""
+        return self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
+
+    def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the inverse times a right-hand side, as in (68) and (72); NaN where there is none."""
+        determinant = self.determinant
+        divisor = np.where(determinant == 0, np.nan, determinant)
+        return (
+            (self.stiffness_2 * torque_row - self.torque_2 * stiffness_row) / divisor,
+            (self.torque_1 * stiffness_row - self.stiffness_1 * torque_row) / divisor,
+        )
+
+
 class ElasticState(ABC):
-    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions."""
+    """Springs of joints at given coordinates: torque and stiffness, and their rates for given motions.
+
+    Values of a joint are arrays of any one shape, those of motors and coordinates sequences of such arrays.
+    """
+
+    @property
+    @abstractmethod
+    def energy(self) -> FloatArray:
+        """Elastic energy, J."""
 
     @property
     @abstractmethod
     def tau_e(self) -> FloatArray:
-        """Elastic torque (6), (..., joints)."""
+        """Elastic torque (6)."""
 
     @property
     @abstractmethod
     def stiffness(self) -> FloatArray:
-        """Stiffness of the joint (11), (..., joints)."""
+        """Stiffness of the joint (11)."""
 
     @property
     @abstractmethod
-    def tau_transmission(self) -> FloatArray:
-        """Torque against each motor (62), (..., joints, motors)."""
+    def tau_transmission(self) -> tuple[FloatArray, ...]:
+        """Torque against each motor (62)."""
+
+    @property
+    def determinant(self) -> FloatArray:
+        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
+        return np.full_like(self.tau_e, np.nan)
+
+    def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        """Return the sizes of tau_e and stiffness, relative to which the self-check's errors are.
+
+        They are sums of absolute values of terms; the one of the stiffness is what a relative change of the
+        unknowns, such as rounding, changes.
+        """
+        return np.abs(self.tau_e), self.stiffness
 
     @abstractmethod
-    def torque_rate(self, rates: FloatArray) -> FloatArray:
-        """Return the rate of the elastic torque (17), (..., joints)."""
+    def torque_rate(self, rates: Components) -> FloatArray:
+        """Return the rate of the elastic torque (17) from the rates of the coordinates."""
 
     @abstractmethod
-    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
-        """Return the rate of the stiffness (18), (..., joints)."""
+    def stiffness_rate(self, rates: Components) -> FloatArray:
+        """Return the rate of the stiffness (18)."""
 
     @abstractmethod
-    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """Return the part x' H x' of the second derivative of the stiffness, (..., joints)."""
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
+        """Return the part x' H x' of the second derivative of the stiffness."""
+
+    @abstractmethod
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray, ...]:
+        """Return the rates of the torques against the motors."""
+
+    @abstractmethod
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
+        """Return the rates of the coordinates for rates of torque and stiffness, (68); NaN as below."""
 
     @abstractmethod
     def motor_accelerations(
-        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
-    ) -> FloatArray:
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> tuple[FloatArray, ...]:
         """Return the motor accelerations for these second derivatives of torque and stiffness, (70)-(72).
 
         NaN where there are none, because the decoupling matrix is singular.
         """
-
-    def determinant(self) -> FloatArray:
-        """Return det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
-        return np.full_like(self.tau_e, np.nan)

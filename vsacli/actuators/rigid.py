@@ -52,6 +52,8 @@ class Rigid(Actuator):
             ddstiffness=none,
             phi=still,
             dphi=still,
+            theta=command.q,
+            dtheta=command.dq,
             ddtheta=command.ddq,
             tau_transmission=command.tau_e,
             elastic_energy=still * command.tau_e / 2,

@@ -11,16 +11,15 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
+from vsacli.actuators.actuator import PlaceholderConstants
 from vsacli.actuators.drivetrain import largest_coupling
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, Torques
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.mechanisms.mechanism import Mechanism, MechanismState
-from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import OfJoint, deflections_within_reach
+from vsacli.actuators.motor import Motor
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -28,13 +27,9 @@ from vsacli.base.variables import Variable
 from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, value
 from vsacli.documents.source import Source
 
-SMALL_DEFLECTION = 1e-3
-"""Deflection, rad (m), whose torque is large compared with rounding. The load of motor 1 passes through zero,
-where the torque itself is no scale for its error."""
-
 
 @dataclass(frozen=True)
-class Serial(Actuator):
+class Serial(VariableStiffness):
     """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
@@ -50,10 +45,7 @@ class Serial(Actuator):
         OneOf(MECHANISMS), "springs, and the mechanism by which motor 2 adjusts them"
     )
 
-    motor_count = 2
-    commanded = ("stiffness",)
     branch_field = "mechanism.branch"
-    integrable = True
 
     def __post_init__(self) -> None:
         problems = []
@@ -99,11 +91,6 @@ class Serial(Actuator):
         return FieldProblem(("mechanism", "type"), reason)
 
     @property
-    def motors(self) -> tuple[JointMotor, ...]:
-        """Motors 1 and 2."""
-        return tuple(motor.at_joint for motor in self.motor)
-
-    @property
     def coupled_rotors(self) -> float:
         """Coupled inertia on the joint side: times the gear ratios, with signs, of motors on their shafts."""
         first, second = (motor.ratio_of_side for motor in self.motor)
@@ -139,56 +126,21 @@ class Serial(Actuator):
         """See `Actuator.spring_group`; joints with equal mechanisms are computed together."""
         return self.mechanism
 
-    def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+    def deflections(self, unknowns: FloatArray) -> FloatArray:
+        """Return phi of motor 1; motor 2 has none, its position is the second unknown."""
+        return np.stack((unknowns[0], np.full_like(unknowns[0], np.nan)))
+
+    def motor_positions(self, unknowns: Components, q: FloatArray) -> FloatArray:
         """Return theta_1 = phi + q, and theta_2, which is the setting."""
-        return np.stack((phi[0] + q, phi[1]))
+        return np.stack((unknowns[0] + q, unknowns[1]))
 
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
-        """Compute deflection and setting on the mechanism's branch, their rates, and motor accelerations.
+    def unknowns(self, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return phi of motor 1 and theta_2."""
+        return phi[0], theta[1]
 
-        NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones.
-        """
-        stiffness, dstiffness, ddstiffness = (
-            command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
-        )
-        solution = self.solve(command.tau_e, stiffness, command.q)
-        phi, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)
-        state = self._state(phi, command.q)
-        rates = np.where(
-            reached.singular[..., None], np.nan, state.rates(command.dtau_e, dstiffness, command.dq)
-        )
-        return {
-            "stiffness": stiffness,
-            "dstiffness": dstiffness,
-            "ddstiffness": ddstiffness,
-            "phi": phi,
-            "dphi": rates[..., :2].T,
-            "ddtheta": state.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness).T,
-            "tau_transmission": state.tau_transmission.T,
-            "elastic_energy": state.energy,
-            "det_A": state.determinant(),
-            "stiffness_min": solution.lower,
-            "stiffness_max": solution.upper,
-            "flags": reached.flags,
-        }
-
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """Return the rates of the derivatives of the potential over theta_1 and theta_2."""
-        rates = of_joint["dphi"][0], of_joint["dtheta"][1], of_joint["dq"]
-        return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
-
-    def carried(self, of_joint: OfJoint) -> Carried:
-        """Return torque and stiffness of the mechanism.
-
-        The stiffness may be a small difference of two large terms, which the last digits of phi and of the
-        setting determine.
-        """
-        state = self._state_of(of_joint)
-        rows, size = state.rows, np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
-        turned = np.abs(rows.stiffness_1 * of_joint["phi"][0]) + np.abs(
-            rows.stiffness_2 * of_joint["theta"][1]
-        )
-        return Carried(state.tau_e, size, state.stiffness, state.stiffness + turned, state.tau_transmission.T)
+    def springs(self, unknowns: Components, q: FloatArray) -> MechanismState:
+        """Return the mechanism at a deflection and a setting."""
+        return self.mechanism.state(unknowns[0], unknowns[1], q)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
@@ -207,22 +159,6 @@ class Serial(Actuator):
     def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
         """See `Actuator.other_branch`: another branch of the mechanism."""
         return self.mechanism.other_branch(tau_e, stiffness, q)
-
-    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
-        """Return A^-1 (tau_e', sigma')."""
-        state = self._state(phi, command.q)
-        return state.rates(command.dtau_e, command.commanded["dstiffness"], command.dq)[..., :2].T
-
-    def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        """Return det A over (theta_1, theta_2)."""
-        return self._state(phi, q).determinant()
-
-    def _state(self, phi: FloatArray, q: FloatArray) -> MechanismState:
-        return self.mechanism.state(np.stack((*phi, q), axis=-1))
-
-    def _state_of(self, of_joint: OfJoint) -> MechanismState:
-        """Return the state at the motion of joint and motors."""
-        return self._state(np.stack((of_joint["phi"][0], of_joint["theta"][1])), of_joint["q"])
 
 
 class _Springs(Elasticity):
@@ -245,13 +181,13 @@ class _Springs(Elasticity):
 
     def torques(self, coordinates: FloatArray) -> Torques:
         """Return the derivatives of the potential."""
-        state = self._mechanism.state(coordinates)
-        return Torques(state.tau_e, state.tau_transmission)
+        state = self.state(coordinates)
+        return Torques(state.tau_e, np.stack(state.tau_transmission, axis=-1))
 
     def energy(self, coordinates: FloatArray) -> FloatArray:
         """Return the potential."""
-        return self._mechanism.state(coordinates).energy
+        return self.state(coordinates).energy
 
-    def state(self, coordinates: FloatArray) -> ElasticState:
+    def state(self, coordinates: FloatArray) -> MechanismState:
         """Return the potential with its derivatives."""
-        return self._mechanism.state(coordinates)
+        return self._mechanism.state(*(coordinates[..., number] for number in range(3)))

@@ -1,4 +1,4 @@
-"""One spring at each of several joints, for the equations of motion."""
+"""Single springs in motion: one spring at a joint, or at each of several joints."""
 
 from __future__ import annotations
 
@@ -6,9 +6,71 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
 from vsacli.actuators.laws.law import SpringRows, SpringState
 from vsacli.base.arrays import FloatArray
+
+
+class SingleSpring(ElasticState):
+    """State of a spring between the motor and the link; the coordinate is its deflection.
+
+    Args:
+        spring: State of the spring.
+        energy: Its energy.
+    """
+
+    def __init__(self, spring: SpringState, energy: FloatArray) -> None:
+        self._spring, self._energy = spring, energy
+
+    @property
+    def energy(self) -> FloatArray:
+        """Energy of the spring."""
+        return self._energy
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """Torque of the spring."""
+        return self._spring.tau
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of the spring."""
+        return self._spring.sigma
+
+    @property
+    def tau_transmission(self) -> tuple[FloatArray]:
+        """Torque of the spring."""
+        return (self._spring.tau,)
+
+    def torque_rate(self, rates: Components) -> FloatArray:
+        """Return sigma phi'."""
+        return self._spring.sigma * rates[0]
+
+    def stiffness_rate(self, rates: Components) -> FloatArray:
+        """Return zeta phi'; for a linear spring zero, not -0."""
+        return self._spring.zeta * rates[0] + 0.0
+
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
+        """Return eta phi'^2."""
+        return self._spring.eta * rates[0] * rates[0]
+
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray]:
+        """Return sigma phi'."""
+        return (self.torque_rate(rates),)
+
+    def rates(self, dtau_e: FloatArray, _dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray]:
+        """Return tau_e'/sigma; NaN where sigma is zero."""
+        return (dtau_e / self._divisor,)
+
+    def motor_accelerations(
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
+    ) -> tuple[FloatArray]:
+        """Return (tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
+        return ((ddtau_e - self._spring.zeta * rates[0] * rates[0]) / self._divisor + ddq,)
+
+    @property
+    def _divisor(self) -> FloatArray:
+        return np.where(self.stiffness == 0, np.nan, self.stiffness)
 
 
 class LinearRows:
@@ -50,47 +112,6 @@ class SingleSprings(Elasticity):
 
     def state(self, phi: FloatArray) -> ElasticState:
         """Return the spring with its derivatives."""
-        return _State(self._rows.state(phi))
-
-
-class _State(ElasticState):
-    """One spring of each joint, arrays (..., joints, 1)."""
-
-    def __init__(self, springs: SpringState) -> None:
-        self._springs = springs
-        self._one = SpringState(*(each[..., 0] for each in springs))
-
-    @property
-    def tau_e(self) -> FloatArray:
-        """Torque of the spring."""
-        return self._one.tau
-
-    @property
-    def stiffness(self) -> FloatArray:
-        """Stiffness of the spring."""
-        return self._one.sigma
-
-    @property
-    def tau_transmission(self) -> FloatArray:
-        """Torque of the spring."""
-        return self._springs.tau
-
-    def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """Return sigma phi'."""
-        return self._one.sigma * dphi[..., 0]
-
-    def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """Return zeta phi'; for a linear spring zero, not -0."""
-        return self._one.zeta * dphi[..., 0] + 0.0
-
-    def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
-        """Return eta phi'^2."""
-        return self._one.eta * dphi[..., 0] * dphi[..., 0]
-
-    def motor_accelerations(
-        self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
-    ) -> FloatArray:
-        """Return (tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
-        squared = dphi[..., 0] * dphi[..., 0]
-        divisor = np.where(self.stiffness == 0, np.nan, self.stiffness)
-        return ((ddtau_e - self._one.zeta * squared) / divisor + ddq)[..., None]
+        return SingleSpring(
+            SpringState(*(values[..., 0] for values in self._rows.state(phi))), self.energy(phi)
+        )

@@ -73,8 +73,8 @@ def single_motor(**variables: AnyArray) -> OfJoint:
     """Return the result of `Actuator.transmit` for one motor without a commanded stiffness.
 
     Args:
-        variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `ddtheta`, `tau_transmission`,
-            `elastic_energy` and `flags`, each (samples,).
+        variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `theta`, `dtheta`, `ddtheta`,
+            `tau_transmission`, `elastic_energy` and `flags`, each (samples,).
     """
     none = np.full_like(variables["phi"], np.nan)
     transmitted = {

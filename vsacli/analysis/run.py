@@ -304,7 +304,7 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections | None) ->
     return [
         DriftSummary(joint, index, stop)
         for index, (joint, stop) in enumerate(pairs)
-        if joint.actuator.integrable and joint.damper_at("transmission") is None
+        if "stiffness" in joint.actuator.commanded and joint.damper_at("transmission") is None
     ]
 
 

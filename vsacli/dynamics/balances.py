@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.elasticity import Components
 from vsacli.actuators.friction import REST, Friction
 from vsacli.actuators.motor import ELECTRICAL, JointMotor
 from vsacli.actuators.reach import OfJoint
@@ -44,14 +45,14 @@ Residual = tuple[FloatArray, FloatArray]
 
 
 def shaft_error(
-    joint: Joint, of_joint: OfJoint, tau_transmission: FloatArray, regular: BoolArray
+    joint: Joint, of_joint: OfJoint, tau_transmission: Components, regular: BoolArray
 ) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
         joint: Joint.
         of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
-        tau_transmission: Torque of the springs against each motor by their laws, (motors, samples).
+        tau_transmission: Torque of the springs against each motor by their laws, each (samples,).
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
@@ -61,7 +62,7 @@ def shaft_error(
     return reduce(np.maximum, errors)
 
 
-def _residuals(joint: Joint, of_joint: OfJoint, tau_transmission: FloatArray) -> Iterator[Residual]:
+def _residuals(joint: Joint, of_joint: OfJoint, tau_transmission: Components) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
         own = {name: of_joint[name][index] for name in ("tau_motor", "dtheta", "motor_power")}
         yield _torque_residual(joint, index, of_joint, tau_transmission[index])
@@ -294,15 +295,16 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
     tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
-    carried = joint.actuator.carried(of_joint)
-    of_shafts = shaft_error(joint, of_joint, carried.tau_transmission, regular)
-    of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, carried.stiffness_size, 1.0)
+    springs = joint.actuator.springs_of(of_joint)
+    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint["phi"], of_joint["theta"]))
+    of_shafts = shaft_error(joint, of_joint, springs.tau_transmission, regular)
+    of_stiffness = np.abs(springs.stiffness - stiffness) / np.where(regular, stiffness_size, 1.0)
     of_stiffness = np.where(regular, of_stiffness, 0.0)
-    size = np.maximum(carried.size, np.finfo(float).tiny)
+    size = np.maximum(size, np.finfo(float).tiny)
     if not joint.damper_at("transmission"):
-        of_torque = np.where(regular, np.abs(carried.tau_e - tau_e) / size, 0.0)
+        of_torque = np.where(regular, np.abs(springs.tau_e - tau_e) / size, 0.0)
         return of_stiffness, of_torque, None, of_shafts
-    residual = np.abs(carried.tau_e + of_joint["tau_damper"] - tau_e)
+    residual = np.abs(springs.tau_e + of_joint["tau_damper"] - tau_e)
     residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
     size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
     return of_stiffness, np.where(regular, residual, 0.0), size, of_shafts

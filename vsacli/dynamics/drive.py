@@ -1,7 +1,6 @@
 """Actuation of a joint, (61)-(74): stiffness, motor motion and motor torques, for every kind of actuator.
 
-`Actuator.transmit` computes (61)-(68) and (70)-(72), `driven_by` adds (69) and (73)-(74), and `drive` the
-flags of limits.
+`Actuator.transmit` computes (61)-(72), `driven_by` adds (73)-(74), and `drive` the flags of limits.
 """
 
 from __future__ import annotations
@@ -81,12 +80,12 @@ def driven_by(
     """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
     if internal is None:
-        found = dict(actuator.transmit(command, min_margin, integrated))  # (61)-(68), (70)-(72)
+        found = dict(actuator.transmit(command, min_margin, integrated))  # (61)-(72)
     else:
         from vsacli.actuators.damped_springs import DampedSprings
 
         found = dict(DampedSprings(actuator).transmit(command, internal, min_margin))
-    dtheta = actuator.motor_positions(found["dphi"], command.dq)  # (69)
+    dtheta = found["dtheta"]
     tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_transmission"])
     tau_damper, beside = _damper_torques(joint, command, found["dphi"])
     if tau_damper is not None:
@@ -96,10 +95,7 @@ def driven_by(
     windings = Windings.of(actuator.sides)
     if windings is not None:
         found |= windings.with_axis_behind().variables(tau_motor, dtheta)
-    found["theta"] = actuator.motor_positions(found["phi"], command.q)  # (69)
-    found |= {"dtheta": dtheta, "tau_motor": tau_motor, "motor_power": tau_motor * dtheta}
-    # Until here phi may include what a motor sets, such as a serial actuator's theta_2: no spring deflection.
-    found |= {name: _published(actuator, found[name]) for name in ("phi", "dphi")}
+    found |= {"tau_motor": tau_motor, "motor_power": tau_motor * dtheta}
     return {name: found[name] for name in (*ACTUATED, *(each for each in OF_DEVICES if each in found))}
 
 
@@ -151,12 +147,6 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
     explained = infeasible | (theta & tau_transmission & (singular | power))
     demand = finite([of_joint["tau_e"], *(of_joint[key] for key in joint.commanded)])
     return ~(demand & explained)
-
-
-def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
-    """Return phi of the motors behind a spring; NaN for a motor that adjusts the springs."""
-    there = actuator.has(VARIABLES["phi"])[: actuator.motor_count]
-    return phi if all(there) else np.where(np.array(actuator.has(VARIABLES["phi"]))[:, None], phi, np.nan)
 
 
 def _by_motor(values: list[float]) -> FloatArray:

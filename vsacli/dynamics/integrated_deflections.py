@@ -20,6 +20,7 @@ from vsacli.actuators.reach import reach_flags
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
+from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -40,7 +41,7 @@ FOLLOWED, SINGULAR, UNATTAINABLE, STALLED = range(len(REASONS))
 
 def integrable(joint: Joint) -> bool:
     """Return whether (19) applies to a joint; with a parallel damper, deflections are integrated anyway."""
-    return joint.actuator.integrable and joint.damper_at("transmission") is None
+    return STIFFNESS.key in joint.actuator.commanded and joint.damper_at("transmission") is None
 
 
 class Task:
@@ -69,7 +70,7 @@ class Task:
         """Return the rates of the deflections of some joints, (19)."""
         return np.stack(
             [
-                actuator.deflection_rates(of_joint, command)
+                _rates_of_unknowns(actuator, command, of_joint)
                 for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
@@ -95,11 +96,18 @@ def _root(actuator: Actuator, command: Command) -> PairSolution:
     return actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
 
 
+def _rates_of_unknowns(actuator: Actuator, command: Command, phi: FloatArray) -> FloatArray:
+    dstiffness = command.commanded[STIFFNESS.names[1]]
+    return np.stack(actuator.springs(phi, command.q).rates(command.dtau_e, dstiffness, command.dq)[:SIDES])
+
+
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
     solution = _root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
-    here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
+    here, on_branch = (
+        np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
+    )
     singular = has(flags, Flag.SINGULAR) | (here != on_branch)
     return np.where(has(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 

@@ -294,7 +294,7 @@ class March:
                     _largest(there.slope),
                 )
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
-            missing = command.tau_e - there.state.tau_e[..., 0] - damping * rate
+            missing = command.tau_e - there.state.tau_e - damping * rate
             slope = there.slope
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
             step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)

@@ -81,6 +81,8 @@ class Polynomial(SpringLaw):
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Return deflection and state by one iteration."""
+        if self.is_linear:
+            return torque / self.c1, self.state(torque / self.c1)
         load = np.abs(torque)
         bounds = [
             (load / coefficient) ** (1 / (2 * index + 1))

@@ -9,12 +9,16 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vsacli.actuators.elasticity import ElasticState
+from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import check_fields
 from vsacli.documents.source import Source
+
+SMALL_DEFLECTION = 1e-3
+"""Deflection, rad (m), whose torque is large compared with rounding. The load of motor 1 passes through zero,
+where the torque itself is no scale for its error."""
 
 
 class Partials(NamedTuple):
@@ -43,53 +47,27 @@ class Partials(NamedTuple):
     T_pss: FloatArray
 
 
-class DecouplingRows(NamedTuple):
-    """The matrix A = d(tau_e, sigma)/d(theta_1, theta_2); arrays of one shape."""
-
-    torque_1: FloatArray
-    torque_2: FloatArray
-    stiffness_1: FloatArray
-    stiffness_2: FloatArray
-
-    @property
-    def determinant(self) -> FloatArray:
-        """Zero where A is singular."""
-        return self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
-
-    def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return A^-1 times a right-hand side; NaN where A is singular."""
-        determinant = self.determinant
-        divisor = np.where(determinant == 0, np.nan, determinant)
-        return (
-            (self.stiffness_2 * torque_row - self.torque_2 * stiffness_row) / divisor,
-            (self.torque_1 * stiffness_row - self.stiffness_1 * torque_row) / divisor,
-        )
-
-
 class MechanismState(ElasticState):
-    """State of a serial actuator's springs at coordinates, for inverse and forward dynamics."""
+    """State of a serial actuator's springs; the coordinates are phi, theta_2 and q."""
 
     @property
     @abstractmethod
-    def energy(self) -> FloatArray:
-        """Elastic energy U."""
-
-    @property
-    @abstractmethod
-    def rows(self) -> DecouplingRows:
+    def matrix(self) -> MotorMatrix:
         """The matrix A."""
 
-    @abstractmethod
-    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the coordinates' rates for rates of torque and stiffness, (68); NaN where A is singular."""
-
-    @abstractmethod
-    def spring_rates(self, rates: FloatArray) -> FloatArray:
-        """Return the rates of the torques against the motors, (..., 2), from rates of the coordinates."""
-
+    @property
     def determinant(self) -> FloatArray:
-        """Return det A."""
-        return self.rows.determinant
+        """Det A."""
+        return self.matrix.determinant
+
+    def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:
+        """Return the sizes of torque and stiffness.
+
+        The stiffness may be a small difference of two large terms, which the last digits of phi and of the
+        setting determine.
+        """
+        turned = np.abs(self.matrix.stiffness_1 * unknowns[0]) + np.abs(self.matrix.stiffness_2 * unknowns[1])
+        return np.abs(self.tau_e) + SMALL_DEFLECTION * self.stiffness, self.stiffness + turned
 
 
 class DeflectionState(MechanismState):
@@ -114,52 +92,49 @@ class DeflectionState(MechanismState):
         return self._partials.T_p
 
     @property
-    def tau_transmission(self) -> FloatArray:
+    def tau_transmission(self) -> tuple[FloatArray, ...]:
         """T against motor 1, which carries the load; U_s against motor 2."""
-        return np.stack((self._partials.T, self._partials.setting_torque), axis=-1)
+        return self._partials.T, self._partials.setting_torque
 
     @property
-    def rows(self) -> DecouplingRows:
+    def matrix(self) -> MotorMatrix:
         """Derivatives of T and T_p over phi and s."""
         p = self._partials
-        return DecouplingRows(p.T_p, p.T_s, p.T_pp, p.T_ps)
+        return MotorMatrix(p.T_p, p.T_s, p.T_pp, p.T_ps)
 
-    def torque_rate(self, rates: FloatArray) -> FloatArray:
+    def torque_rate(self, rates: Components) -> FloatArray:
         """Return T_p phi' + T_s s'."""
-        p = self._partials
-        return p.T_p * rates[..., 0] + p.T_s * rates[..., 1]
+        return self._partials.T_p * rates[0] + self._partials.T_s * rates[1]
 
-    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
+    def stiffness_rate(self, rates: Components) -> FloatArray:
         """Return T_pp phi' + T_ps s'."""
-        p = self._partials
-        return p.T_pp * rates[..., 0] + p.T_ps * rates[..., 1]
+        return self._partials.T_pp * rates[0] + self._partials.T_ps * rates[1]
 
-    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
         """Return T_ppp phi'^2 + 2 T_pps phi' s' + T_pss s'^2."""
-        p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
+        p, dphi, ds = self._partials, rates[0], rates[1]
         return p.T_ppp * dphi * dphi + 2 * p.T_pps * dphi * ds + p.T_pss * ds * ds
 
-    def spring_rates(self, rates: FloatArray) -> FloatArray:
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray, ...]:
         """Return the rates of T and U_s."""
         p = self._partials
-        of_setting = p.T_s * rates[..., 0] + p.setting_stiffness * rates[..., 1]
-        return np.stack((self.torque_rate(rates), of_setting), axis=-1)
+        return self.torque_rate(rates), p.T_s * rates[0] + p.setting_stiffness * rates[1]
 
-    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return A^-1 (tau_e', sigma')."""
-        return np.stack((*self.rows.solve(dtau_e, dstiffness), dq), axis=-1)
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
+        """Return A^-1 (tau_e', sigma'), and q'."""
+        return *self.matrix.solve(dtau_e, dstiffness), dq
 
     def motor_accelerations(
-        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
-    ) -> FloatArray:
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> tuple[FloatArray, ...]:
         """Return A^-1 of (tau_e'', sigma'') minus terms quadratic in the rates; theta_1'' = phi'' + q''."""
-        p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
+        p, dphi, ds = self._partials, rates[0], rates[1]
         squared, mixed, of_setting = dphi * dphi, 2 * dphi * ds, ds * ds
-        ddphi, dds = self.rows.solve(
+        ddphi, dds = self.matrix.solve(
             ddtau_e - (p.T_pp * squared + p.T_ps * mixed + p.T_ss * of_setting),
             ddstiffness - (p.T_ppp * squared + p.T_pps * mixed + p.T_pss * of_setting),
         )
-        return np.stack((ddphi + ddq, dds), axis=-1)
+        return ddphi + ddq, dds
 
 
 Range: TypeAlias = tuple[float, float]
@@ -260,6 +235,6 @@ class Mechanism(ABC):
         """Return the potential and its derivatives at deflections and settings, arrays of one shape."""
         raise NotImplementedError(f"{type(self).__name__} depends on more than phi and the setting")
 
-    def state(self, coordinates: FloatArray) -> MechanismState:
-        """Return the springs at coordinates (..., 3): phi, theta_2 and q."""
-        return DeflectionState(self.partials(coordinates[..., 0], coordinates[..., 1]))
+    def state(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> MechanismState:  # noqa: ARG002
+        """Return the springs at deflections, settings and joint positions, arrays of one shape."""
+        return DeflectionState(self.partials(phi, s))

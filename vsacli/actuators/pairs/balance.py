@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw, SpringState, state_of
-from vsacli.actuators.pairs.joints import Sides
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, subroutine
+
+Sides = tuple[FloatArray, FloatArray]
+"""A quantity of sides 1 and 2, each a motor with its spring."""
 
 
 class PairState(NamedTuple):

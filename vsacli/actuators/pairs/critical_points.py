@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.balance import Balance, PairState
+from vsacli.actuators.pairs.balance import Balance, PairState, Sides
 from vsacli.actuators.pairs.bracketing import bracketed_root
-from vsacli.actuators.pairs.joints import Sides
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.compute.control_flow import Values
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.laws.law import PairSolution, SpringLaw, SpringState
+from vsacli.actuators.laws.law import PairSolution, SpringLaw
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -57,11 +57,6 @@ class PairOnBranch:
         if self.branch == "negative":
             return make_pair(second, first).solve(tau_e, stiffness).exchanged()
         return make_pair(first, second).solve(tau_e, stiffness)
-
-    def states(self, phi_1: FloatArray, phi_2: FloatArray) -> tuple[SpringState, SpringState]:
-        """Return the states of both springs at their deflections."""
-        first, second = self.laws
-        return first.state(phi_1), second.state(phi_2)
 
     @property
     def opposite(self) -> str | None:

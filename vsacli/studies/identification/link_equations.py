@@ -214,7 +214,7 @@ def _carried(
     own = [each if each.joint == index else None for each in springs]
     chosen = [each for each in own if each is not None]
     carrying = apart(seeded(robot, chosen).joints[index]).actuator
-    torque = carrying.carried(joint_motion(signals, index)).tau_e
+    torque = carrying.springs_of(joint_motion(signals, index)).tau_e
     slopes = np.zeros((len(springs), len(signals.time)))
     slopes[[each is not None for each in own]] = tangent_of(torque, len(chosen), signals.time.shape)
     return value_of(torque), slopes

@@ -145,7 +145,7 @@ def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
 
     They are NaN for a motor that does not exist.
     """
-    tau_transmission = actuator.carried(motion).tau_transmission
+    tau_transmission = np.stack(actuator.springs_of(motion).tau_transmission)
     missing = np.full((SIDES - len(tau_transmission), *tau_transmission.shape[1:]), np.nan)
     against = np.concatenate((tau_transmission, missing))
     return motor_torques(actuator, motion["dtheta"], motion["ddtheta"], against)

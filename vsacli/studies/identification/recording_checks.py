@@ -186,8 +186,8 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
     stride = signals.filter.stride
     q, theta = signals.q[::stride, index], signals.theta[::stride, index]
     phi = Drivetrain([actuator]).deflections(q[:, None], theta).T
-    carried = actuator.carried({"q": q, "theta": theta.T, "phi": phi})
-    on_branch = actuator.solve(carried.tau_e, carried.stiffness, q).deflections
+    springs = actuator.springs(phi, q)
+    on_branch = actuator.solve(springs.tau_e, springs.stiffness, q).deflections
     off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)
     if np.mean(off) > 1 / 2:
         yield (

@@ -66,7 +66,7 @@ def _recorded_motion(robot: Robot, signals: Signals) -> Motion:
     stiffness = np.full_like(signals.q, np.nan)
     for index, actuator in enumerate(robot.actuators):
         if STIFFNESS.key in actuator.commanded:
-            stiffness[:, index] = value_of(actuator.carried(joint_motion(signals, index)).stiffness)
+            stiffness[:, index] = value_of(actuator.springs_of(joint_motion(signals, index)).stiffness)
     of_time = (
         *(signals.time, signals.q, signals.dq, signals.ddq, *spline_derivatives(signals.time, signals.ddq)),
         *(stiffness, *spline_derivatives(signals.time, stiffness)),

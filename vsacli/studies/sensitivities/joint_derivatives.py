@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.elasticity import MotorMatrix
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.reach import margin
 from vsacli.actuators.transmission import Command
@@ -78,11 +79,8 @@ class ImplicitSolution:
         if self._actuator.motor_count == 1:
             alone: Any = self._dual(found.phi_1, torque / slopes.torque[0])
             return found._replace(phi_1=alone)
-        (torque_1, torque_2), (stiffness_1, stiffness_2) = slopes.torque, slopes.stiffness
-        determinant = torque_1 * stiffness_2 - torque_2 * stiffness_1
-        with np.errstate(divide="ignore", invalid="ignore"):
-            dphi_1 = (stiffness_2 * torque - torque_2 * change) / determinant
-            dphi_2 = (-stiffness_1 * torque + torque_1 * change) / determinant
+        with np.errstate(invalid="ignore"):
+            dphi_1, dphi_2 = MotorMatrix(*slopes.torque, *slopes.stiffness).solve(torque, change)
         derived: dict[str, Any] = {
             "phi_1": self._dual(found.phi_1, dphi_1),
             "phi_2": self._dual(found.phi_2, dphi_2),
@@ -96,10 +94,9 @@ class ImplicitSolution:
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
         last = self._directions - len(phi)
         deflections: Any = np.stack(seeds(phi, last))  # type: ignore[arg-type]
-        theta = self._carrying.motor_positions(deflections, q)
-        carried = self._carrying.carried({"phi": deflections, "theta": theta, "q": q})
+        springs = self._carrying.springs(deflections, q)
         torque, stiffness = (
-            tangent_of(each, self._directions, q.shape) for each in (carried.tau_e, carried.stiffness)
+            tangent_of(each, self._directions, q.shape) for each in (springs.tau_e, springs.stiffness)
         )
         none = np.zeros((len(phi), *q.shape))
         by_directions = (np.concatenate((each[:last], none)) for each in (torque, stiffness))

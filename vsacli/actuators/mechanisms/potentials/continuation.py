@@ -128,8 +128,8 @@ class LevelCurves:
 
     def spot(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> Spot:
         """Return the point at a deflection, a position of motor 2 and one of the joint."""
-        u = self._potential.derivatives(np.stack((phi, s, q), axis=-1), ROWS)
-        rows, (by_phi, by_s) = u.rows, self._width
+        u = self._potential.derivatives((phi, s, q), ROWS)
+        rows, (by_phi, by_s) = u.matrix, self._width
         return Spot(
             phi,
             s,

@@ -129,7 +129,7 @@ class Potential(Mechanism):
         ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
         axes = [low + (high - low) * shares for low, high in ends]
         far = [(axis - at) / (high - low) for axis, at, (low, high) in zip(axes, start, ends, strict=True)]
-        grid = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1)
+        grid = np.meshgrid(*axes, [0.0], indexing="ij")
         with np.errstate(all="ignore"):
             lost = ~self._potential.derivatives(grid, ACCELERATIONS).finite[..., 0]
         if lost.any():
@@ -149,9 +149,9 @@ class Potential(Mechanism):
         """See `Mechanism.solve`; on the branch of the start."""
         return self._branch.solve(tau_e, stiffness, q)
 
-    def state(self, coordinates: FloatArray) -> PotentialState:
+    def state(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> PotentialState:
         """Return the potential with its derivatives."""
-        return PotentialState(self._potential, coordinates)
+        return PotentialState(self._potential, (phi, s, q))
 
     @cached_property
     def _potential(self) -> PotentialEnergy:
@@ -202,7 +202,7 @@ class Potential(Mechanism):
         start = self._branch.start
         with np.errstate(all="ignore"):
             (sine,), (stiffness,) = np.abs(start.sine), start.stiffness
-            at_start = np.array([[self.start.theta_1, self.start.theta_2, 0.0]])
+            at_start = np.array([[self.start.theta_1], [self.start.theta_2], [0.0]])
             known = self._potential.derivatives(at_start, ACCELERATIONS).finite
         if not known.all():
             reason = "the energy or one of its first four derivatives is not finite here"

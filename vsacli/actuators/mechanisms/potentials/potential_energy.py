@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.actuators.mechanisms.mechanism import DecouplingRows, MechanismState
+from vsacli.actuators.elasticity import Components, MotorMatrix
+from vsacli.actuators.mechanisms.mechanism import MechanismState
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.jets import FUNCTIONS, Order, Truncation
 from vsacli.documents.expression import Expression, Grammar, parse
@@ -62,19 +63,20 @@ class PotentialEnergy:
         self._constants = {name: np.float64(number) for name, number in constants.items()}
         self._row_functions: dict[Truncation, RowFunction] = {}
 
-    def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
-        """Return the derivatives by q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
+    def derivatives(self, coordinates: Components, truncation: Truncation) -> Derivatives:
+        """Return the derivatives by q, theta_1 and theta_2 at coordinates phi, theta_2 and q.
 
         For numbers, a program traced from the series is run: the series itself would take ten times as long,
         for bookkeeping of the orders.
         """
-        rows = [coordinates[..., number] for number in range(3)]
-        if not isinstance(coordinates, np.ndarray):
-            return Derivatives(dict(zip(truncation.orders, self._series(rows, truncation), strict=True)))
+        if not all(isinstance(each, np.ndarray) for each in coordinates):
+            return Derivatives(
+                dict(zip(truncation.orders, self._series(coordinates, truncation), strict=True))
+            )
         if truncation not in self._row_functions:
             self._row_functions[truncation] = self._traced(truncation)
-        function, shape = self._row_functions[truncation], coordinates.shape[:-1]
-        flat = [row.ravel() for row in rows]
+        function, shape = self._row_functions[truncation], coordinates[0].shape
+        flat = [np.ravel(each) for each in coordinates]
         values = np.empty((len(truncation.orders), flat[0].size))
         function(flat, values, function.workspace(flat[0].size))
         return Derivatives(dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True)))
@@ -85,7 +87,7 @@ class PotentialEnergy:
 
         return RowFunction(trace(lambda rows: self._series(rows, truncation), [Kind.REAL] * 3))
 
-    def _series(self, coordinates: Sequence[FloatArray], truncation: Truncation) -> list[FloatArray]:
+    def _series(self, coordinates: Components, truncation: Truncation) -> list[FloatArray]:
         """Return the derivatives in the truncation's order, from rows of phi, theta_2 and q."""
         phi, s, q = coordinates
         names = {
@@ -117,9 +119,9 @@ class Derivatives:
         return np.asarray(np.isfinite(list(self._by_order.values())).all(axis=0))
 
     @property
-    def rows(self) -> DecouplingRows:
+    def matrix(self) -> MotorMatrix:
         """The matrix A of tau_e = -U_q and the stiffness U_qq over theta_1 and theta_2."""
-        return DecouplingRows(-self(0, 1), -self(0, 2), self(0, 0, 1), self(0, 0, 2))
+        return MotorMatrix(-self(0, 1), -self(0, 2), self(0, 0, 1), self(0, 0, 2))
 
 
 class PotentialState(MechanismState):
@@ -131,7 +133,7 @@ class PotentialState(MechanismState):
         A theta'' = y'' - y_q q'' - (x'^T H x' of either), H the second derivatives of y over x.
     """
 
-    def __init__(self, potential: PotentialEnergy, coordinates: FloatArray) -> None:
+    def __init__(self, potential: PotentialEnergy, coordinates: Components) -> None:
         self._potential, self._coordinates = potential, coordinates
 
     @cached_property
@@ -158,58 +160,58 @@ class PotentialState(MechanismState):
         return self._all(0, 0)
 
     @property
-    def tau_transmission(self) -> FloatArray:
+    def tau_transmission(self) -> tuple[FloatArray, ...]:
         """Derivatives of U over theta_1 and theta_2."""
-        return np.stack((self._first(1), self._first(2)), axis=-1)
+        return self._first(1), self._first(2)
 
     @property
-    def rows(self) -> DecouplingRows:
+    def matrix(self) -> MotorMatrix:
         """Derivatives of tau_e and the stiffness over theta_1 and theta_2."""
-        return self._all.rows
+        return self._all.matrix
 
-    def torque_rate(self, rates: FloatArray) -> FloatArray:
+    def torque_rate(self, rates: Components) -> FloatArray:
         """Return the rate of -U_q."""
         return -self._rate((0,), rates)
 
-    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
+    def stiffness_rate(self, rates: Components) -> FloatArray:
         """Return the rate of U_qq."""
         return self._rate((0, 0), rates)
 
-    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
         """Return the terms of U_qq'' that are quadratic in the rates of x."""
         return self._curvature((0, 0), rates)
 
-    def spring_rates(self, rates: FloatArray) -> FloatArray:
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray, ...]:
         """Return the rates of the derivatives by theta_1 and theta_2."""
-        return np.stack((self._rate((1,), rates), self._rate((2,), rates)), axis=-1)
+        return self._rate((1,), rates), self._rate((2,), rates)
 
-    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
         """Return A^-1 (y' - y_q q'), with phi' = theta_1' - q'."""
         u = self._all
-        dtheta_1, dtheta_2 = self.rows.solve(dtau_e + u(0, 0) * dq, dstiffness - u(0, 0, 0) * dq)
-        return np.stack((dtheta_1 - dq, dtheta_2, dq), axis=-1)
+        dtheta_1, dtheta_2 = self.matrix.solve(dtau_e + u(0, 0) * dq, dstiffness - u(0, 0, 0) * dq)
+        return dtheta_1 - dq, dtheta_2, dq
 
     def motor_accelerations(
-        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
-    ) -> FloatArray:
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> tuple[FloatArray, ...]:
         """Return A^-1 of y'' - y_q q'' minus the terms quadratic in the rates."""
         u = self._all
         torque_row = ddtau_e + u(0, 0) * ddq + self._curvature((0,), rates)
         stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self.stiffness_curvature(rates)
-        return np.stack(self.rows.solve(torque_row, stiffness_row), axis=-1)
+        return self.matrix.solve(torque_row, stiffness_row)
 
-    def _rate(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
+    def _rate(self, of: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the rate of a derivative of the potential."""
-        return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0]))
+        return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[0]))
 
-    def _curvature(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
+    def _curvature(self, of: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the terms quadratic in the rates of the second time derivative of a partial derivative."""
         return sum(
-            (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0])
+            (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[0])
         )
 
 
-def _motion(rates: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+def _motion(rates: Components) -> Iterator[tuple[int, FloatArray]]:
     """Return the rates of q, theta_1 and theta_2 by index, from rates of the coordinates."""
-    dphi, ds, dq = (rates[..., number] for number in range(3))
+    dphi, ds, dq = rates
     return enumerate((dq, dphi + dq, ds))

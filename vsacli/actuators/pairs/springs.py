@@ -1,0 +1,127 @@
+"""Pairs of springs in motion: torque, stiffness, decoupling matrix A and motor accelerations, (62)-(72)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, MotorMatrix, Torques
+from vsacli.actuators.laws.law import SpringLaw, SpringRows, SpringState
+from vsacli.base.arrays import FloatArray
+
+
+class PairSprings(ElasticState):
+    """State of two springs, each between a motor and the link; the coordinates are their deflections.
+
+    Args:
+        one: State of spring 1 (62)-(64), (66).
+        two: State of spring 2.
+        energy: Energy of all springs.
+        coupling: State of a spring between the motors, over phi_1 - phi_2, if there is one.
+    """
+
+    def __init__(
+        self, one: SpringState, two: SpringState, energy: FloatArray, coupling: SpringState | None = None
+    ) -> None:
+        self._one, self._two, self._energy, self._coupling = one, two, energy, coupling
+
+    @property
+    def energy(self) -> FloatArray:
+        """Energy of all springs."""
+        return self._energy
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """Sum of the torques of both springs; a coupling exerts none on the link."""
+        return self._one.tau + self._two.tau
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Sum of both stiffnesses."""
+        return self._one.sigma + self._two.sigma
+
+    @property
+    def tau_transmission(self) -> tuple[FloatArray, FloatArray]:
+        """Torque of each spring, and of the coupling, which acts on the motors in opposite directions."""
+        if self._coupling is None:
+            return self._one.tau, self._two.tau
+        return self._one.tau + self._coupling.tau, self._two.tau - self._coupling.tau
+
+    @property
+    def _matrix(self) -> MotorMatrix:
+        """The matrix A: stiffness and slope of each spring."""
+        return MotorMatrix(self._one.sigma, self._two.sigma, self._one.zeta, self._two.zeta)
+
+    @property
+    def determinant(self) -> FloatArray:
+        """Det A (67)."""
+        return self._matrix.determinant
+
+    def sizes(self, _unknowns: Components) -> tuple[FloatArray, FloatArray]:
+        """Return the sum of the sizes of both torques, and the stiffness."""
+        return np.abs(self._one.tau) + np.abs(self._two.tau), self.stiffness
+
+    def torque_rate(self, rates: Components) -> FloatArray:
+        """Return the sum of sigma_k phi_k' (17)."""
+        return self._one.sigma * rates[0] + self._two.sigma * rates[1]
+
+    def stiffness_rate(self, rates: Components) -> FloatArray:
+        """Return the sum of zeta_k phi_k' (18)."""
+        return self._one.zeta * rates[0] + self._two.zeta * rates[1]
+
+    def stiffness_curvature(self, rates: Components) -> FloatArray:
+        """Return the sum of eta_k phi_k'^2, of (22)."""
+        return self._one.eta * (rates[0] * rates[0]) + self._two.eta * (rates[1] * rates[1])
+
+    def transmission_rates(self, rates: Components) -> tuple[FloatArray, FloatArray]:
+        """Return sigma_k phi_k' of each side, with the rate of the coupling."""
+        of_one, of_two = self._one.sigma * rates[0], self._two.sigma * rates[1]
+        if self._coupling is None:
+            return of_one, of_two
+        between = self._coupling.sigma * (rates[0] - rates[1])
+        return of_one + between, of_two - between
+
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray, ...]:
+        """Return A^-1 (tau_e', sigma'), (68)."""
+        return self._matrix.solve(dtau_e, dstiffness)
+
+    def motor_accelerations(
+        self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return A^-1 beta (72), with the sums (11) and (65)."""
+        one, two = self._one, self._two
+        squared_1, squared_2 = rates[0] * rates[0], rates[1] * rates[1]
+        return self._matrix.solve(
+            ddtau_e - (one.zeta * squared_1 + two.zeta * squared_2) + (one.sigma + two.sigma) * ddq,  # (70)
+            ddstiffness - (one.eta * squared_1 + two.eta * squared_2) + (one.zeta + two.zeta) * ddq,  # (71)
+        )
+
+
+class PairElasticity(Elasticity):
+    """Two springs at each of several joints, and a coupling that is equal at all of them, if there is one."""
+
+    def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]], coupling: SpringLaw | None) -> None:
+        self._springs, self._coupling = SpringRows(pairs), coupling
+
+    def torques(self, phi: FloatArray) -> Torques:
+        """Return the torques; each spring exerts the same torque on the link as against its motor."""
+        tau = self._springs.torque(phi)
+        tau_e = tau[..., 0] + tau[..., 1]
+        if self._coupling is None:
+            return Torques(tau_e, tau)
+        between = self._coupling.torque(phi[..., 0] - phi[..., 1])
+        return Torques(tau_e, tau + np.stack((between, -between), axis=-1))
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Return the sum over all springs."""
+        of_side = self._springs.energy(phi)
+        energy = of_side[..., 0] + of_side[..., 1]
+        return energy if self._coupling is None else energy + self._coupling.energy(phi[..., 0] - phi[..., 1])
+
+    def state(self, phi: FloatArray) -> ElasticState:
+        """Return the springs with their derivatives."""
+        springs = self._springs.state(phi)
+        one, two = (SpringState(*(values[..., side] for values in springs)) for side in range(2))
+        coupling = None if self._coupling is None else self._coupling.state(phi[..., 0] - phi[..., 1])
+        return PairSprings(one, two, self.energy(phi), coupling)
