@@ -150,7 +150,7 @@ def test_wrench_counts_in_either_frame(frame: str):
 @pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 def test_robots_that_differ_in_a_limit_alone_are_told_apart():
-    """Springs compare equal whatever their limits, for pairs of them to be alike."""
+    """The springs have equal torques, so that pairs of them are alike."""
     motion = demands(one_joint(ALIKE, ALIKE), SAMPLES)
     beyond = []
     for largest in (0.3, 0.4):

@@ -58,10 +58,10 @@ class Elastic(Actuator):
 
     @cached_property
     def law(self) -> SpringLaw:
-        """Law of the spring."""
+        """Law of the spring, without its limit."""
         if self.stiffness is None:
             assert self.spring is not None, "see __post_init__"
-            return self.spring
+            return self.spring.unlimited
         from vsacli.actuators.laws.polynomial import Polynomial
 
         return Polynomial(c1=self.stiffness)

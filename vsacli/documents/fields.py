@@ -88,15 +88,13 @@ NON_ZERO = Check(
 FINITE = Check(lambda value: abs(value) < math.inf, "finite")
 
 
-def _declare(field: Field, default: Any, **options: Any) -> Any:
-    return dataclasses.field(default=default, metadata={"field": field}, kw_only=True, **options)
+def _declare(field: Field, default: Any) -> Any:
+    return dataclasses.field(default=default, metadata={"field": field}, kw_only=True)
 
 
-def number(
-    unit: Quantity, doc: str, *, check: Check = FINITE, default: Any = REQUIRED, compare: bool = True
-) -> Any:
-    """Declare a number; `compare=False` excludes it from the equality of records."""
-    return _declare(Field(Number(unit), doc, check), default, compare=compare)
+def number(unit: Quantity, doc: str, *, check: Check = FINITE, default: Any = REQUIRED) -> Any:
+    """Declare a number."""
+    return _declare(Field(Number(unit), doc, check), default)
 
 
 def integer(doc: str, *, check: Check, default: Any = REQUIRED) -> Any:

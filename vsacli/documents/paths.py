@@ -243,7 +243,7 @@ class _Replacement(NamedTuple):
     def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         word, *rest = words
-        if _same(*content):
+        if content[0] == content[1]:
             both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
             return both, both
         if word != ALL:
@@ -276,10 +276,3 @@ def _written(record: Any) -> tree.Mapping:
     contents = {name: getattr(record, name) for name in declared(type(record))}
     simple = {name: _node(entry) for name, entry in contents.items() if isinstance(entry, str | int | float)}
     return tree.Mapping(0, simple, dict.fromkeys(simple, 0))
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Return whether two records agree in every declared field, including fields excluded from equality."""
-    if type(one) is not type(other):
-        return False
-    return one is other or all(getattr(one, name) == getattr(other, name) for name in declared(type(one)))

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, by_joint, checked_shape
 from vsacli.base.errors import InputError
-from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.control_flow import Keyed, call
@@ -211,7 +210,7 @@ def link_torques(
     return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
 
 
-@cached_by_identity(KEPT_PROGRAMS)
+@lru_cache(KEPT_PROGRAMS)
 def _kernel(robot: Robot, frame: str | None) -> LinkTorques:
     return LinkTorques(robot, frame)
 

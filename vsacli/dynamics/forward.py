@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,6 @@ import numpy.typing as npt
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import BoolArray, FloatArray, checked_shape
 from vsacli.base.errors import InputError, check_type
-from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import Wrench, check_wrench
 from vsacli.compute.engine import KEPT_PROGRAMS
@@ -102,7 +102,7 @@ def state_derivative(
     return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
 
 
-@cached_by_identity(KEPT_PROGRAMS)
+@lru_cache(KEPT_PROGRAMS)
 def plant_of(robot: Robot, frame: str | None = None) -> Plant:
     """Return the plant of a robot, prepared once for many calls; see `Plant`."""
     return Plant(robot, frame)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
 from itertools import repeat
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -17,12 +17,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import LimitCheck, OfJoint
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import MIN_MARGIN
-from vsacli.base.identity_cache import cached_by_identity
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
@@ -90,18 +89,12 @@ class InverseDynamics(BlockKernel):
         frame: Frame of the wrench; None without a wrench.
         min_margin: Margin below which a sample is near-singular.
         deflections: Deflections that are inputs; where a joint has several, the last counts.
-        limits: Limits of each joint; a field, since springs compare equal whatever their limits.
     """
 
     robot: Robot
     frame: str | None = None
     min_margin: float = MIN_MARGIN
     deflections: tuple[IntegratedRows | InternalRows, ...] = ()
-    limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        limits = tuple(tuple(limit_checks(joint)) for joint in self.robot.joints)
-        object.__setattr__(self, "limits", limits)
 
     @cached_property
     def links(self) -> LinkTorques:
@@ -150,10 +143,12 @@ class InverseDynamics(BlockKernel):
             (command, self.min_margin, *self._deflections(index, inputs))
             for index, command in enumerate(commands)
         ]
-        driven = call_at_joints(rows[0], drive, joints, arguments, self.limits)  # (61)-(74)
+        driven = call_at_joints(
+            rows[0], drive, joints, arguments, [joint.limits for joint in joints]
+        )  # (61)-(74)
         of_joints = [{**command.arrays(), **motors} for command, motors in zip(commands, driven, strict=True)]
-        for limits, of_joint in zip(self.limits, of_joints, strict=True):
-            _check_limits(limits, of_joint)
+        for joint, of_joint in zip(joints, of_joints, strict=True):
+            _check_limits(joint, of_joint)
         if "dissipated_power" in self.variables:
             powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
             for of_joint, power in zip(of_joints, powers, strict=True):
@@ -178,9 +173,9 @@ class InverseDynamics(BlockKernel):
         }
 
 
-def _check_limits(limits: Sequence[LimitCheck], of_joint: OfJoint) -> None:
+def _check_limits(joint: Joint, of_joint: OfJoint) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
-    for check in limits:
+    for check in limit_checks(joint):
         if check.variable not in of_joint:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
@@ -239,7 +234,7 @@ def compute_block(
     return block_of(kernel, motion, engine, internal_rows(internal))
 
 
-@cached_by_identity(KEPT_PROGRAMS)
+@lru_cache(KEPT_PROGRAMS)
 def _kernel(robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]) -> InverseDynamics:
     deflections = (InternalRows(damped),) if damped else ()
     return InverseDynamics(robot, frame, min_margin, deflections)

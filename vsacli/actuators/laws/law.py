@@ -7,11 +7,12 @@ their laws. `SpringRows` evaluates the springs of several joints, one evaluation
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -154,11 +155,19 @@ class SpringLaw(ABC):
         "largest admissible |deflection|; larger ones are flagged, but the law does not end there",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
-        compare=False,
     )
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def unlimited(self) -> Self:
+        """The law without `max_deflection`, for the mathematics: laws of equal torques are equal there."""
+        if self.max_deflection == math.inf:
+            return self
+        law = copy.copy(self)
+        object.__setattr__(law, "max_deflection", math.inf)
+        return law
 
     @property
     def domain(self) -> tuple[float, float]:

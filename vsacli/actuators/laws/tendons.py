@@ -42,7 +42,7 @@ class Tendon(SpringLaw):
 
     def as_second(self) -> SpringLaw:
         """Return the tendon pulling downward."""
-        return Mirrored(law=self)
+        return Mirrored(law=self.unlimited)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ __all__ = ["make_pair"]
 
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
     """Return the solver of (14) for two laws with phi_1 up: closed if the laws have one, else iterated."""
+    first, second = first.unlimited, second.unlimited
     return first.closed_pair(second) or _iterated(first, second)
 
 

@@ -31,9 +31,9 @@ class PairOnBranch:
 
     @cached_property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
-        """The springs as they act on sides 1 and 2."""
+        """The springs as they act on sides 1 and 2, without their limits."""
         first, second = self.spring
-        return first, second.as_second()
+        return first.unlimited, second.unlimited.as_second()
 
     @property
     def distinct(self) -> tuple[SpringLaw, ...]:

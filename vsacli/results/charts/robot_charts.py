@@ -101,7 +101,7 @@ class StiffnessMap(NamedTuple):
         levels: stiffness values between the ends and below the end of the axis, (levels, points).
         clearance: distance to each limit at these values, relative to it, by the meaning of the limit;
             negative beyond it; the smaller one of two motors.
-        deflections: coordinates of the springs, phi, at these values, (2, levels, points).
+        unknowns: unknowns of the springs at these values, see `Actuator`, (motors, levels, points).
         top: end of the stiffness axis.
     """
 
@@ -112,7 +112,7 @@ class StiffnessMap(NamedTuple):
     upper_singular: BoolArray
     levels: FloatArray
     clearance: dict[str, FloatArray]
-    deflections: FloatArray
+    unknowns: FloatArray
     top: float
 
     @property
@@ -206,8 +206,8 @@ class ActuatorChart:
                 values = np.where(infeasible, np.nan, check.clearance(state).reshape(levels.shape))
                 words = LIMITS[check.variable]
                 clearance[words] = np.minimum(clearance.get(words, np.inf), values)
-        phi = np.where(infeasible, np.nan, state["phi"].reshape(-1, *levels.shape))
-        return clearance, phi
+        unknowns = np.stack(self.actuator.unknowns(state["phi"], state["theta"]))
+        return clearance, np.where(infeasible, np.nan, unknowns.reshape(-1, *levels.shape))
 
     @cached_property
     def stiffness(self) -> StiffnessMap:
@@ -263,16 +263,16 @@ class ActuatorChart:
     def torques(self) -> list[TorqueCurve]:
         """Torques of the springs over the deflections that occur in the map within all limits."""
         within = self.stiffness.within
-        phi = np.where(within | ~within.any(), self.stiffness.deflections, np.nan)
-        return list(
-            self._of_mechanism(phi) if self.actuator.spring_elements is None else self._of_springs(phi)
-        )
+        unknowns = np.where(within | ~within.any(), self.stiffness.unknowns, np.nan)
+        curves = self._of_mechanism if self.actuator.spring_elements is None else self._of_springs
+        return list(curves(unknowns))
 
-    def _of_springs(self, phi: FloatArray) -> Iterator[TorqueCurve]:
+    def _of_springs(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of each spring, of equal springs only once."""
-        theta = self.actuator.motor_positions(phi[: self.actuator.motor_count], np.asarray(self.q))
+        theta = self.actuator.motor_positions(unknowns, np.asarray(self.q))
         elements = self.actuator.spring_elements or ()
-        kinds = [(element.law, _as_declared(element.law).max_deflection) for element in elements]
+        limits = (*self.actuator.max_deflections, *[math.inf] * len(elements))
+        kinds = [(element.law, limit) for element, limit in zip(elements, limits, strict=False)]
         for index, (element, (law, limit)) in enumerate(zip(elements, kinds, strict=True)):
             if (law, limit) in kinds[:index]:
                 continue
@@ -285,10 +285,10 @@ class ActuatorChart:
             name = "spring between the motors" if element.joint == 0 else _numbered(same)
             yield TorqueCurve(name, points, law.torque(points), limit)
 
-    def _of_mechanism(self, phi: FloatArray) -> Iterator[TorqueCurve]:
+    def _of_mechanism(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of a mechanism at several settings of motor 2."""
-        settings = np.linspace(np.nanmin(phi[1]), np.nanmax(phi[1]), SETTINGS)
-        reached = float(np.nanmax(np.abs(phi[0])))
+        settings = np.linspace(np.nanmin(unknowns[1]), np.nanmax(unknowns[1]), SETTINGS)
+        reached = float(np.nanmax(np.abs(unknowns[0])))
         points = np.linspace(-reached, reached, FINE_POINTS)
         springs = self.actuator.elasticity([self.actuator])
         q = np.full((FINE_POINTS, 1), self.q)
