@@ -239,8 +239,8 @@ def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
     actuator = springs(*[Quadratic(k=1000, max_deflection=0.1)] * 2)
     found = drive(joint_with(actuator), command(stiffness=1000.0))  # 2 k |phi| on either side
     np.testing.assert_allclose(found["phi"][:, 0], [0.25, -0.25], rtol=1e-12)
-    checks = [check.motor for check in actuator.limits() if check.flag is Flag.DEFLECTION_LIMIT]
-    held = [check for check in actuator.limits() if np.isfinite(check.range).all()]
+    checks = [check.motor for check in actuator.limits if check.flag is Flag.DEFLECTION_LIMIT]
+    held = [check for check in actuator.limits if np.isfinite(check.range).all()]
     assert checks == [1, 2]
     assert [check.flags({"phi": found["phi"]}).tolist() for check in held] == [[Flag.DEFLECTION_LIMIT]] * 2
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -127,7 +128,7 @@ class Actuator(ABC):
         """Return the field that excludes joints of this type, with the reason; None if it can drive them."""
         return None
 
-    @property
+    @cached_property
     @abstractmethod
     def motors(self) -> tuple[JointMotor, ...]:
         """Motors, on the joint side."""
@@ -142,7 +143,7 @@ class Actuator(ABC):
         """Whether the motors bear shares of tau_e and nothing else, so that they can oppose each other."""
         return False
 
-    @property
+    @cached_property
     def sides(self) -> tuple[JointMotor | None, ...]:
         """Motors 1 and 2; None for a missing one."""
         return (*self.motors, None)[: len(MOTORS)]
@@ -177,14 +178,22 @@ class Actuator(ABC):
         """Spring between a lever and a point of the link, if it is the only spring; else None."""
         return None
 
-    def limits(self) -> Iterator[LimitCheck]:
-        """Yield all limits of motors and springs, finite or not."""
-        for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
-            yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
-            yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
-            yield LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", number, within(motor.max_torque))
-            yield LimitCheck(Flag.CURRENT_LIMIT, "current", number, within(motor.max_current or math.inf))
-            yield LimitCheck(Flag.VOLTAGE_LIMIT, "voltage", number, within(motor.max_voltage or math.inf))
+    @cached_property
+    def limits(self) -> tuple[LimitCheck, ...]:
+        """All limits of motors and springs, finite or not."""
+        return tuple(
+            LimitCheck(flag, variable, number, within(math.inf if bound is None else bound))
+            for number, (motor, deflection) in enumerate(
+                zip(self.motors, self.max_deflections, strict=True), 1
+            )
+            for flag, variable, bound in (
+                (Flag.DEFLECTION_LIMIT, "phi", deflection),
+                (Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor.max_velocity),
+                (Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor.max_torque),
+                (Flag.CURRENT_LIMIT, "current", motor.max_current),
+                (Flag.VOLTAGE_LIMIT, "voltage", motor.max_voltage),
+            )
+        )
 
     @abstractmethod
     def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:

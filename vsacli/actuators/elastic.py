@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -79,7 +79,7 @@ class Elastic(Actuator):
         """Return one motor, which drives the joint alone, behind a linear spring."""
         return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """The one motor."""
         return (self.motor.at_joint,)
@@ -109,10 +109,10 @@ class Elastic(Actuator):
         """The spring."""
         return (SpringElement(self.law, -1.0, (1.0,)),)
 
-    def limits(self) -> Iterator[LimitCheck]:
-        """Yield the limits of every actuator, and the torques that the spring can carry."""
-        yield from super().limits()
-        yield self._carriable
+    @cached_property
+    def limits(self) -> tuple[LimitCheck, ...]:
+        """The limits of every actuator, and the torques that the spring can carry."""
+        return *super().limits, self._carriable
 
     @property
     def _carriable(self) -> LimitCheck:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -38,7 +39,7 @@ class Rigid(Actuator):
         """Return one motor, which drives the joint alone."""
         return cls(motor=constants.only_motor)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """The one motor."""
         return (self.motor.at_joint,)

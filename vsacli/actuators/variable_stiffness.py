@@ -7,6 +7,7 @@ phi_1 and phi_2 of an antagonistic pair, deflection phi and setting theta_2 of a
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class VariableStiffness(Actuator):
     motor_count = 2
     commanded = (STIFFNESS.key,)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """Motors 1 and 2."""
         return tuple(motor.at_joint for motor in self.motor)

@@ -208,6 +208,6 @@ def _torque_limits(joint: Joint) -> FloatArray:
     """Return the interval (2,) of torque that all motors of a joint allow."""
     import numpy as np
 
-    ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]
+    ranges = [check.range for check in joint.actuator.limits if check.variable == "tau_motor"]
     lower, upper = zip(*ranges, strict=True) if ranges else ((-np.inf,), (np.inf,))
     return np.array([max(lower), min(upper)])

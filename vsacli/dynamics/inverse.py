@@ -143,9 +143,8 @@ class InverseDynamics(BlockKernel):
             (command, self.min_margin, *self._deflections(index, inputs))
             for index, command in enumerate(commands)
         ]
-        driven = call_at_joints(
-            rows[0], drive, joints, arguments, [joint.limits for joint in joints]
-        )  # (61)-(74)
+        bounds = [joint.limits for joint in joints]
+        driven = call_at_joints(rows[0], drive, joints, arguments, bounds)  # (61)-(74)
         of_joints = [{**command.arrays(), **motors} for command, motors in zip(commands, driven, strict=True)]
         for joint, of_joint in zip(joints, of_joints, strict=True):
             _check_limits(joint, of_joint)

@@ -201,7 +201,7 @@ class ActuatorChart:
         state = self.at_rest(torques, levels.ravel())
         infeasible = has(state["flags"], Flag.INFEASIBLE).reshape(levels.shape)
         clearance: dict[str, FloatArray] = {}
-        for check in self.actuator.limits():
+        for check in self.actuator.limits:
             if check.variable in LIMITS and math.isfinite(check.range[1]):
                 values = np.where(infeasible, np.nan, check.clearance(state).reshape(levels.shape))
                 words = LIMITS[check.variable]
@@ -342,7 +342,7 @@ def _drawn(actuator: Actuator) -> tuple[object, ...]:
         for each in fields(cast("DataclassInstance", actuator))
         if each.name not in ROTORS
     ]
-    limits = [check for check in actuator.limits() if check.variable in LIMITS]
+    limits = [check for check in actuator.limits if check.variable in LIMITS]
     return type(actuator), parts, limits
 
 
