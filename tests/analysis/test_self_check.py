@@ -18,7 +18,7 @@ from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
@@ -272,11 +272,11 @@ def spoil_drive(
 ) -> None:
     """Let the actuation return a variable, (2, samples), with a defect, at one joint or at all."""
 
-    def spoiled(joint, *arguments) -> OfJoint:
+    def spoiled(joint, *arguments) -> JointVariables:
         driven = drive(joint, *arguments)
         if joint_name not in ("", joint.name):
             return driven
-        return {**driven, name: spoil(driven[name])}
+        return driven._replace(**{name: spoil(getattr(driven, name))})
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
 

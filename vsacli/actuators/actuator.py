@@ -17,9 +17,9 @@ import numpy as np
 from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
-from vsacli.actuators.reach import LimitCheck, OfJoint, within
+from vsacli.actuators.reach import LimitCheck, within
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
@@ -196,7 +196,7 @@ class Actuator(ABC):
         )
 
     @abstractmethod
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
         """Compute the springs and the motion of the motors for a command.
 
         Args:
@@ -206,9 +206,9 @@ class Actuator(ABC):
                 none; only for kinds with a commanded stiffness.
 
         Returns:
-            The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `theta`, `dtheta`,
-            `ddtheta`, `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and
-            `flags`; NaN for those that the actuator lacks, such as a second motor's.
+            The command with the stiffness and its derivatives, deflections, motor motion, spring torques and
+            energy, det A, the attainable range and `flags`; NaN where the actuator lacks them, such as a
+            second motor.
         """
 
     def deflections(self, unknowns: FloatArray) -> FloatArray:
@@ -227,20 +227,20 @@ class Actuator(ABC):
         """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
-    def springs_of(self, of_joint: OfJoint) -> ElasticState:
+    def springs_of(self, of_joint: JointVariables) -> ElasticState:
         """Return the springs with their derivatives from the motion of joint and motors."""
-        return self.springs(self.unknowns(of_joint["phi"], of_joint["theta"]), of_joint["q"])
+        return self.springs(self.unknowns(of_joint.phi, of_joint.theta), of_joint.q)
 
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+    def spring_rates(self, of_joint: JointVariables) -> FloatArray:
         """Return the rates of tau_transmission, (motors, samples), from variables of the joint."""
-        rates = *self.unknowns(of_joint["dphi"], of_joint["dtheta"]), of_joint["dq"]
+        rates = *self.unknowns(of_joint.dphi, of_joint.dtheta), of_joint.dq
         return np.stack(self.springs_of(of_joint).transmission_rates(rates))
 
-    def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
+    def spring_loads(self, of_joint: JointVariables) -> tuple[SpringLoad, ...]:
         """Return the loads of the springs from variables of the joint; those behind motor 1 as one."""
         if not self.sprung:
             return ()
-        loaded = of_joint["phi"][0], of_joint["tau_transmission"][0], of_joint["elastic_energy"]
+        loaded = of_joint.phi[0], of_joint.tau_transmission[0], of_joint.elastic_energy
         return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     @property

@@ -19,8 +19,8 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
 from vsacli.actuators.pairs.springs import PairElasticity, PairSprings
-from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.spring_elements import SpringElement
+from vsacli.actuators.transmission import JointVariables
 from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -135,9 +135,9 @@ class Antagonistic(VariableStiffness):
         energy_3, coupling = self.coupling.energy_and_state(unknowns[0] - unknowns[1])
         return PairSprings(one, two, energy_1 + energy_2 + energy_3, coupling)
 
-    def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
+    def spring_loads(self, of_joint: JointVariables) -> tuple[SpringLoad, ...]:
         """Return the load of each spring, including a coupling."""
-        phi = of_joint["phi"]
+        phi = of_joint.phi
         sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
         springs = [(f"spring {side}", *spring) for side, spring in sides]
         if self.coupling is not None:

@@ -24,8 +24,8 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
-from vsacli.actuators.reach import OfJoint, Reach, reach
-from vsacli.actuators.transmission import Command, InternalMotion
+from vsacli.actuators.reach import Reach, reach
+from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
 from vsacli.base.signals import DAMPING, STIFFNESS
@@ -117,7 +117,7 @@ class DampedSprings:
         if self._settable:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
-            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None)["phi"]
+            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
         if spread is None:
             return phi
         begin = self.spread(phi)
@@ -134,7 +134,7 @@ class DampedSprings:
         rate = springs.state.torque_rate(self._rates(command.dq, dtheta))
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
-    def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> OfJoint:
+    def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> JointVariables:
         """Compute stiffness, motor motion and spring torques of an internal motion; see `Actuator.transmit`.
 
         The attainable range is that at the springs' torque. A sample is singular where the pivot is zero, not
@@ -157,20 +157,21 @@ class DampedSprings:
             return np.where(reached.infeasible, np.nan, np.stack(rows))
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
-        return {
-            **dict(zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)),
-            "phi": self._actuator.deflections(of_motors(phi)),
-            "dphi": self._actuator.deflections(of_motors(rates)),
-            "theta": of_motors(self._positions(phi, command.q)),
-            "dtheta": of_motors(dtheta),
-            "ddtheta": of_motors(ddtheta),
-            "tau_transmission": of_motors(springs.state.tau_transmission),
-            "elastic_energy": np.where(reached.infeasible, np.nan, springs.state.energy),
-            "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant),
-            "stiffness_min": lower,
-            "stiffness_max": upper,
-            "flags": reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
-        }
+        stiffness = zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)
+        return command.variables()._replace(
+            **dict(stiffness),
+            phi=self._actuator.deflections(of_motors(phi)),
+            dphi=self._actuator.deflections(of_motors(rates)),
+            theta=of_motors(self._positions(phi, command.q)),
+            dtheta=of_motors(dtheta),
+            ddtheta=of_motors(ddtheta),
+            tau_transmission=of_motors(springs.state.tau_transmission),
+            elastic_energy=np.where(reached.infeasible, np.nan, springs.state.energy),
+            det_A=np.where(reached.infeasible, np.nan, springs.state.determinant),
+            stiffness_min=lower,
+            stiffness_max=upper,
+            flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+        )
 
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, min_margin: float

@@ -11,8 +11,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command, single_motor
+from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.documents.fields import Record, check_fields, value
 
@@ -44,10 +43,13 @@ class Rigid(Actuator):
         """The one motor."""
         return (self.motor.at_joint,)
 
-    def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
+    def transmit(
+        self, command: Command, _min_margin: float, _integrated: FloatArray | None
+    ) -> JointVariables:
         """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
+            command,
             stiffness=none,
             dstiffness=none,
             ddstiffness=none,
@@ -61,6 +63,6 @@ class Rigid(Actuator):
             flags=np.zeros(still.shape, dtype=FLAG_TYPE),
         )
 
-    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+    def spring_rates(self, of_joint: JointVariables) -> FloatArray:
         """Return the rate of tau_e, which takes the place of a spring torque."""
-        return of_joint["dtau_e"][None]
+        return of_joint.dtau_e[None]

@@ -14,8 +14,8 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import OfJoint, deflections_within_reach
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.reach import deflections_within_reach
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
 
@@ -40,7 +40,7 @@ class VariableStiffness(Actuator):
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Actuator.solve`."""
 
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
         """Compute deflections on the actuator's branch, motion of the motors, and torques of the springs.
 
         NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones. See
@@ -53,19 +53,16 @@ class VariableStiffness(Actuator):
         rates = np.stack(springs.rates(command.dtau_e, dstiffness, command.dq))  # (68)
         rates = np.where(reached.singular, np.nan, rates)
         ddtheta = springs.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness)  # (70)-(72)
-        return {
-            "stiffness": stiffness,
-            "dstiffness": dstiffness,
-            "ddstiffness": ddstiffness,
-            "phi": self.deflections(unknowns),
-            "dphi": self.deflections(rates),
-            "theta": self.motor_positions(unknowns, command.q),  # (69)
-            "dtheta": self.motor_positions(rates, command.dq),  # (69)
-            "ddtheta": np.stack(ddtheta),
-            "tau_transmission": np.stack(springs.tau_transmission),  # (62)
-            "elastic_energy": springs.energy,
-            "det_A": springs.determinant,  # (67)
-            "stiffness_min": solution.lower,
-            "stiffness_max": solution.upper,
-            "flags": reached.flags,
-        }
+        return command.variables()._replace(
+            phi=self.deflections(unknowns),
+            dphi=self.deflections(rates),
+            theta=self.motor_positions(unknowns, command.q),  # (69)
+            dtheta=self.motor_positions(rates, command.dq),  # (69)
+            ddtheta=np.stack(ddtheta),
+            tau_transmission=np.stack(springs.tau_transmission),  # (62)
+            elastic_energy=springs.energy,
+            det_A=springs.determinant,  # (67)
+            stiffness_min=solution.lower,
+            stiffness_max=solution.upper,
+            flags=reached.flags,
+        )

@@ -15,6 +15,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import margin
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.difference_errors import MIDDLE, NEIGHBORS, OFFSETS, DifferenceErrors
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
@@ -143,7 +144,7 @@ class RunCheck:
     def _residuals(self) -> tuple[float, float]:
         """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
-        of_joints = [of_joint(probed, index) for index in range(len(self._joints))]
+        of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(self._joints))]
         apart = balances(self._joints, of_joints)
         error = np.max(apart["spring_error"], initial=self._error)
         damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
@@ -269,14 +270,14 @@ def _energy_balances(dynamics: RunDynamics, block: Block) -> Iterator[FloatArray
     squared, such as K (1 - cos(2 phi)): the result changes by jumps, between which it shows no noise.
     """
     robot, frame = dynamics.robot, dynamics.kernel.dynamics.frame
-    of_joints = [block.of_joint(index) for index in range(len(robot.joints))]
+    of_joints = [JointVariables.of(block.of_joint(index)) for index in range(len(robot.joints))]
     pairs = list(zip(robot.joints, of_joints, strict=True))
     powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, frame)]
     yield np.stack([*(shaft_energy(*pair) for pair in pairs), link_energy(robot, block)], axis=-1)
     yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
     yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
-    grains = [np.finfo(float).eps * np.nan_to_num(of_joint["stiffness"]) for of_joint in of_joints]
-    turns = [1.0 if joint.is_revolute else of_joint["q"] ** 2 for joint, of_joint in pairs]
+    grains = [np.finfo(float).eps * np.nan_to_num(of_joint.stiffness) for of_joint in of_joints]
+    turns = [1.0 if joint.is_revolute else of_joint.q**2 for joint, of_joint in pairs]
     yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.elasticity import Components
 from vsacli.actuators.friction import REST, Friction
-from vsacli.actuators.motor import ELECTRICAL, JointMotor
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
@@ -45,7 +45,7 @@ Residual = tuple[FloatArray, FloatArray]
 
 
 def shaft_error(
-    joint: Joint, of_joint: OfJoint, tau_transmission: Components, regular: BoolArray
+    joint: Joint, of_joint: JointVariables, tau_transmission: Components, regular: BoolArray
 ) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
@@ -62,22 +62,25 @@ def shaft_error(
     return reduce(np.maximum, errors)
 
 
-def _residuals(joint: Joint, of_joint: OfJoint, tau_transmission: Components) -> Iterator[Residual]:
+def _residuals(joint: Joint, of_joint: JointVariables, tau_transmission: Components) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
-        own = {name: of_joint[name][index] for name in ("tau_motor", "dtheta", "motor_power")}
+        torque, dtheta, power = (
+            rows[index] for rows in (of_joint.tau_motor, of_joint.dtheta, of_joint.motor_power)
+        )
         yield _torque_residual(joint, index, of_joint, tau_transmission[index])
-        yield _residual(own["motor_power"], own["tau_motor"] * own["dtheta"])
+        yield _residual(power, torque * dtheta)
         if motor.torque_constant is not None:
-            electrical = {name: of_joint[name][index] for name in ELECTRICAL if name in of_joint}
-            yield from _winding_residuals(motor, **own, **electrical)
+            electrical = (of_joint.current, of_joint.voltage, of_joint.copper_loss)
+            rows = (None if array is None else array[index] for array in electrical)
+            yield from _winding_residuals(motor, torque, dtheta, power, *rows)
     if joint.damper is not None:
         yield _residual(
-            of_joint["tau_damper"],
-            *(of_joint["damping"] * velocity for velocity in _damper_velocities(joint, of_joint).values()),
+            of_joint.tau_damper,
+            *(of_joint.damping * velocity for velocity in _damper_velocities(joint, of_joint).values()),
         )
-    if of_joint.get("dissipated_power") is not None:
+    if of_joint.dissipated_power is not None:
         lost = (*link_losses(joint, of_joint), *shaft_losses(joint, of_joint))
-        yield _residual(of_joint["dissipated_power"], *lost)
+        yield _residual(of_joint.dissipated_power, *lost)
 
 
 def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
@@ -85,18 +88,20 @@ def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
     return given - reduce(np.add, terms, np.zeros_like(given)), size
 
 
-def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_transmission: FloatArray) -> Residual:
+def _torque_residual(
+    joint: Joint, index: int, of_joint: JointVariables, tau_transmission: FloatArray
+) -> Residual:
     """Return the residual of a shaft, without the effect of rounded positions on the springs."""
-    motor, dtheta = joint.actuator.motors[index], of_joint["dtheta"][index]
-    terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_transmission]
+    motor, dtheta = joint.actuator.motors[index], of_joint.dtheta[index]
+    terms = [*_momentum_rates(joint, index, of_joint.ddtheta), tau_transmission]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
     damped = _damper_velocities(joint, of_joint).get(index)
     if damped is not None:
-        terms.append(of_joint["damping"] * damped)
-    missing, size = _residual(of_joint["tau_motor"][index], *terms)
+        terms.append(of_joint.damping * damped)
+    missing, size = _residual(of_joint.tau_motor[index], *terms)
     if joint.actuator.sprung:
-        positions = np.abs(of_joint["q"]) + np.abs(of_joint["theta"][index])
-        rounding = POSITION_ROUNDING * of_joint["stiffness"] * positions
+        positions = np.abs(of_joint.q) + np.abs(of_joint.theta[index])
+        rounding = POSITION_ROUNDING * of_joint.stiffness * positions
         missing = np.maximum(np.abs(missing) - rounding, 0.0)
     return missing, size
 
@@ -141,52 +146,52 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
     return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
 
 
-def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, FloatArray]:
+def _damper_velocities(joint: Joint, of_joint: JointVariables) -> dict[int | None, FloatArray]:
     """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
     if joint.damper_at("link"):
-        return {None: of_joint["dq"]}
+        return {None: of_joint.dq}
     behind = joint.actuator.has(VARIABLES["phi"])
-    return {motor: of_joint["dphi"][motor] for motor, there in enumerate(behind) if there}
+    return {motor: of_joint.dphi[motor] for motor, there in enumerate(behind) if there}
 
 
-def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def link_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the power lost between the two links of a joint, term by term."""
-    dq = of_joint["dq"]
+    dq = of_joint.dq
     lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
     if joint.damper_at("link"):
-        lost.append(of_joint["damping"] * dq * dq)
+        lost.append(of_joint.damping * dq * dq)
     return lost
 
 
-def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def shaft_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the power lost between the motors and the link of a joint, term by term."""
     lost = []
-    for motor, dtheta in zip(joint.actuator.motors, of_joint["dtheta"], strict=False):
+    for motor, dtheta in zip(joint.actuator.motors, of_joint.dtheta, strict=False):
         lost.append(motor.damping * dtheta * dtheta)
         lost.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
     if joint.damper_at("transmission"):
         velocities = _damper_velocities(joint, of_joint).values()
-        lost.extend(of_joint["damping"] * velocity * velocity for velocity in velocities)
+        lost.extend(of_joint.damping * velocity * velocity for velocity in velocities)
     return lost
 
 
-def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
+def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
     """Return the kinetic energy of the rotors of a joint plus the energy in its springs, (samples,), J."""
-    energy: FloatArray = of_joint["elastic_energy"]
-    motors, dtheta = joint.actuator.motors, of_joint["dtheta"]
+    energy: FloatArray = of_joint.elastic_energy
+    motors, dtheta = joint.actuator.motors, of_joint.dtheta
     for motor, velocity in zip(motors, dtheta, strict=False):
         energy = energy + motor.inertia / 2 * velocity * velocity
     coupling = joint.actuator.coupled_rotors
     return energy + coupling * dtheta[0] * dtheta[1] if coupling else energy
 
 
-def shaft_powers(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
     motors = len(joint.actuator.motors)
-    taken = [of_joint["tau_e"] * of_joint["dq"], *shaft_losses(joint, of_joint)]
-    return [*of_joint["motor_power"][:motors], *(-power for power in taken)]
+    taken = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
+    return [*of_joint.motor_power[:motors], *(-power for power in taken)]
 
 
 BALANCES = {
@@ -262,7 +267,7 @@ def damped_joints(joints: Sequence[Joint]) -> list[int]:
     return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
 
 
-def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
+def balances(joints: Sequence[Joint], of_joints: Sequence[JointVariables]) -> dict[str, list[FloatArray]]:
     """Return the residuals of (14), by the springs' laws at phi, and of the shafts, by name.
 
     They are zero at infeasible and singular samples. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k|
@@ -270,7 +275,7 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
     damper the torque of the springs may pass zero while nothing else is small, so the torque residual is
     returned unscaled, with its size: only the whole run has a scale for it.
     """
-    row = of_joints[0]["tau_e"]
+    row = of_joints[0].tau_e
     springs, shafts, missing, sizes = [np.zeros_like(row)], [], [], []
     balanced = call_at_joints(row, _balance, joints, zip(of_joints, strict=True))
     for of_stiffness, of_torque, size, of_shafts in balanced:
@@ -286,17 +291,17 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
     return {**largest, "damped_error": missing, "damped_size": sizes}
 
 
-def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
+def _balance(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray | None, ...]:
     """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
-    regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
-    tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
+    regular = ~has(of_joint.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+    tau_e, stiffness = of_joint.tau_e, of_joint.stiffness
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
     springs = joint.actuator.springs_of(of_joint)
-    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint["phi"], of_joint["theta"]))
+    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint.phi, of_joint.theta))
     of_shafts = shaft_error(joint, of_joint, springs.tau_transmission, regular)
     of_stiffness = np.abs(springs.stiffness - stiffness) / np.where(regular, stiffness_size, 1.0)
     of_stiffness = np.where(regular, of_stiffness, 0.0)
@@ -304,28 +309,28 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
     if not joint.damper_at("transmission"):
         of_torque = np.where(regular, np.abs(springs.tau_e - tau_e) / size, 0.0)
         return of_stiffness, of_torque, None, of_shafts
-    residual = np.abs(springs.tau_e + of_joint["tau_damper"] - tau_e)
+    residual = np.abs(springs.tau_e + of_joint.tau_damper - tau_e)
     residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
     size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
     return of_stiffness, np.where(regular, residual, 0.0), size, of_shafts
 
 
-def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:
+def _rounding_of_damper(of_joint: JointVariables) -> FloatArray:
     """Return the rounding of the torque of a damper, whose velocity is the difference theta' - q'."""
-    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint["damping"] * np.abs(of_joint["dq"])
+    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint.damping * np.abs(of_joint.dq)
     return rounding
 
 
-def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
+def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the power of motors into springs, dampers and damping, and its rate, W, W/s.
 
     It is the motor power without that of inertia and dry friction, which `energy` integrates separately. Each
     (2, samples), NaN where there is no motor.
     """
-    dtheta, ddtheta = of_joint["dtheta"], of_joint["ddtheta"]
+    dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
     motors = [motor.damping for motor in joint.actuator.motors]
     damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
-    torque = damping * dtheta + of_joint["tau_transmission"]
+    torque = damping * dtheta + of_joint.tau_transmission
     rate = damping * ddtheta
     own = joint.actuator.spring_rates(of_joint)
     rate = rate + (own if len(own) == SIDES else np.concatenate((own, np.full_like(own, np.nan))))
@@ -375,8 +380,8 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
     """
     powers = []
     for index, joint in enumerate(robot.joints):
-        of_joint = block.of_joint(index)
-        powers.append(of_joint["tau_e"] * of_joint["dq"])
+        of_joint = JointVariables.of(block.of_joint(index))
+        powers.append(of_joint.tau_e * of_joint.dq)
         powers.extend(-lost for lost in link_losses(joint, of_joint))
     return powers if frame is None else [*powers, _wrench_power(robot, block, frame)]
 

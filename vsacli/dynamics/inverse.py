@@ -17,8 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command, InternalMotion
+from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import MIN_MARGIN
@@ -132,50 +131,50 @@ class InverseDynamics(BlockKernel):
         """Run (36)-(74)."""
         return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
 
-    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
-        """Return the variables of each joint by name, without those that it does not have."""
+    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[JointVariables]:
+        """Return the variables of each joint."""
         inputs = self.arguments.unpack(rows)
         torques = self.links(self.links.arguments.pack(inputs))  # (36)-(60)
         of_all = {**inputs, **self.links.results.unpack([_as_row(torque, rows[0]) for torque in torques])}
         names, joints = Command.names(signal.key for signal in self.robot.signals), self.robot.joints
-        commands = [Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints))]
-        arguments = [
-            (command, self.min_margin, *self._deflections(index, inputs))
-            for index, command in enumerate(commands)
-        ]
-        bounds = [joint.limits for joint in joints]
-        driven = call_at_joints(rows[0], drive, joints, arguments, bounds)  # (61)-(74)
-        of_joints = [{**command.arrays(), **motors} for command, motors in zip(commands, driven, strict=True)]
+        commands = (Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints)))
+        deflections = (self._deflections(index, inputs) for index in range(len(joints)))
+        demands = zip(commands, repeat(self.min_margin), deflections, strict=False)
+        limits = [joint.limits for joint in joints]
+        of_joints: list[JointVariables] = call_at_joints(rows[0], drive, joints, demands, limits)  # (61)-(74)
         for joint, of_joint in zip(joints, of_joints, strict=True):
             _check_limits(joint, of_joint)
         if "dissipated_power" in self.variables:
             powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
-            for of_joint, power in zip(of_joints, powers, strict=True):
-                of_joint["dissipated_power"] = power
+            of_joints = [
+                of_joint._replace(dissipated_power=power)
+                for of_joint, power in zip(of_joints, powers, strict=True)
+            ]
         return of_joints
 
     def _deflections(
         self, index: int, inputs: Mapping[str, Sequence[Scalar]]
-    ) -> tuple[FloatArray | None, InternalMotion | None]:
+    ) -> FloatArray | InternalMotion | None:
         states = (rows.of_joint(index, inputs) for rows in reversed(self.deflections))
-        state = next((state for state in states if state is not None), None)
-        return (None, state) if isinstance(state, InternalMotion) else (state, None)
+        return next((state for state in states if state is not None), None)
 
-    def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
+    def rows_of(
+        self, rows: Sequence[Scalar], of_joints: Sequence[JointVariables]
+    ) -> dict[str, Iterable[Any]]:
         """Return the rows of each result by name, from the input rows and the variables of the joints."""
-        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
-        return {
-            name: rows_of_joints(
-                [of_joint.get(name, absent[len(VARIABLES[name].dims)]) for of_joint in of_joints]
-            )
-            for name in self.results.shapes
-        }
+        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0].dtheta, np.nan)}
+        computed: dict[str, Iterable[Any]] = {}
+        for name in self.results.shapes:
+            arrays = [getattr(of_joint, name) for of_joint in of_joints]
+            none = absent[len(VARIABLES[name].dims)]
+            computed[name] = rows_of_joints(none if array is None else array for array in arrays)
+        return computed
 
 
-def _check_limits(joint: Joint, of_joint: OfJoint) -> None:
+def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
     for check in limit_checks(joint):
-        if check.variable not in of_joint:
+        if getattr(of_joint, check.variable, None) is None:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 

@@ -201,8 +201,8 @@ def deviations_of_joint(
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
-        found = {**command.arrays(), **drive(undamped.joints[index], command)}
-        return {name: found[name].T[:, None] for name in _COMPUTED}
+        driven = drive(undamped.joints[index], command)
+        return {name: getattr(driven, name).T[:, None] for name in _COMPUTED}
 
     components = {  # what other joints are commanded beside their motion has no effect on this one
         signal: [index] if signal.key in COMMANDED else range(len(covariance))

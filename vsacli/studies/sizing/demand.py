@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import Flag, has
@@ -151,7 +152,7 @@ class SpringPeaks:
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
-            for load in joint.actuator.spring_loads(block.of_joint(index)):
+            for load in joint.actuator.spring_loads(JointVariables.of(block.of_joint(index))):
                 energy, torque, deflection = (
                     Peak.of(values, block.time, trajectory)
                     for values in (load.energy, load.torque, load.deflection)
@@ -255,7 +256,7 @@ def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     load = block.tau_transmission.copy()
     for index, joint in enumerate(robot.joints):
         if joint.damper_at("transmission"):
-            load[:, index] += motor_torques(joint, block.of_joint(index))[0].T
+            load[:, index] += motor_torques(joint, JointVariables.of(block.of_joint(index)))[0].T
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
     load[has(block.flags, UNDONE)] = np.nan
