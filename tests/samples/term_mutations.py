@@ -71,7 +71,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
     return [module for module in modules if vars(module).get(name) is function]
 
 
-PAIR, MATRIX = "actuators.pairs.springs:PairSprings", "actuators.elasticity:MotorMatrix"
+PAIR, MATRIX = "actuators.pairs.pair_springs:PairSprings", "actuators.elasticity:MotorMatrix"
 BETA = f"{PAIR}.motor_accelerations"
 DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
@@ -149,8 +149,8 @@ MUTATIONS = (
         "spring between the motors",
         "pair",
         f"{PAIR}.tau_transmission",
-        "+ self._coupling",
-        "+ 1.01 * self._coupling",
+        "tau + between",
+        "tau + 1.01 * between",
     ),
     Mutation("motor friction", "pair", TORQUES, "+ friction.with", "+ 1.01 * friction.with"),
     Mutation("motor friction, sign", "pair", TORQUES, "+ friction.with", "- friction.with"),

@@ -59,24 +59,6 @@ class PlaceholderConstants(NamedTuple):
         )
 
 
-class SpringLoad(NamedTuple):
-    """Load of one of an actuator's springs, or of all springs of a mechanism; arrays (samples,).
-
-    Attributes:
-        name: Name of the spring.
-        deflection: Deflection of the spring, or of a mechanism between motor 1 and link.
-        torque: Torque at that deflection.
-        energy: Stored energy, J.
-        max_deflection: Largest admissible |deflection|.
-    """
-
-    name: str
-    deflection: FloatArray
-    torque: FloatArray
-    energy: FloatArray
-    max_deflection: float
-
-
 class Actuator(ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
@@ -211,17 +193,13 @@ class Actuator(ABC):
             second motor.
         """
 
-    def deflections(self, unknowns: FloatArray) -> FloatArray:
-        """Return phi, (2, samples), from the unknowns, or its rates; NaN for a motor without a deflection."""
-        return unknowns
-
     def motor_positions(self, unknowns: Components, q: FloatArray) -> FloatArray:
         """Return theta, (motors, samples), from the unknowns, or velocities from their rates (69)."""
         return unknowns + q
 
-    def unknowns(self, phi: FloatArray, theta: FloatArray) -> Components:  # noqa: ARG002
+    def unknowns(self, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, ...]:  # noqa: ARG002
         """Return the unknowns from deflections and motor positions, (2, samples), or their rates."""
-        return phi[: self.motor_count]
+        return tuple(phi[: self.motor_count])
 
     def springs(self, unknowns: Components, q: FloatArray) -> ElasticState:
         """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
@@ -230,18 +208,6 @@ class Actuator(ABC):
     def springs_of(self, of_joint: JointVariables) -> ElasticState:
         """Return the springs with their derivatives from the motion of joint and motors."""
         return self.springs(self.unknowns(of_joint.phi, of_joint.theta), of_joint.q)
-
-    def spring_rates(self, of_joint: JointVariables) -> FloatArray:
-        """Return the rates of tau_transmission, (motors, samples), from variables of the joint."""
-        rates = *self.unknowns(of_joint.dphi, of_joint.dtheta), of_joint.dq
-        return np.stack(self.springs_of(of_joint).transmission_rates(rates))
-
-    def spring_loads(self, of_joint: JointVariables) -> tuple[SpringLoad, ...]:
-        """Return the loads of the springs from variables of the joint; those behind motor 1 as one."""
-        if not self.sprung:
-            return ()
-        loaded = of_joint.phi[0], of_joint.tau_transmission[0], of_joint.elastic_energy
-        return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     @property
     def spring_group(self) -> Hashable:

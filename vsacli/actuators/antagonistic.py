@@ -9,18 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
-from vsacli.actuators.actuator import PlaceholderConstants, SpringLoad
+from vsacli.actuators.actuator import PlaceholderConstants
 from vsacli.actuators.elasticity import Components, Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
-from vsacli.actuators.pairs.springs import PairElasticity, PairSprings
+from vsacli.actuators.pairs.pair_springs import PairElasticity, PairSprings
 from vsacli.actuators.spring_elements import SpringElement
-from vsacli.actuators.transmission import JointVariables
 from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -127,25 +126,15 @@ class Antagonistic(VariableStiffness):
 
     def springs(self, unknowns: Components, _q: FloatArray) -> PairSprings:
         """Return both springs at their deflections, with the coupling at the difference."""
-        (energy_1, one), (energy_2, two) = (
-            law.energy_and_state(phi) for law, phi in zip(self.laws, unknowns, strict=True)
-        )
-        if self.coupling is None:
-            return PairSprings(one, two, energy_1 + energy_2)
-        energy_3, coupling = self.coupling.energy_and_state(unknowns[0] - unknowns[1])
-        return PairSprings(one, two, energy_1 + energy_2 + energy_3, coupling)
+        one, two = (law.state(phi) for law, phi in zip(self.laws, unknowns, strict=True))
+        law, apart = self.coupling, unknowns[0] - unknowns[1]
+        coupling = None if law is None else partial(law.derivatives, apart)
+        return PairSprings(one, two, partial(self._energy, unknowns), coupling)
 
-    def spring_loads(self, of_joint: JointVariables) -> tuple[SpringLoad, ...]:
-        """Return the load of each spring, including a coupling."""
-        phi = of_joint.phi
-        sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
-        springs = [(f"spring {side}", *spring) for side, spring in sides]
-        if self.coupling is not None:
-            springs.append(("coupling", self.coupling, phi[0] - phi[1], math.inf))
-        return tuple(
-            SpringLoad(name, deflection, law.torque(deflection), law.energy(deflection), bound)
-            for name, law, deflection, bound in springs
-        )
+    def _energy(self, unknowns: Components) -> FloatArray:
+        first, second = self.laws
+        energy = first.energy(unknowns[0]) + second.energy(unknowns[1])
+        return energy if self.coupling is None else energy + self.coupling.energy(unknowns[0] - unknowns[1])
 
     @property
     def spring_group(self) -> Hashable:

@@ -44,24 +44,24 @@ class _Springs(NamedTuple):
 
     Attributes:
         state: Springs with their derivatives.
-        torque: Derivatives of T over each theta, (motors, samples).
-        stiffness: Derivatives of sigma over each theta, (motors, samples).
-        pivot: Determinant of the matrix that gives the motors' velocities, zero where these do not follow
-            from the rate of the stiffness; 1 if no stiffness is commanded.
+        spreading: Matrix that gives the motors' velocities from w and the rate of the stiffness; None if no
+            stiffness is commanded.
     """
 
     state: ElasticState
-    torque: FloatArray
-    stiffness: FloatArray
-    pivot: FloatArray
+    spreading: MotorMatrix | None
+
+    @property
+    def pivot(self) -> FloatArray:
+        """Determinant of that matrix; 1 without one."""
+        if self.spreading is None:
+            return np.ones_like(self.state.tau_e)
+        return self.spreading.determinant
 
     @property
     def slope(self) -> FloatArray:
         """dT/d(spread) at constant stiffness, det A/pivot: positive where the internal motion is stable."""
-        if len(self.torque) == 1:
-            slope: FloatArray = self.torque[0]
-            return slope
-        return MotorMatrix(*self.torque, *self.stiffness).determinant / self.divisor
+        return self.state.stiffness if self.spreading is None else self.state.determinant / self.divisor
 
     @property
     def divisor(self) -> FloatArray:
@@ -88,8 +88,7 @@ class DampedSprings:
 
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
-        slope: FloatArray = self.springs_at(phi, q).slope
-        return slope
+        return self.springs_at(phi, q).slope
 
     def within(self, phi: FloatArray) -> BoolArray:
         """Return where the springs' laws hold."""
@@ -157,11 +156,12 @@ class DampedSprings:
             return np.where(reached.infeasible, np.nan, np.stack(rows))
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
+        behind = self._behind[:, None] > 0
         stiffness = zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)
         return command.variables()._replace(
             **dict(stiffness),
-            phi=self._actuator.deflections(of_motors(phi)),
-            dphi=self._actuator.deflections(of_motors(rates)),
+            phi=np.where(behind, of_motors(phi), np.nan),
+            dphi=np.where(behind, of_motors(rates), np.nan),
             theta=of_motors(self._positions(phi, command.q)),
             dtheta=of_motors(dtheta),
             ddtheta=of_motors(ddtheta),
@@ -208,14 +208,14 @@ class DampedSprings:
         return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
 
     def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
-        still = self._rates(command.dq, np.zeros_like(springs.torque))
+        still = self._rates(command.dq, np.zeros((self._motors, 1)) * command.dq)
         rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)
         return self._solved(springs, velocity + sum(self._behind) * command.dq, rate)
 
     def _accelerations(
         self, springs: _Springs, acceleration: FloatArray, rates: Components, command: Command
     ) -> FloatArray:
-        still = self._rates(command.ddq, np.zeros_like(springs.torque))
+        still = self._rates(command.ddq, np.zeros((self._motors, 1)) * command.ddq)
         state = springs.state
         bent = state.stiffness_curvature(rates) + state.stiffness_rate(still)
         missing = command.commanded[STIFFNESS.names[2]] - bent
@@ -223,9 +223,9 @@ class DampedSprings:
 
     def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
         """Return the solution of both rows; of the first alone if there is one motor."""
-        if self._motors == 1:
+        if springs.spreading is None:
             return of_spread[None]
-        return np.stack(MotorMatrix(*self._behind, *springs.stiffness).solve(of_spread, of_stiffness))
+        return np.stack(springs.spreading.solve(of_spread, of_stiffness))
 
     def _stiffness(
         self, springs: _Springs, rates: Components, ddtheta: FloatArray, command: Command
@@ -241,13 +241,10 @@ class DampedSprings:
     def springs_at(self, phi: FloatArray, q: FloatArray) -> _Springs:
         """Return the state of the springs at deflections and joint positions."""
         state = self._state(phi, q)
-        units = np.eye(self._motors)[:, :, None] + 0 * q
-        turned = [self._rates(0 * q, unit) for unit in units]
-        torque = np.stack([state.torque_rate(each) for each in turned])
-        stiffness = np.stack([state.stiffness_rate(each) for each in turned])
-        if self._motors == 1:
-            return _Springs(state, torque, stiffness, np.ones_like(q))
-        return _Springs(state, torque, stiffness, MotorMatrix(*self._behind, *stiffness).determinant)
+        if not self._settable:
+            return _Springs(state, None)
+        (one, two), of_stiffness = self._behind, state.matrix[2:]
+        return _Springs(state, MotorMatrix(one, two, *of_stiffness))
 
     def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
         return self._actuator.springs(phi[: self._motors], q)

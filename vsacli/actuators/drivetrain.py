@@ -162,13 +162,8 @@ class Drivetrain:
         values[..., self.sprung] = sprung
         return values
 
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi or rates, (..., springs), from those of joints, (..., joints), and sprung motors."""
-        parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
-        return self.of_springs(parts, theta)
-
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates that `domain` bounds, (..., springs), at positions as for `deflections`."""
+        """Return the coordinates that `domain` bounds, (..., springs), at positions of joints and motors."""
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
@@ -219,6 +214,14 @@ class Drivetrain:
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
             result[..., group.springs] = part
+        return result
+
+    def by_motor(self, parts: Sequence[Components], like: FloatArray) -> FloatArray:
+        """Return (..., springs) from the parts of the groups, one array (..., joints) for each motor."""
+        result = np.empty_like(like)
+        for group, part in zip(self._groups, parts, strict=True):
+            for springs, of_motor in zip(group.springs.T, part, strict=True):
+                result[..., springs] = of_motor
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
@@ -275,8 +278,7 @@ class DrivetrainState:
     @property
     def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        parts = [np.stack(part.tau_transmission, axis=-1) for part, _ in self._parts]
-        return self._drivetrain.of_springs(parts, self._theta)
+        return self._drivetrain.by_motor([part.tau_transmission for part, _ in self._parts], self._theta)
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -290,7 +292,7 @@ class DrivetrainState:
         """
         wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
         parts = [
-            np.stack(part.motor_accelerations(rates, *of_part), axis=-1)
+            part.motor_accelerations(rates, *of_part)
             for (part, rates), of_part in zip(self._parts, wanted, strict=True)
         ]
-        return self._drivetrain.of_springs(parts, self._theta)
+        return self._drivetrain.by_motor(parts, self._theta)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -157,8 +157,7 @@ class Elastic(Actuator):
 
     def springs(self, unknowns: Components, _q: FloatArray) -> SingleSpring:
         """Return the spring at its deflection."""
-        energy, spring = self.law.energy_and_state(unknowns[0])
-        return SingleSpring(spring, energy)
+        return SingleSpring(self.law.state(unknowns[0]), partial(self.law.energy, unknowns[0]))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Return the deflection at which the spring carries the torque; the stiffness cannot be chosen."""

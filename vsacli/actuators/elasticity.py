@@ -28,21 +28,17 @@ class Torques(NamedTuple):
 class Elasticity(ABC):
     """Springs of joints with one kind of actuator: a potential of q and theta, and its derivatives.
 
-    The state of the springs is phi, one coordinate per motor, linear in q and theta. The methods below take
-    `coordinates`: phi, and further variables that the springs depend on.
+    The methods take `coordinates`, linear in q and theta: the unknowns of the actuator, such as deflections,
+    one per motor, and further variables that the springs depend on.
     """
 
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi from positions, or its rates from velocities; theta - q unless the kind overrides it."""
+    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Return the coordinates, (..., joints, coordinates), or their rates: theta - q by default."""
         return theta - q[..., None]
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates bounded by `Actuator.phi_ranges`, (..., joints, motors): phi by default."""
-        return self.deflections(q, theta)
-
-    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return the coordinates of the springs, (..., joints, coordinates), or rates: phi by default."""
-        return self.deflections(q, theta)
+        """Return the coordinates bounded by `Actuator.phi_ranges`, (..., joints, motors)."""
+        return self.coordinates(q, theta)
 
     @abstractmethod
     def torques(self, coordinates: FloatArray) -> Torques:
@@ -110,9 +106,14 @@ class ElasticState(ABC):
         """Torque against each motor (62)."""
 
     @property
+    def matrix(self) -> MotorMatrix:
+        """The decoupling matrix A of two motors."""
+        raise NotImplementedError(f"{type(self).__name__} has one motor")
+
+    @property
     def determinant(self) -> FloatArray:
-        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if not overridden."""
-        return np.full_like(self.tau_e, np.nan)
+        """Det A (67); NaN of one motor."""
+        return self.matrix.determinant
 
     def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         """Return the sizes of tau_e and stiffness, relative to which the self-check's errors are.

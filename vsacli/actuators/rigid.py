@@ -62,7 +62,3 @@ class Rigid(Actuator):
             elastic_energy=still * command.tau_e / 2,
             flags=np.zeros(still.shape, dtype=FLAG_TYPE),
         )
-
-    def spring_rates(self, of_joint: JointVariables) -> FloatArray:
-        """Return the rate of tau_e, which takes the place of a spring torque."""
-        return of_joint.dtau_e[None]

@@ -127,14 +127,14 @@ class Serial(VariableStiffness):
         return self.mechanism
 
     def deflections(self, unknowns: FloatArray) -> FloatArray:
-        """Return phi of motor 1; motor 2 has none, its position is the second unknown."""
+        """Return phi of motor 1; the second unknown is no deflection, but the position of motor 2."""
         return np.stack((unknowns[0], np.full_like(unknowns[0], np.nan)))
 
     def motor_positions(self, unknowns: Components, q: FloatArray) -> FloatArray:
         """Return theta_1 = phi + q, and theta_2, which is the setting."""
         return np.stack((unknowns[0] + q, unknowns[1]))
 
-    def unknowns(self, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def unknowns(self, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return phi of motor 1 and theta_2."""
         return phi[0], theta[1]
 
@@ -166,10 +166,6 @@ class _Springs(Elasticity):
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Return phi and theta_2."""
-        return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return the coordinates in which the range of the mechanism is stated."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -16,16 +17,16 @@ class SingleSpring(ElasticState):
 
     Args:
         spring: State of the spring.
-        energy: Its energy.
+        energy: Function that returns its energy, which few callers need.
     """
 
-    def __init__(self, spring: SpringState, energy: FloatArray) -> None:
+    def __init__(self, spring: SpringState, energy: Callable[[], FloatArray]) -> None:
         self._spring, self._energy = spring, energy
 
     @property
     def energy(self) -> FloatArray:
         """Energy of the spring."""
-        return self._energy
+        return self._energy()
 
     @property
     def tau_e(self) -> FloatArray:
@@ -41,6 +42,11 @@ class SingleSpring(ElasticState):
     def tau_transmission(self) -> tuple[FloatArray]:
         """Torque of the spring."""
         return (self._spring.tau,)
+
+    @property
+    def determinant(self) -> FloatArray:
+        """NaN: there is no matrix A."""
+        return np.full_like(self.tau_e, np.nan)
 
     def torque_rate(self, rates: Components) -> FloatArray:
         """Return sigma phi'."""
@@ -112,6 +118,5 @@ class SingleSprings(Elasticity):
 
     def state(self, phi: FloatArray) -> ElasticState:
         """Return the spring with its derivatives."""
-        return SingleSpring(
-            SpringState(*(values[..., 0] for values in self._rows.state(phi))), self.energy(phi)
-        )
+        spring = SpringState(*(values[..., 0] for values in self._rows.state(phi)))
+        return SingleSpring(spring, partial(self.energy, phi))

@@ -40,6 +40,10 @@ class VariableStiffness(Actuator):
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Actuator.solve`."""
 
+    def deflections(self, unknowns: FloatArray) -> FloatArray:
+        """Return phi, (2, samples), from the unknowns, or its rates; NaN for a motor without a deflection."""
+        return unknowns
+
     def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
         """Compute deflections on the actuator's branch, motion of the motors, and torques of the springs.
 

@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.elasticity import Components
 from vsacli.actuators.friction import REST, Friction
@@ -332,12 +333,20 @@ def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, Fl
     damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
     torque = damping * dtheta + of_joint.tau_transmission
     rate = damping * ddtheta
-    own = joint.actuator.spring_rates(of_joint)
-    rate = rate + (own if len(own) == SIDES else np.concatenate((own, np.full_like(own, np.nan))))
+    none = np.full_like(of_joint.q, np.nan)
+    rate = rate + np.stack([*_transmission_rates(joint.actuator, of_joint), none][:SIDES])
     if joint.damper_at("transmission"):
         against, its_rate = motor_torques(joint, of_joint)
         torque, rate = torque + against, rate + its_rate
     return torque * dtheta, rate * dtheta + torque * ddtheta
+
+
+def _transmission_rates(actuator: Actuator, of_joint: JointVariables) -> Sequence[FloatArray]:
+    """Return the rates of the torques that act on each motor beside its own losses."""
+    if not actuator.sprung:
+        return [of_joint.dtau_e]
+    rates = *actuator.unknowns(of_joint.dphi, of_joint.dtheta), of_joint.dq
+    return actuator.springs_of(of_joint).transmission_rates(rates)
 
 
 class _Moving(NamedTuple):

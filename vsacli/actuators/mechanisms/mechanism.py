@@ -50,16 +50,6 @@ class Partials(NamedTuple):
 class MechanismState(ElasticState):
     """State of a serial actuator's springs; the coordinates are phi, theta_2 and q."""
 
-    @property
-    @abstractmethod
-    def matrix(self) -> MotorMatrix:
-        """The matrix A."""
-
-    @property
-    def determinant(self) -> FloatArray:
-        """Det A."""
-        return self.matrix.determinant
-
     def sizes(self, unknowns: Components) -> tuple[FloatArray, FloatArray]:
         """Return the sizes of torque and stiffness.
 

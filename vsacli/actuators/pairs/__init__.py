@@ -2,7 +2,7 @@
 
 Equal cubic springs and tendons have closed solutions, in the file of their law. For all others: `balance` has
 the equations and steps, `critical_points` and `folds` the singularities that end a branch, `corridor` the
-attainable range, `solver` the iteration on it. `joints` has the decoupling matrix A of solved pairs.
+attainable range, `solver` the iteration on it. `pair_springs` has the pairs in motion, (62)-(72).
 """
 
 from __future__ import annotations

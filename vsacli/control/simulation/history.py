@@ -228,12 +228,11 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
     plant, drivetrain = loop.plant, loop.plant.drivetrain
     phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
     ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
-    phi, dphi = drivetrain.deflections(phase.q, phase.theta), drivetrain.deflections(phase.dq, phase.dtheta)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
     passed_on = torque if friction is None else torque - friction
     dampers = plant.dampers.passed(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
     tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), passed_on)
-    still, deflected = np.zeros_like(phase.q), drivetrain.deflected
+    deflected = drivetrain.deflected
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
     tau_motor = drivetrain.of_joints(torque)
     found = {
@@ -243,8 +242,8 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
         "stiffness": np.where(drivetrain.rigid, np.nan, springs.stiffness),  # (11)
         "dstiffness": np.where(drivetrain.rigid, np.nan, springs.dstiffness),  # (18)
         "tau_e": tau_e,
-        "phi": np.where(deflected, drivetrain.merged(phi, still), np.nan),
-        "dphi": np.where(deflected, drivetrain.merged(dphi, still), np.nan),
+        "phi": np.where(deflected, theta - phase.q[..., None], np.nan),
+        "dphi": np.where(deflected, dtheta - phase.dq[..., None], np.nan),
         "theta": theta,
         "dtheta": dtheta,
         "tau_transmission": drivetrain.merged(springs.tau_transmission, tau_e),

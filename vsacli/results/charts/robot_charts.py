@@ -353,16 +353,12 @@ def _within(levels: FloatArray, clearance: dict[str, FloatArray]) -> BoolArray:
     return within
 
 
-def _as_declared(law: SpringLaw) -> SpringLaw:
-    """Return the law of a robot file from one that acts on side 2, where tendons are mirrored."""
-    return law.law if isinstance(law, Mirrored) else law
-
-
 def _law_name(law: SpringLaw) -> str:
     """Return the name of a law in robot files."""
     if law.is_linear:
         return "linear"
-    return LAWS.name_of(type(_as_declared(law))).replace("_", " ")
+    declared = law.law if isinstance(law, Mirrored) else law  # a tendon that acts on side 2
+    return LAWS.name_of(type(declared)).replace("_", " ")
 
 
 def _numbered(numbers: Sequence[int]) -> str:

@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.robot.model import Robot
@@ -185,10 +184,10 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
         return
     stride = signals.filter.stride
     q, theta = signals.q[::stride, index], signals.theta[::stride, index]
-    phi = Drivetrain([actuator]).deflections(q[:, None], theta).T
-    springs = actuator.springs(phi, q)
+    unknowns = np.stack(actuator.unknowns(theta.T - q, theta.T))
+    springs = actuator.springs(unknowns, q)
     on_branch = actuator.solve(springs.tau_e, springs.stiffness, q).deflections
-    off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)
+    off = np.linalg.norm(on_branch - unknowns, axis=0) > ELSEWHERE * np.linalg.norm(unknowns, axis=0)
     if np.mean(off) > 1 / 2:
         yield (
             f"the springs of {robot.joint_names[index]} are deflected as on the branch "

@@ -10,6 +10,8 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
@@ -142,6 +144,24 @@ class SpringDemand(Published):
         return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
 
 
+def _spring_loads(
+    actuator: Actuator, of_joint: JointVariables
+) -> Iterator[tuple[str, float, FloatArray, FloatArray, FloatArray]]:
+    """Yield name, largest admissible deflection, energy, torque and deflection of springs of a joint.
+
+    Those of a mechanism are taken together: their deflection is that between motor 1 and link.
+    """
+    phi, limits = of_joint.phi, actuator.max_deflections
+    if isinstance(actuator, Antagonistic):
+        springs = [("spring 1", phi[0], limits[0]), ("spring 2", phi[1], limits[1])]
+        springs.append(("coupling", phi[0] - phi[1], math.inf))
+        for element, (name, deflection, limit) in zip(actuator.spring_elements, springs, strict=False):
+            law = element.law
+            yield name, limit, law.energy(deflection), law.torque(deflection), deflection
+    elif actuator.sprung:
+        yield "springs", limits[0], of_joint.elastic_energy, of_joint.tau_transmission[0], phi[0]
+
+
 class SpringPeaks:
     """The largest loads of springs over trajectories; `add` their blocks."""
 
@@ -152,15 +172,10 @@ class SpringPeaks:
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
-            for load in joint.actuator.spring_loads(JointVariables.of(block.of_joint(index))):
-                energy, torque, deflection = (
-                    Peak.of(values, block.time, trajectory)
-                    for values in (load.energy, load.torque, load.deflection)
-                )
-                new = SpringDemand(
-                    joint.name, joint.type, load.name, energy, torque, deflection, load.max_deflection
-                )
-                key = joint.name, load.name
+            for name, limit, *load in _spring_loads(joint.actuator, JointVariables.of(block.of_joint(index))):
+                energy, torque, deflection = (Peak.of(values, block.time, trajectory) for values in load)
+                new = SpringDemand(joint.name, joint.type, name, energy, torque, deflection, limit)
+                key = joint.name, name
                 self._found[key] = _larger(self._found.get(key, new), new)
 
     def report(self) -> tuple[SpringDemand, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -17,19 +18,24 @@ class PairSprings(ElasticState):
     Args:
         one: State of spring 1 (62)-(64), (66).
         two: State of spring 2.
-        energy: Energy of all springs.
-        coupling: State of a spring between the motors, over phi_1 - phi_2, if there is one.
+        energy: Function that returns the energy of all springs, which few callers need.
+        coupling: Function that returns the torque of a spring between the motors and its derivatives up to an
+            order, if there is one.
     """
 
     def __init__(
-        self, one: SpringState, two: SpringState, energy: FloatArray, coupling: SpringState | None = None
+        self,
+        one: SpringState,
+        two: SpringState,
+        energy: Callable[[], FloatArray],
+        coupling: Callable[[int], Sequence[FloatArray]] | None,
     ) -> None:
         self._one, self._two, self._energy, self._coupling = one, two, energy, coupling
 
     @property
     def energy(self) -> FloatArray:
         """Energy of all springs."""
-        return self._energy
+        return self._energy()
 
     @property
     def tau_e(self) -> FloatArray:
@@ -46,17 +52,13 @@ class PairSprings(ElasticState):
         """Torque of each spring, and of the coupling, which acts on the motors in opposite directions."""
         if self._coupling is None:
             return self._one.tau, self._two.tau
-        return self._one.tau + self._coupling.tau, self._two.tau - self._coupling.tau
+        (between,) = self._coupling(0)
+        return self._one.tau + between, self._two.tau - between
 
     @property
-    def _matrix(self) -> MotorMatrix:
+    def matrix(self) -> MotorMatrix:
         """The matrix A: stiffness and slope of each spring."""
         return MotorMatrix(self._one.sigma, self._two.sigma, self._one.zeta, self._two.zeta)
-
-    @property
-    def determinant(self) -> FloatArray:
-        """Det A (67)."""
-        return self._matrix.determinant
 
     def sizes(self, _unknowns: Components) -> tuple[FloatArray, FloatArray]:
         """Return the sum of the sizes of both torques, and the stiffness."""
@@ -79,12 +81,12 @@ class PairSprings(ElasticState):
         of_one, of_two = self._one.sigma * rates[0], self._two.sigma * rates[1]
         if self._coupling is None:
             return of_one, of_two
-        between = self._coupling.sigma * (rates[0] - rates[1])
+        between = self._coupling(1)[1] * (rates[0] - rates[1])
         return of_one + between, of_two - between
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray, ...]:
         """Return A^-1 (tau_e', sigma'), (68)."""
-        return self._matrix.solve(dtau_e, dstiffness)
+        return self.matrix.solve(dtau_e, dstiffness)
 
     def motor_accelerations(
         self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -92,7 +94,7 @@ class PairSprings(ElasticState):
         """Return A^-1 beta (72), with the sums (11) and (65)."""
         one, two = self._one, self._two
         squared_1, squared_2 = rates[0] * rates[0], rates[1] * rates[1]
-        return self._matrix.solve(
+        return self.matrix.solve(
             ddtau_e - (one.zeta * squared_1 + two.zeta * squared_2) + (one.sigma + two.sigma) * ddq,  # (70)
             ddstiffness - (one.eta * squared_1 + two.eta * squared_2) + (one.zeta + two.zeta) * ddq,  # (71)
         )
@@ -123,5 +125,6 @@ class PairElasticity(Elasticity):
         """Return the springs with their derivatives."""
         springs = self._springs.state(phi)
         one, two = (SpringState(*(values[..., side] for values in springs)) for side in range(2))
-        coupling = None if self._coupling is None else self._coupling.state(phi[..., 0] - phi[..., 1])
-        return PairSprings(one, two, self.energy(phi), coupling)
+        law, apart = self._coupling, phi[..., 0] - phi[..., 1]
+        coupling = None if law is None else partial(law.derivatives, apart)
+        return PairSprings(one, two, partial(self.energy, phi), coupling)
