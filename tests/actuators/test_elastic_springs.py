@@ -97,10 +97,10 @@ def test_a_tendon_does_not_push() -> None:
     assert found.flags.tolist() == [slack, slack, 0, 0]
     np.testing.assert_allclose(found.stiffness, [np.nan, np.nan, 24, 42])
     for name in ("stiffness", "dstiffness", "ddstiffness", "elastic_energy"):
-        assert np.isnan(found[name][:2]).all()
+        assert np.isnan(getattr(found, name)[:2]).all()
     for name in ("phi", "dphi", "ddtheta", "tau_transmission"):
-        assert np.isnan(found[name][0, :2]).all()
-        assert np.isfinite(found[name][0, 2:]).all()
+        assert np.isnan(getattr(found, name)[0, :2]).all()
+        assert np.isfinite(getattr(found, name)[0, 2:]).all()
 
 
 def test_a_tendon_without_stiffness_at_rest_is_singular_there() -> None:

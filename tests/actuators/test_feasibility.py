@@ -233,9 +233,9 @@ def test_limits_do_not_move_the_corridor():
     for name in ("phi", "tau_motor", "stiffness_min", "stiffness_max"):
         free, held = (drive(joint_with(each), command(tau_e=20.0)) for each in (None, limited))
         if name != "tau_motor":
-            np.testing.assert_array_equal(free[name], held[name])
-    assert Flag(int(held["flags"][0])) == Flag.DEFLECTION_LIMIT
-    assert np.all(np.isfinite(held["tau_motor"]))
+            np.testing.assert_array_equal(getattr(free, name), getattr(held, name))
+    assert Flag(int(held.flags[0])) == Flag.DEFLECTION_LIMIT
+    assert np.all(np.isfinite(held.tau_motor))
 
 
 def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
