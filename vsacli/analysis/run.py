@@ -18,7 +18,7 @@ from vsacli.analysis.between_samples import Between, Minima
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
-from vsacli.analysis.run_dynamics import RunDynamics, damped_motions, integrated
+from vsacli.analysis.run_dynamics import RunDynamics, choose_deflections, damped_motions
 from vsacli.analysis.self_check import RunCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
@@ -92,7 +92,7 @@ class Run:
             robot,
             trajectory,
             min_margin=min_margin,
-            deflections=integrated(deflection_solver, robot, trajectory),
+            deflections=choose_deflections(deflection_solver, robot, trajectory),
             internal=damped_motions(robot, trajectory),
         )
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
@@ -127,22 +127,22 @@ class Run:
         starts = range(0, self.trajectory.samples, self._block_samples)
         motions = (self.trajectory.block(start, start + self._block_samples) for start in starts)
         if self.choice.threads == 1 or not self._ahead:
-            return map(self._dynamics.of_motion, motions)
+            return map(self._dynamics.compute, motions)
         from vsacli.base.background import ahead
 
-        return ahead(self._dynamics.of_motion, motions)
+        return ahead(self._dynamics.compute, motions)
 
     def _finish(self, block: Block) -> Block:
         """Take the next block through the stages after the search between samples; return what is stored."""
         between = self._between.nearest(block)
-        _mark(between, block)
+        _mark_minima(between, block)
         if self._stop_on_infeasible:
             block, between = self._until_infeasible(block, between)
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
-            _mark(between, block)  # again, since the samples themselves may keep limits within it
+            _mark_minima(between, block)  # again, since the samples themselves may keep limits within it
         self._summarize(block, between)
-        return self._stored(block)
+        return self._without_balances(block)
 
     def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:
         """Return a block up to its first infeasible sample, with the minima of these samples."""
@@ -166,7 +166,7 @@ class Run:
         for drift in self._drifts:
             drift.add(block)
 
-    def _stored(self, block: Block) -> Block:
+    def _without_balances(self, block: Block) -> Block:
         """Return a block without the quantities of the self-check, and with the energy of its motors."""
         stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
         return Block(**stored, motor_energy=self._energy.add(block))
@@ -236,7 +236,7 @@ class Run:
             yield f"{joint}: what moves inside its damped transmission {when}: {stop.reason}"
 
 
-def _mark(between: Iterable[Minima], block: Block) -> None:
+def _mark_minima(between: Iterable[Minima], block: Block) -> None:
     """Set the flags of minima in those of the nearest samples."""
     for minima in between:
         minima.mark(block.flags)

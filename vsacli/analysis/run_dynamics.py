@@ -12,7 +12,7 @@ from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.variables import Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
-from vsacli.dynamics.deflection_rows import IntegratedRows, InternalRows
+from vsacli.dynamics.deflection_rows import IntegratedRows, InternalRows, internal_rows
 from vsacli.dynamics.inverse import InverseDynamics, block_of, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
@@ -59,16 +59,18 @@ class RunDynamics:
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self.kernel = BalancedDynamics(InverseDynamics(robot, frame, min_margin, tuple(inputs)))
 
-    def of_motion(self, motion: Motion) -> Block:
+    def compute(self, motion: Motion) -> Block:
         """Return the variables of a part of the trajectory."""
-        rows = {} if self.deflections is None else self.deflections.rows(motion.time)
+        time, rows = motion.time, dict[str, FloatArray]()
+        if self.deflections is not None:
+            rows["phi"] = self.deflections.at(time).reshape(-1, len(time))
         if self.internal is not None:
-            rows |= self.internal.rows(motion.time - self.trajectory.start)
+            rows |= internal_rows(self.internal.at(time - self.trajectory.start))
         return block_of(self.kernel, motion, self.engine, rows)
 
     def at(self, time: FloatArray) -> Block:
         """Return the variables at any times of the trajectory."""
-        return self.of_motion(self.trajectory.at(time))
+        return self.compute(self.trajectory.at(time))
 
     def blocks_at(self, time: FloatArray) -> Iterator[tuple[slice, Block]]:
         """Yield the variables at many times in blocks of the usual size, each with its part of the times."""
@@ -78,7 +80,7 @@ class RunDynamics:
             yield part, self.at(time[part])
 
 
-def integrated(
+def choose_deflections(
     deflection_solver: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
 ) -> IntegratedDeflections | None:
     """Return the deflections to use instead of the root of (14) at each sample; None for the root.

@@ -25,7 +25,6 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import (
-    BALANCED,
     balances,
     damped_joints,
     link_energy,
@@ -112,20 +111,19 @@ class RunCheck:
     """
 
     def __init__(self, dynamics: RunDynamics) -> None:
-        joints = dynamics.robot.joints
-        self._dynamics, self._joints = dynamics, joints
+        self._dynamics, self._joints = dynamics, dynamics.robot.joints
         self._probed = evenly(dynamics.trajectory.samples, PROBES)
         self._excerpts: list[dict[str, AnyArray]] = []
         self._samples = 0
         self._error, self._shaft_error = 0.0, 0.0
-        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(joints))))
+        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(self._joints))))
 
     def add(self, block: Block) -> None:
         """Merge a block of `BalancedDynamics`."""
         first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
         probed = self._probed[first:last] - self._samples
         self._excerpts.append(
-            {name: array[probed] for name, array in block.arrays().items() if name in BALANCED}
+            {name: array[probed] for name, array in block.arrays().items() if name in JointVariables._fields}
         )
         self._samples += len(block.time)
         self._error = np.maximum(self._error, block.spring_error.max())

@@ -32,12 +32,6 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
 
-SHAFT_VARIABLES = (
-    *("q", "dq", "tau_e", "stiffness", "damping", "theta", "dtheta", "ddtheta", "dphi", "tau_damper"),
-    *("tau_motor", "motor_power", "current", "voltage", "copper_loss", "dissipated_power"),
-)
-"""Variables of a joint that enter the balances, where it has them."""
-
 POSITION_ROUNDING = 8 * np.finfo(float).eps
 """Error of phi = theta - q by rounding, relative to the size of q and theta: a few roundings."""
 
@@ -52,7 +46,7 @@ def shaft_error(
 
     Args:
         joint: Joint.
-        of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
+        of_joint: Variables of the joint.
         tau_transmission: Torque of the springs against each motor by their laws, each (samples,).
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
@@ -211,10 +205,6 @@ BALANCES = {
 """Quantities of the balances; they are computed with the result variables, but not stored."""
 
 
-BALANCED = {*SHAFT_VARIABLES, "phi", "flags"}
-"""Variables from which the balances of springs and shafts are computed."""
-
-
 class BalancedBlock(Block):
     """A block with the result variables and `BALANCES`."""
 
@@ -234,11 +224,6 @@ class BalancedDynamics(BlockKernel):
     block = BalancedBlock
 
     dynamics: InverseDynamics
-
-    @property
-    def variables(self) -> frozenset[str]:
-        """See `BlockKernel.variables`."""
-        return self.dynamics.variables
 
     @property
     def arguments(self) -> RowLayout:

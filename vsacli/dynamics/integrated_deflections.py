@@ -280,10 +280,6 @@ class IntegratedDeflections:
                 phi[joint, :, time >= stop.time] = np.nan
         return phi
 
-    def rows(self, time: FloatArray) -> dict[str, FloatArray]:
-        """Return the inputs of a kernel with `IntegratedRows` at times, by name."""
-        return {"phi": self.at(time).reshape(-1, len(time))}
-
 
 def integrate_deflections(
     robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE

@@ -21,7 +21,6 @@ from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
-from vsacli.dynamics.deflection_rows import internal_rows
 from vsacli.dynamics.integrated_deflections import Pieces
 from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
 from vsacli.robot.model import Robot
@@ -372,10 +371,6 @@ class InternalMotions:
         gone = (elapsed >= marched.end) & (marched.reason is not None)
         phi, rates = (np.where(gone, np.nan, each.at(elapsed)) for each in (marched.phi, marched.rates))
         return InternalMotion(phi, *rates)
-
-    def rows(self, elapsed: FloatArray) -> dict[str, FloatArray]:
-        """Return the inputs of a kernel with `InternalRows`, by name; times as for `at`."""
-        return internal_rows(self.at(elapsed))
 
 
 def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:

@@ -6,7 +6,6 @@ rows, and the results into a `Block`. Before that, `fitted` checks a trajectory 
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -70,11 +69,6 @@ class BlockKernel(RowKernel):
 
     block: ClassVar[type[Block]] = Block
 
-    @property
-    @abstractmethod
-    def variables(self) -> frozenset[str]:
-        """Names of the variables that results of the robot have."""
-
 
 @dataclass(frozen=True)
 class InverseDynamics(BlockKernel):
@@ -101,11 +95,6 @@ class InverseDynamics(BlockKernel):
         return LinkTorques(self.robot, self.frame)
 
     @cached_property
-    def variables(self) -> frozenset[str]:
-        """See `BlockKernel.variables`."""
-        return frozenset(name for name, variable in VARIABLES.items() if self.robot.has(variable))
-
-    @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
         joints = len(self.robot.joints)
@@ -123,7 +112,7 @@ class InverseDynamics(BlockKernel):
             {
                 name: (joints, SIDES) if "motor" in VARIABLES[name].dims else (joints,)
                 for name in COMPUTED
-                if name in self.variables
+                if self.robot.has(VARIABLES[name])
             }
         )
 
@@ -135,7 +124,9 @@ class InverseDynamics(BlockKernel):
         """Return the variables of each joint."""
         inputs = self.arguments.unpack(rows)
         torques = self.links(self.links.arguments.pack(inputs))  # (36)-(60)
-        of_all = {**inputs, **self.links.results.unpack([_as_row(torque, rows[0]) for torque in torques])}
+        # The recursion gives the integer 0 for joints that move no mass.
+        rows_of_links = [np.full_like(rows[0], row) if np.ndim(row) == 0 else row for row in torques]
+        of_all = {**inputs, **self.links.results.unpack(rows_of_links)}
         names, joints = Command.names(signal.key for signal in self.robot.signals), self.robot.joints
         commands = (Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints)))
         deflections = (self._deflections(index, inputs) for index in range(len(joints)))
@@ -144,7 +135,7 @@ class InverseDynamics(BlockKernel):
         of_joints: list[JointVariables] = call_at_joints(rows[0], drive, joints, demands, limits)  # (61)-(74)
         for joint, of_joint in zip(joints, of_joints, strict=True):
             _check_limits(joint, of_joint)
-        if "dissipated_power" in self.variables:
+        if "dissipated_power" in self.results.shapes:
             powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
             of_joints = [
                 of_joint._replace(dissipated_power=power)
@@ -163,12 +154,11 @@ class InverseDynamics(BlockKernel):
     ) -> dict[str, Iterable[Any]]:
         """Return the rows of each result by name, from the input rows and the variables of the joints."""
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0].dtheta, np.nan)}
-        computed: dict[str, Iterable[Any]] = {}
-        for name in self.results.shapes:
-            arrays = [getattr(of_joint, name) for of_joint in of_joints]
-            none = absent[len(VARIABLES[name].dims)]
-            computed[name] = rows_of_joints(none if array is None else array for array in arrays)
-        return computed
+        present = [of_joint.by_name() for of_joint in of_joints]
+        return {
+            name: rows_of_joints([arrays.get(name, absent[len(VARIABLES[name].dims)]) for arrays in present])
+            for name in self.results.shapes
+        }
 
 
 def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
@@ -201,11 +191,6 @@ def call_at_joints(
         counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
         bodies.append(Keyed((function, *counting, key), partial(function, joint)))
     return [call(row, body, *of_joint) for body, of_joint in zip(bodies, arguments, strict=True)]
-
-
-def _as_row(torque: Scalar, row: Scalar) -> Scalar:
-    """Return a torque as a row of samples; the recursion gives the integer 0 for joints that move no mass."""
-    return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
 
 
 def compute_block(
@@ -301,12 +286,13 @@ def block_of(
         engine: Backend.
         deflections: Rows of the deflections that are inputs of the kernel, (rows, samples), by name.
     """
-    commanded = {name: array for name, array in motion.variables().items() if name in kernel.variables}
-    rows = {name: by_joint(commanded[name]) for name in kernel.arguments.shapes if name in commanded}
+    inputs = kernel.arguments.shapes
+    commanded = {name: array for name, array in motion.variables().items() if name in inputs}
+    rows = {name: by_joint(array) for name, array in commanded.items()}
     results = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack({**rows, **deflections})))
-    computed = {name: over_time(array) for name, array in results.items()}
-    arrays: dict[str, AnyArray] = {**commanded, **computed, "flags": computed["flags"].astype(FLAG_TYPE)}
-    return kernel.block(**arrays)
+    computed: dict[str, AnyArray] = {name: over_time(array) for name, array in results.items()}
+    computed["flags"] = computed["flags"].astype(FLAG_TYPE)
+    return kernel.block(time=motion.time, **{**commanded, **computed})
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
