@@ -247,7 +247,8 @@ class DampedSprings:
         return _Springs(state, MotorMatrix(one, two, *of_stiffness))
 
     def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
-        return self._actuator.springs(phi[: self._motors], q)
+        theta = self._positions(phi, q)
+        return self._actuator.springs(self._actuator.unknowns(theta - q, theta), q)
 
     def _positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         return self._actuator.motor_positions(phi[: self._motors], q)

@@ -288,7 +288,7 @@ def integrate_deflections(
 
     The integration uses the smooth functions of the trajectory and ignores derivatives given with samples.
     For a joint it ends where A becomes singular or the stiffness is unattainable; the other joints continue.
-    Only kinds of actuator that are `integrable` have deflections to integrate.
+    Only joints with a commanded stiffness have deflections to integrate.
 
     Args:
         robot: Robot.
