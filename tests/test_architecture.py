@@ -45,7 +45,7 @@ NOT_FOR_THE_MAIN_JOB = (
 )
 """Modules, here and elsewhere, that take time to import and have no part in the paper's example."""
 
-MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 472, 51_492, 19, 1
+MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 472, 51_493, 19, 1
 """How many files and statements of Python the package has at most, names of files that several folders
 have, and docstrings that begin without a verb or a noun. A change that needs more raises these, with its
 reason in its message; one that needs less lowers them."""

@@ -66,8 +66,9 @@ def internal_rows(motions: Mapping[int, InternalMotion]) -> dict[str, FloatArray
     """Return the inputs of `InternalRows`, from the motion of each of its joints, in that order."""
     columns = zip(*motions.values(), strict=True)
     # Compiled code reads rows that are contiguous, which stacking columns would not give.
-    rows = (np.ascontiguousarray(np.vstack(column)) for column in columns)
-    return dict(zip(INTERNAL, rows, strict=False))
+    return {
+        name: np.ascontiguousarray(np.vstack(column)) for name, column in zip(INTERNAL, columns, strict=False)
+    }
 
 
 def _both_sides(rows: Sequence[Scalar], place: int) -> FloatArray:
