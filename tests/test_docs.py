@@ -24,7 +24,7 @@ from samples.marks import slow
 from site_parts import contents
 
 import vsacli
-from vsacli.analysis.derivative_check import LADDER_BOUND, SPRING_BOUND
+from vsacli.analysis.self_check import LADDER_BOUND, SPRING_BOUND
 from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
 from vsacli.cli.main import vsacli as group
 from vsacli.documents.source import MAX_DOCUMENT_BYTES

@@ -19,8 +19,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws import Cubic, Exponential, FourBar, Polynomial, Quadratic, SpringLaw
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.errors import InvalidRecordError
 from vsacli.base.flags import Flag
 
@@ -45,7 +44,7 @@ def asked(tau_e: list[float], **rates: float) -> Command:
     return Command.of({**arrays, "tau_e": np.array(tau_e)})
 
 
-def transmit(law: SpringLaw, tau_e: list[float], **rates: float) -> OfJoint:
+def transmit(law: SpringLaw, tau_e: list[float], **rates: float) -> JointVariables:
     return elastic(law).transmit(asked(tau_e, **rates), 0.01, None)
 
 
@@ -78,7 +77,7 @@ def test_the_deflection_is_the_root_that_bracketing_finds(law: str, side: int) -
     low, high = np.clip(spring.domain, -0.6, 0.6)
     torque = curve.torque(np.linspace(low, high, 41)[1:-1])
     found = transmit(spring, torque.tolist())
-    for load, deflection in zip(torque, found["phi"][0], strict=True):
+    for load, deflection in zip(torque, found.phi[0], strict=True):
         root = brentq(lambda x, load=load: float(curve.torque(np.array(x))) - load, low, high, xtol=1e-15)
         assert deflection == pytest.approx(root, rel=1e-11, abs=1e-12)  # where there is no stiffness at rest
 
@@ -87,28 +86,28 @@ def test_a_linear_law_is_the_same_as_its_stiffness() -> None:
     command = asked([-3.0, 0.0, 7.0], dtau_e=2.0, ddtau_e=-5.0, ddq=1.5)
     linear = Elastic(motor=MOTOR, stiffness=40).transmit(command, 0.01, None)
     law = elastic(Polynomial(c1=40)).transmit(command, 0.01, None)
-    assert law.keys() == linear.keys()
-    for name in law:
-        np.testing.assert_allclose(law[name], linear[name], rtol=1e-15)
+    assert law.by_name().keys() == linear.by_name().keys()
+    for name, values in law.by_name().items():
+        np.testing.assert_allclose(values, getattr(linear, name), rtol=1e-15)
 
 
 def test_a_tendon_does_not_push() -> None:
     found = transmit(Exponential(c=4, a=6), [-1.0, -1e-12, 0.0, 3.0], dtau_e=1.0)
     slack = Flag.INFEASIBLE | Flag.SLACK
-    assert found["flags"].tolist() == [slack, slack, 0, 0]
-    np.testing.assert_allclose(found["stiffness"], [np.nan, np.nan, 24, 42])
+    assert found.flags.tolist() == [slack, slack, 0, 0]
+    np.testing.assert_allclose(found.stiffness, [np.nan, np.nan, 24, 42])
     for name in ("stiffness", "dstiffness", "ddstiffness", "elastic_energy"):
-        assert np.isnan(found[name][:2]).all()
+        assert np.isnan(getattr(found, name)[:2]).all()
     for name in ("phi", "dphi", "ddtheta", "tau_transmission"):
-        assert np.isnan(found[name][0, :2]).all()
-        assert np.isfinite(found[name][0, 2:]).all()
+        assert np.isnan(getattr(found, name)[0, :2]).all()
+        assert np.isfinite(getattr(found, name)[0, 2:]).all()
 
 
 def test_a_tendon_without_stiffness_at_rest_is_singular_there() -> None:
     found = transmit(Quadratic(k=100), [0.0, 4.0], dtau_e=1.0)
-    assert found["flags"].tolist() == [Flag.SINGULAR, 0]
-    assert (found["phi"][0, 0], found["tau_transmission"][0, 0], found["stiffness"][0]) == (0, 0, 0)
-    for values in (found["dphi"][0], found["ddtheta"][0], found["dstiffness"], found["ddstiffness"]):
+    assert found.flags.tolist() == [Flag.SINGULAR, 0]
+    assert (found.phi[0, 0], found.tau_transmission[0, 0], found.stiffness[0]) == (0, 0, 0)
+    for values in (found.dphi[0], found.ddtheta[0], found.dstiffness, found.ddstiffness):
         assert np.isnan(values[0])
         assert np.isfinite(values[1])
 
@@ -118,8 +117,8 @@ def test_beyond_the_end_of_its_law_a_spring_carries_nothing(law: SpringLaw) -> N
     low, high = law.torque_range
     # what exceeds the end by less than a billionth, as rounding does, is at the end
     found = transmit(law, [1.001 * low, low, high, high * (1 + 1e-10), 1.001 * high])
-    assert found["flags"].tolist() == [Flag.INFEASIBLE, 0, 0, 0, Flag.INFEASIBLE]
-    np.testing.assert_allclose(found["phi"][0, 1:4], [*law.domain, law.domain[1]], rtol=1e-9)
+    assert found.flags.tolist() == [Flag.INFEASIBLE, 0, 0, 0, Flag.INFEASIBLE]
+    np.testing.assert_allclose(found.phi[0, 1:4], [*law.domain, law.domain[1]], rtol=1e-9)
 
 
 def test_a_law_or_a_stiffness_but_not_both() -> None:

@@ -25,7 +25,8 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.reach import OfJoint, margin, reach_flags
+from vsacli.actuators.reach import margin, reach_flags
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -38,7 +39,7 @@ LOST_AT_A_FOLD = ("dphi", "dtheta", "ddtheta", "tau_motor")
 
 
 def flags_of(joint: Joint, **given: FloatArray | float) -> list[Flag]:
-    return [Flag(int(bits)) for bits in drive(joint, command(**given))["flags"]]
+    return [Flag(int(bits)) for bits in drive(joint, command(**given)).flags]
 
 
 def corridor(lower: float, upper: float, *, critical: bool = True, slack: bool = False) -> PairSolution:
@@ -118,14 +119,14 @@ def test_threshold_must_be_a_margin(threshold: float):
 # What is NaN
 
 
-def values_of(driven: OfJoint, name: str) -> FloatArray:
+def values_of(driven: JointVariables, name: str) -> FloatArray:
     """(samples, ...) of a variable of the motors."""
-    return np.moveaxis(driven[name], -1, 0)
+    return np.moveaxis(getattr(driven, name), -1, 0)
 
 
 def test_infeasible_step_has_no_motor_variables():
     driven = drive(joint_with(), command(tau_e=np.array([10.0, 40.0, 10.0]), stiffness=806.0))
-    assert [Flag(int(bits)) for bits in driven["flags"]] == [
+    assert [Flag(int(bits)) for bits in driven.flags] == [
         Flag.NEAR_SINGULAR,
         Flag.INFEASIBLE,
         Flag.NEAR_SINGULAR,
@@ -134,20 +135,20 @@ def test_infeasible_step_has_no_motor_variables():
         values = values_of(driven, name)
         assert np.all(np.isnan(values[1])), name
         assert np.all(np.isfinite(values[[0, 2]])), name
-    assert np.all(np.isfinite(driven["stiffness_min"]))
-    assert np.all(driven["stiffness_max"] == math.inf)
+    assert np.all(np.isfinite(driven.stiffness_min))
+    assert np.all(driven.stiffness_max == math.inf)
 
 
 @pytest.mark.parametrize("tau_e", [0.0, 40.0, 400.0])
 def test_singular_step_keeps_what_needs_no_inverse(tau_e: float):
-    lower = drive(joint_with(), command(tau_e=tau_e))["stiffness_min"]
+    lower = drive(joint_with(), command(tau_e=tau_e)).stiffness_min
     driven = drive(joint_with(), command(tau_e=tau_e, stiffness=lower, dtau_e=5.0))
-    assert Flag(int(driven["flags"][0])) == Flag.SINGULAR
+    assert Flag(int(driven.flags[0])) == Flag.SINGULAR
     for name in MOTOR_VARIABLES:
         lost = name in LOST_AT_A_FOLD
-        assert np.all(np.isnan(driven[name]) == lost), name
+        assert np.all(np.isnan(getattr(driven, name)) == lost), name
     # The springs carry the load: rounding of the spread's square root, 1e-8, squared.
-    assert driven["tau_transmission"].sum() == pytest.approx(tau_e, abs=1e-12 * (1 + tau_e))
+    assert driven.tau_transmission.sum() == pytest.approx(tau_e, abs=1e-12 * (1 + tau_e))
 
 
 def test_other_joints_are_untouched_by_an_infeasible_one():
@@ -166,16 +167,16 @@ def test_other_joints_are_untouched_by_an_infeasible_one():
 
 def test_end_of_a_laws_domain_is_no_singularity():
     actuator = springs(Stopped(k=400, k_c=2000), Stopped(k=400, k_c=2000))
-    upper = drive(joint_with(actuator), command(tau_e=10.0))["stiffness_max"]
+    upper = drive(joint_with(actuator), command(tau_e=10.0)).stiffness_max
     tau_e = np.array([10.0, 10.0, 10.0, 61.0])
     driven = drive(
         joint_with(actuator), command(tau_e=tau_e, stiffness=upper * np.array([0.999, 1, 1.001, 1]))
     )
-    assert [int(bits) for bits in driven["flags"]] == [0, 0, Flag.INFEASIBLE, Flag.INFEASIBLE]
+    assert [int(bits) for bits in driven.flags] == [0, 0, Flag.INFEASIBLE, Flag.INFEASIBLE]
     # One spring is at its stop, the other carries the rest.
-    np.testing.assert_allclose(driven["tau_transmission"][:, 1], [30, -20], rtol=1e-14)
-    assert np.all(np.isfinite(driven["tau_motor"][:, :2]))
-    assert np.isnan([driven["stiffness_min"][3], driven["stiffness_max"][3]]).all()
+    np.testing.assert_allclose(driven.tau_transmission[:, 1], [30, -20], rtol=1e-14)
+    assert np.all(np.isfinite(driven.tau_motor[:, :2]))
+    assert np.isnan([driven.stiffness_min[3], driven.stiffness_max[3]]).all()
 
 
 # Limits
@@ -204,7 +205,9 @@ def test_each_limit_has_its_bit():
 )
 def test_limits_of_a_side_are_its_own(side: int, variable: str, limit: str, bit: Flag):
     asked = {"tau_e": 8.0, "stiffness": 900.0, "dq": 0.5, "dtau_e": 20.0}
-    reached = abs(float(drive(joint_with(springs(ALIKE, ALIKE)), command(**asked))[variable][side, 0]))
+    reached = abs(
+        float(getattr(drive(joint_with(springs(ALIKE, ALIKE)), command(**asked)), variable)[side, 0])
+    )
     for factor, expected in [(1.0, Flag(0)), (1 + 1e-6, Flag(0)), (1 - 1e-6, bit)]:
         motors, laws = [Motor(inertia=3, damping=0.1)] * 2, [ALIKE] * 2
         parts = laws if limit == "max_deflection" else motors
@@ -230,19 +233,19 @@ def test_limits_do_not_move_the_corridor():
     for name in ("phi", "tau_motor", "stiffness_min", "stiffness_max"):
         free, held = (drive(joint_with(each), command(tau_e=20.0)) for each in (None, limited))
         if name != "tau_motor":
-            np.testing.assert_array_equal(free[name], held[name])
-    assert Flag(int(held["flags"][0])) == Flag.DEFLECTION_LIMIT
-    assert np.all(np.isfinite(held["tau_motor"]))
+            np.testing.assert_array_equal(getattr(free, name), getattr(held, name))
+    assert Flag(int(held.flags[0])) == Flag.DEFLECTION_LIMIT
+    assert np.all(np.isfinite(held.tau_motor))
 
 
 def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
     actuator = springs(*[Quadratic(k=1000, max_deflection=0.1)] * 2)
     found = drive(joint_with(actuator), command(stiffness=1000.0))  # 2 k |phi| on either side
-    np.testing.assert_allclose(found["phi"][:, 0], [0.25, -0.25], rtol=1e-12)
-    checks = [check.motor for check in actuator.limits() if check.flag is Flag.DEFLECTION_LIMIT]
-    held = [check for check in actuator.limits() if np.isfinite(check.range).all()]
+    np.testing.assert_allclose(found.phi[:, 0], [0.25, -0.25], rtol=1e-12)
+    checks = [check.motor for check in actuator.limits if check.flag is Flag.DEFLECTION_LIMIT]
+    held = [check for check in actuator.limits if np.isfinite(check.range).all()]
     assert checks == [1, 2]
-    assert [check.flags({"phi": found["phi"]}).tolist() for check in held] == [[Flag.DEFLECTION_LIMIT]] * 2
+    assert [check.flags({"phi": found.phi}).tolist() for check in held] == [[Flag.DEFLECTION_LIMIT]] * 2
 
 
 # The other branch

@@ -114,7 +114,7 @@ def test_a_wrong_derivative_of_any_kind_fails(
         driven = drive(joint, *arguments)
         if joint.actuator_type != kind:
             return driven
-        return {**driven, name: driven[name] * (1 + 1e-6)}
+        return driven._replace(**{name: getattr(driven, name) * (1 + 1e-6)})
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
     check = inverse_dynamics(robot, motion).report.self_check
@@ -129,7 +129,7 @@ def test_a_wrong_deflection_of_an_elastic_joint_fails(
     def spoiled(joint, *arguments):
         driven = drive(joint, *arguments)
         factor = 1 + 1e-9 if joint.actuator_type == "elastic" else 1
-        return {**driven, "phi": driven["phi"] * factor}
+        return driven._replace(phi=driven.phi * factor)
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
     check = inverse_dynamics(robot, motion).report.self_check
@@ -142,8 +142,8 @@ def test_missing_numbers_fail(robot: Robot, motion: Trajectory, monkeypatch: pyt
         driven = drive(joint, *arguments)
         if joint.actuator_type != "rigid":
             return driven
-        none = np.full_like(driven["theta"], np.nan)
-        return {**driven, "theta": none, "dtheta": none, "ddtheta": none}
+        none = np.full_like(driven.theta, np.nan)
+        return driven._replace(theta=none, dtheta=none, ddtheta=none)
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
     assert not inverse_dynamics(robot, motion).report.self_check.passed

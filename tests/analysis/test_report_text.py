@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from vsacli.analysis.derivative_check import SelfCheck
 from vsacli.analysis.joint_report import COUNTED, JointReport
 from vsacli.analysis.report import Report
+from vsacli.analysis.self_check import SelfCheck
 from vsacli.analysis.trouble_text import counts, findings
 from vsacli.base.fitted_text import fitted
 from vsacli.dynamics.energy import JointEnergy

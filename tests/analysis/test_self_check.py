@@ -18,9 +18,9 @@ from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.reach import OfJoint
-from vsacli.analysis.derivative_check import LADDER_BOUND, ROUNDING_GAIN, ladder
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.report import Report
+from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine.engines import Kernel
@@ -165,7 +165,7 @@ def fast_recording(**options: Any) -> Trajectory:
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
     whole = ladder(*load("7R"))
-    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     assert ladder(*load("7R")) == whole
 
 
@@ -204,7 +204,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
     motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
     stiffness = Constant(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
     trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
-    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     tracemalloc.start()
     try:
         ladder(chain, trajectory)
@@ -272,11 +272,11 @@ def spoil_drive(
 ) -> None:
     """Let the actuation return a variable, (2, samples), with a defect, at one joint or at all."""
 
-    def spoiled(joint, *arguments) -> OfJoint:
+    def spoiled(joint, *arguments) -> JointVariables:
         driven = drive(joint, *arguments)
         if joint_name not in ("", joint.name):
             return driven
-        return {**driven, name: spoil(driven[name])}
+        return driven._replace(**{name: spoil(getattr(driven, name))})
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
 

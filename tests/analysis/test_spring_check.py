@@ -8,8 +8,8 @@ import pytest
 from samples.shipped import shipped_run
 
 from vsacli import inverse_dynamics
-from vsacli.actuators.reach import OfJoint
-from vsacli.analysis.derivative_check import LADDER_BOUND
+from vsacli.actuators.transmission import JointVariables
+from vsacli.analysis.self_check import LADDER_BOUND
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine import NUMPY, Choice, Kernel
 from vsacli.dynamics.balances import BalancedDynamics
@@ -36,7 +36,7 @@ def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int,
     """A 199th of the 4001 steps, which are in one block; finite differences do not show it."""
     choice = Choice(Faulty(first, 21), "a fault")
     monkeypatch.setattr("vsacli.analysis.run.choose", lambda *_, **_keywords: choice)
-    monkeypatch.setattr("vsacli.analysis.run.ladder", lambda *_: (0.0, LADDER_BOUND))
+    monkeypatch.setattr("vsacli.analysis.self_check.ladder", lambda *_: (0.0, LADDER_BOUND))
     check = inverse_dynamics(*shipped_run(*RUN)).report.self_check
     assert check.spring_residual > 1e-11
     assert not check.passed
@@ -45,11 +45,11 @@ def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int,
 def test_the_residual_of_every_step_counts(monkeypatch):
     """Also of one that is not among those whose laws are evaluated apart."""
 
-    def spoiled(joint, *arguments) -> OfJoint:
+    def spoiled(joint, *arguments) -> JointVariables:
         driven = drive(joint, *arguments)
-        phi = driven["phi"].copy()
+        phi = driven.phi.copy()
         phi[:, phi.shape[1] // 3 + 1 :: 10**6] += 1e-9
-        return {**driven, "phi": phi}
+        return driven._replace(phi=phi)
 
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
     assert inverse_dynamics(*shipped_run(*RUN)).report.self_check.spring_residual > 1e-11

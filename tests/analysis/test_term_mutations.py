@@ -11,7 +11,7 @@ from samples.term_mutations import MUTATIONS, Mutation, mutated_run
 from samples.valid_runs import valid_run
 
 from vsacli import inverse_dynamics
-from vsacli.analysis.derivative_check import LADDER_BOUND, SHAFT_BOUND, SelfCheck
+from vsacli.analysis.self_check import LADDER_BOUND, SHAFT_BOUND, SelfCheck
 from vsacli.compute.engine.compiled_engine import kernel_code
 
 THEORY = Path(__file__).parents[2] / "docs" / "theory.md"

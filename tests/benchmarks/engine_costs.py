@@ -33,7 +33,7 @@ from vsacli.compute.engine.engines import (
 )
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.energy import IntervalEnergy
-from vsacli.dynamics.inverse import block_of
+from vsacli.dynamics.inverse import InverseDynamics, block_of
 from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes
 
@@ -68,7 +68,7 @@ def costs_of_run(robot: str, trajectory: str) -> str:
     duration = motion.times.span[1]
     noted = Noted()
     motion = motion.sampled(UniformTimes(duration, (SAMPLES - 1) / duration))
-    block_of(BalancedDynamics(arm, None), motion.block(0, SAMPLES), noted)
+    block_of(BalancedDynamics(InverseDynamics(arm)), motion.block(0, SAMPLES), noted)
     kernel, rows, code = noted.kernel, noted.rows, kernel_code(noted.kernel)
     compiled = CompiledEngine(system_compiler(), 1, lambda _text: None)
     engines: dict[str, Engine] = {"NumPy": NumPyEngine(), "traced": TracedEngine(), "C": compiled}
@@ -109,11 +109,11 @@ def rows() -> Iterator[str]:
     """Yield a row for each measurement."""
     for robot, trajectory in RUNS.items():
         yield costs_of_run(robot, trajectory)
-        kernel = BalancedDynamics(shipped_run(robot, trajectory)[0], None)
+        kernel = BalancedDynamics(InverseDynamics(shipped_run(robot, trajectory)[0]))
         yield f"    compiling {costs_of_compiling(kernel)}"
     for joints in JOINTS:
         arm = chain(joints)
-        for each in (BalancedDynamics(arm, None), interval_energy(arm)):
+        for each in (BalancedDynamics(InverseDynamics(arm)), interval_energy(arm)):
             yield f"{joints} joints, {type(each).__name__}: compiling {costs_of_compiling(each)}"
 
 

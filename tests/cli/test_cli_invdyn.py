@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS_MOTION, contents, installed
 
-from vsacli.analysis import run as pipeline
+from vsacli.analysis import run_dynamics
 from vsacli.dynamics import inverse as steps
 from vsacli.dynamics.elastic_torques import LinkTorques
 
@@ -120,7 +120,7 @@ def no_computing(monkeypatch):
     def compute(*_arguments, **_options):
         pytest.fail("computed before the output was checked")
 
-    monkeypatch.setattr(pipeline, "block_of", compute)
+    monkeypatch.setattr(run_dynamics, "block_of", compute)
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -216,7 +216,7 @@ def test_bug_leaves_a_traceback_a_sentence_and_no_file(vsacli, tmp_path, motion,
     def compute(*_arguments, **_options):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr(pipeline, "block_of", compute)
+    monkeypatch.setattr(run_dynamics, "block_of", compute)
     done = vsacli("invdyn", ROBOT, motion)
     assert (done.code, done.out) == (1, "")
     assert done.err.startswith("Traceback (most recent call last)")

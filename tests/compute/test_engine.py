@@ -26,6 +26,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler
 from vsacli.compute.engine.engines import Engine
+from vsacli.dynamics.deflection_rows import IntegratedRows
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
 from vsacli.robot.model import Robot
@@ -127,11 +128,11 @@ def test_other_branch_and_followed_deflections_agree():
     motion = demands(turned, SAMPLES)
     expected = compute_block(turned, motion)
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
-    integrated = np.moveaxis(expected.phi, 0, -1) * 1.001
-    kernel = InverseDynamics(turned, integrated=True)
+    integrated = {"phi": np.moveaxis(expected.phi, 0, -1).reshape(2, -1) * 1.001}
+    kernel = InverseDynamics(turned, deflections=(IntegratedRows(),))
     engine = choose("c", kernel, 1, 1).engine
-    found = block_of(kernel, motion, engine, integrated=integrated)
-    assert_agree(found, block_of(kernel, motion, integrated=integrated))
+    found = block_of(kernel, motion, engine, integrated)
+    assert_agree(found, block_of(kernel, motion, deflections=integrated))
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ from vsacli.compute.tracing import is_of_calls
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 from vsacli.dynamics.energy import IntervalEnergy
+from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
 
 KERNEL = LinkTorques(vsa_3r())
@@ -208,7 +209,7 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
 @needs_compiler
 def test_measured_springs_are_left_to_numpy_until_tracing_repays():
     """48,000 to 96,000 samples take NumPy 0.1 to 0.2 s, and tracing alone 0.2 s, compiled before or not."""
-    kernel = BalancedDynamics(shipped_robot("measured_1r"), None)
+    kernel = BalancedDynamics(InverseDynamics(shipped_robot("measured_1r")))
     assert choose("c", kernel, 1).reason.startswith("C code computes, compiled now")
     for samples in (48_000, 96_000):
         assert choose("auto", kernel, samples).engine is NUMPY
@@ -218,7 +219,7 @@ def test_measured_springs_are_left_to_numpy_until_tracing_repays():
 @pytest.mark.slow
 def test_what_rarely_runs_counts_little():
     """Fallbacks of the iterations are five sixths of the operations, and take a tenth of the time."""
-    code = kernel_code(BalancedDynamics(shipped_robot("measured_1r"), None))
+    code = kernel_code(BalancedDynamics(InverseDynamics(shipped_robot("measured_1r"))))
     assert not code.straight
     assert code.operations < sum(code.functions) / 4
     # NumPy takes 1.3 us a sample, and the compiler 4 s
@@ -228,7 +229,7 @@ def test_what_rarely_runs_counts_little():
 
 @needs_compiler
 def test_the_choice_is_the_same_again():
-    kernel = BalancedDynamics(shipped_robot("vsa_3r"), None)
+    kernel = BalancedDynamics(InverseDynamics(shipped_robot("vsa_3r")))
     chosen = [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)]
     kernel_code.cache_clear()
     assert [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)] == chosen
@@ -247,7 +248,7 @@ def test_long_chains_of_branches_share_functions(joints: int, shares: bool):
 @pytest.mark.parametrize(("joints", "shares"), [(1, False), (3, True)])
 def test_chains_of_loops_share_functions(joints: int, shares: bool):
     """Written out, seven joints with measured springs took the compiler 33 s."""
-    kernel = BalancedDynamics(_chain(shipped_robot("measured_1r"), joints), None)
+    kernel = BalancedDynamics(InverseDynamics(_chain(shipped_robot("measured_1r"), joints)))
     assert is_of_calls(kernel_program(kernel)) is shares
     assert kernel_code(kernel).compiling_seconds < 4
 

@@ -129,11 +129,11 @@ def test_a_pair_of_quadratic_springs_is_an_elastic_joint() -> None:
     still = np.zeros_like(q)
     command = Command(q, dq, ddq, tau_e, dtau_e, ddtau_e, by_name(still + sigma, still, still))
     two, one = (drive(dataclasses.replace(joint, actuator=actuator), command) for actuator in (pair, spring))
-    assert not two["flags"].any()
+    assert not two.flags.any()
     # 1e-11: the accelerations of the two sides are larger than their mean
     for name in ("phi", "theta", "dtheta", "ddtheta"):
-        assert_near(two[name].mean(axis=0), one[name][0], relative=1e-11)
-    assert_near(two["tau_motor"].sum(axis=0), one["tau_motor"][0], relative=1e-11)
+        assert_near(getattr(two, name).mean(axis=0), getattr(one, name)[0], relative=1e-11)
+    assert_near(two.tau_motor.sum(axis=0), one.tau_motor[0], relative=1e-11)
 
 
 # Mixed
@@ -194,7 +194,7 @@ def limited(actuator: object, **limits: object) -> int:
         random_robot("R", seed=1).joints[0], actuator=actuator, limits=Limits(**limits)
     )
     values = np.array([[0.1], [0.5], [0.0], [30.0], [0.0], [0.0], [NAN], [NAN], [NAN]])
-    return int(drive(joint, Command(*values[:6], by_name(*values[6:])))["flags"][0])
+    return int(drive(joint, Command(*values[:6], by_name(*values[6:]))).flags[0])
 
 
 @pytest.mark.parametrize("kind", [elastic(stiffness=900.0), rigid()], ids=["elastic", "rigid"])

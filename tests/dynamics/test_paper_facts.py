@@ -86,8 +86,8 @@ def test_unloaded_joint_and_the_largest_load_it_could_carry(
 ):
     rest = drive(joint_with(), command(stiffness=stiffness))
     # Half the last digit given.
-    assert rest["phi"][:, 0] == pytest.approx([deflection, -deflection], abs=5e-7)
-    assert rest["tau_transmission"][:, 0] == pytest.approx([torque, -torque], abs=5e-5)
+    assert rest.phi[:, 0] == pytest.approx([deflection, -deflection], abs=5e-7)
+    assert rest.tau_transmission[:, 0] == pytest.approx([torque, -torque], abs=5e-5)
     pair = make_pair(ALIKE, ALIKE)
 
     def lack(tau_e: float) -> float:

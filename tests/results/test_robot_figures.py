@@ -91,7 +91,7 @@ def test_the_decoupling_matrix_is_singular_at_ends_of_the_attainable_range_alone
             continue
         seen = each.stiffness
         torques = np.broadcast_to(seen.tau_e, seen.levels.shape).ravel()
-        inside = each.at_rest(torques, seen.levels.ravel())["det_A"].reshape(seen.levels.shape)
+        inside = each.at_rest(torques, seen.levels.ravel()).det_A.reshape(seen.levels.shape)
         wide = seen.levels[-1] - seen.levels[0] > 1e-3 * seen.levels[-1]
         assert wide.any()
         signs = np.sign(inside[1:-1, wide])

@@ -67,7 +67,7 @@ def with_branch(joint: Joint, branch: str) -> Joint:
 
 def lower_by_branch(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
     return {
-        branch: drive(with_branch(joint, branch), command(tau_e=tau_e))["stiffness_min"]
+        branch: drive(with_branch(joint, branch), command(tau_e=tau_e)).stiffness_min
         for branch in ("positive", "negative")
     }
 

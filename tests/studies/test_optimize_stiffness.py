@@ -83,12 +83,12 @@ def costs(arm, load, criterion, rows):
     )
     with np.errstate(invalid="ignore", divide="ignore"):
         driven = drive(joint, tiled)
-    torques = driven["tau_motor"].reshape(2, profiles, -1)
+    torques = driven.tau_motor.reshape(2, profiles, -1)
     low, high = admissible_stiffness(joint, load.command, MARGIN)
     kept = np.all((rows[0] >= low) & (rows[0] <= high), axis=1)
     if criterion == "energy":
-        power = np.maximum(driven["motor_power"], 0).sum(axis=0).reshape(profiles, -1)
-        loaded = driven["elastic_energy"].reshape(profiles, -1)[:, 0]
+        power = np.maximum(driven.motor_power, 0).sum(axis=0).reshape(profiles, -1)
+        loaded = driven.elastic_energy.reshape(profiles, -1)[:, 0]
         return np.where(kept, np.trapezoid(power, load.time) + loaded, np.inf)
     if criterion == "peak":
         return np.where(kept, np.abs(torques).max(axis=(0, 2)), np.inf)

@@ -123,8 +123,8 @@ def command(actuator, samples=40, seed=0):
 def variables(joint, demand):
     with np.errstate(all="ignore"):
         driven = driven_by(joint, demand, 0.01)
-    gap = margin(driven["stiffness"], driven["stiffness_min"], driven["stiffness_max"])
-    return {"tau_motor": driven["tau_motor"], "theta": driven["theta"], "margin": gap}
+    gap = margin(driven.stiffness, driven.stiffness_min, driven.stiffness_max)
+    return {"tau_motor": driven.tau_motor, "theta": driven.theta, "margin": gap}
 
 
 MOTORS = (

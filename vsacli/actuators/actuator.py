@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -16,9 +17,9 @@ import numpy as np
 from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
-from vsacli.actuators.reach import LimitCheck, OfJoint
+from vsacli.actuators.reach import LimitCheck
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
@@ -110,7 +111,7 @@ class Actuator(DeclaredRecord, ABC):
         """Return the field that excludes joints of this type, with the reason; None if it can drive them."""
         return None
 
-    @property
+    @cached_property
     @abstractmethod
     def motors(self) -> tuple[JointMotor, ...]:
         """Motors, on the joint side."""
@@ -125,7 +126,7 @@ class Actuator(DeclaredRecord, ABC):
         """Whether the motors bear shares of tau_e and nothing else, so that they can oppose each other."""
         return False
 
-    @property
+    @cached_property
     def sides(self) -> tuple[JointMotor | None, ...]:
         """Motors 1 and 2; None for a missing one."""
         return (*self.motors, None)[: len(MOTORS)]
@@ -160,20 +161,25 @@ class Actuator(DeclaredRecord, ABC):
         """Spring between a lever and a point of the link, if it is the only spring; else None."""
         return None
 
-    def limits(self) -> Iterator[LimitCheck]:
-        """Yield all limits of motors and springs, finite or not."""
-        for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
+    @cached_property
+    def limits(self) -> tuple[LimitCheck, ...]:
+        """All limits of motors and springs, finite or not."""
+        return tuple(
+            LimitCheck(flag, variable, number, (-bound, bound))
+            for number, (motor, deflection) in enumerate(
+                zip(self.motors, self.max_deflections, strict=True), 1
+            )
             for flag, variable, bound in (
                 (Flag.DEFLECTION_LIMIT, "phi", deflection),
                 (Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor.max_velocity),
                 (Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor.max_torque),
                 (Flag.CURRENT_LIMIT, "current", motor.max_current or math.inf),
                 (Flag.VOLTAGE_LIMIT, "voltage", motor.max_voltage or math.inf),
-            ):
-                yield LimitCheck(flag, variable, number, (-bound, bound))
+            )
+        )
 
     @abstractmethod
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
         """Compute the springs and the motion of the motors for a command.
 
         Args:
@@ -183,9 +189,9 @@ class Actuator(DeclaredRecord, ABC):
                 none; only for kinds with a commanded stiffness.
 
         Returns:
-            The result variables `stiffness`, `dstiffness`, `ddstiffness`, `phi`, `dphi`, `theta`, `dtheta`,
-            `ddtheta`, `tau_transmission`, `elastic_energy`, `det_A`, `stiffness_min`, `stiffness_max` and
-            `flags`; NaN for those that the actuator lacks, such as a second motor's.
+            The command with the stiffness and its derivatives, deflections, motor motion, spring torques and
+            energy, det A, the attainable range and `flags`; NaN where the actuator lacks them, such as a
+            second motor.
         """
 
     def motor_positions(self, unknowns: Components, q: FloatArray) -> FloatArray:
@@ -200,9 +206,9 @@ class Actuator(DeclaredRecord, ABC):
         """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
-    def springs_of(self, of_joint: OfJoint) -> ElasticState:
+    def springs_of(self, of_joint: JointVariables) -> ElasticState:
         """Return the springs with their derivatives from the motion of joint and motors."""
-        return self.springs(self.unknowns(of_joint["phi"], of_joint["theta"]), of_joint["q"])
+        return self.springs(self.unknowns(of_joint.phi, of_joint.theta), of_joint.q)
 
     @property
     def spring_group(self) -> Hashable:

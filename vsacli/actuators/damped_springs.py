@@ -24,8 +24,8 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
-from vsacli.actuators.reach import OfJoint, Reach, reach
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.reach import Reach, reach
+from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
 from vsacli.base.signals import DAMPING, STIFFNESS
@@ -37,21 +37,6 @@ NEWTON_STEPS = 4
 
 CONTINUATION_STEPS = 200
 """Steps from the equilibrium to the start of the motion given in the robot file."""
-
-
-class InternalMotion(NamedTuple):
-    """Internal motion of a transmission with a damper.
-
-    Attributes:
-        phi: State of the springs, (2, samples): its spread is used, the rest is a guess from which (14) is
-            solved for the stiffness.
-        velocity: w, the rate of the spread, (samples,); None if it follows from the damping.
-        acceleration: Derivative of w, (samples,); None with `velocity`.
-    """
-
-    phi: FloatArray
-    velocity: FloatArray | None
-    acceleration: FloatArray | None
 
 
 class _Springs(NamedTuple):
@@ -131,7 +116,7 @@ class DampedSprings:
         if self._settable:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
-            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None)["phi"]
+            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
         if spread is None:
             return phi
         begin = self.spread(phi)
@@ -148,7 +133,7 @@ class DampedSprings:
         rate = springs.state.torque_rate(self._rates(command.dq, dtheta))
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
-    def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> OfJoint:
+    def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> JointVariables:
         """Compute stiffness, motor motion and spring torques of an internal motion; see `Actuator.transmit`.
 
         The attainable range is that at the springs' torque. A sample is singular where the pivot is zero, not
@@ -172,20 +157,21 @@ class DampedSprings:
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
         behind = self._behind[:, None] > 0
-        return {
-            **dict(zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)),
-            "phi": np.where(behind, of_motors(phi), np.nan),
-            "dphi": np.where(behind, of_motors(rates), np.nan),
-            "theta": of_motors(self._positions(phi, command.q)),
-            "dtheta": of_motors(dtheta),
-            "ddtheta": of_motors(ddtheta),
-            "tau_transmission": of_motors(springs.state.tau_transmission),
-            "elastic_energy": np.where(reached.infeasible, np.nan, springs.state.energy),
-            "det_A": np.where(reached.infeasible, np.nan, springs.state.determinant),
-            "stiffness_min": lower,
-            "stiffness_max": upper,
-            "flags": reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
-        }
+        stiffness = zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)
+        return command.variables()._replace(
+            **dict(stiffness),
+            phi=np.where(behind, of_motors(phi), np.nan),
+            dphi=np.where(behind, of_motors(rates), np.nan),
+            theta=of_motors(self._positions(phi, command.q)),
+            dtheta=of_motors(dtheta),
+            ddtheta=of_motors(ddtheta),
+            tau_transmission=of_motors(springs.state.tau_transmission),
+            elastic_energy=np.where(reached.infeasible, np.nan, springs.state.energy),
+            det_A=np.where(reached.infeasible, np.nan, springs.state.determinant),
+            stiffness_min=lower,
+            stiffness_max=upper,
+            flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+        )
 
     def _reach(
         self, springs: _Springs, phi: FloatArray, command: Command, min_margin: float

@@ -15,10 +15,10 @@ from vsacli.actuators.elasticity import Components, Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution, SpringRows
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import LimitCheck, OfJoint, Reach
+from vsacli.actuators.reach import LimitCheck, Reach
 from vsacli.actuators.single_springs import LinearRows, SingleSpring, SingleSprings
 from vsacli.actuators.spring_elements import SpringElement
-from vsacli.actuators.transmission import Command, single_motor
+from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
@@ -75,7 +75,7 @@ class Elastic(Actuator):
         """Return one motor, which drives the joint alone, behind a linear spring."""
         return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """The one motor."""
         return (self.motor.at_joint,)
@@ -105,10 +105,10 @@ class Elastic(Actuator):
         """The spring."""
         return (SpringElement(self.law, -1.0, (1.0,)),)
 
-    def limits(self) -> Iterator[LimitCheck]:
-        """Yield the limits of every actuator, and the torques that the spring can carry."""
-        yield from super().limits()
-        yield self._carriable
+    @cached_property
+    def limits(self) -> tuple[LimitCheck, ...]:
+        """The limits of every actuator, and the torques that the spring can carry."""
+        return *super().limits, self._carriable
 
     @property
     def _carriable(self) -> LimitCheck:
@@ -116,7 +116,9 @@ class Elastic(Actuator):
         torques = endless if self.spring is None else self.spring.torque_range
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
-    def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
+    def transmit(
+        self, command: Command, _min_margin: float, _integrated: FloatArray | None
+    ) -> JointVariables:
         """Compute the deflection at which the spring carries tau_e, and its derivatives.
 
         NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
@@ -135,6 +137,7 @@ class Elastic(Actuator):
             near_singular=np.zeros_like(phi, dtype=bool),
         )
         return single_motor(
+            command,
             stiffness=spring.stiffness,
             dstiffness=spring.stiffness_rate(rates),
             ddstiffness=spring.stiffness_curvature(rates) + spring.stiffness_rate((ddphi,)),

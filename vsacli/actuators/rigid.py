@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command, single_motor
+from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.documents.fields import Record, value
 
@@ -35,15 +35,18 @@ class Rigid(Actuator):
         """Return one motor, which drives the joint alone."""
         return cls(motor=constants.only_motor)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """The one motor."""
         return (self.motor.at_joint,)
 
-    def transmit(self, command: Command, _min_margin: float, _integrated: FloatArray | None) -> OfJoint:
+    def transmit(
+        self, command: Command, _min_margin: float, _integrated: FloatArray | None
+    ) -> JointVariables:
         """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
+            command,
             stiffness=none,
             dstiffness=none,
             ddstiffness=none,

@@ -1,13 +1,12 @@
-"""Input and output of `Actuator.transmit`: the command of a joint, and the result variables of one motor."""
+"""Input and output of `Actuator.transmit`: command, internal motion and variables of a joint."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.signals import COMMANDED, commanded_names
 from vsacli.base.variables import VARIABLES
@@ -49,21 +48,93 @@ class Command(NamedTuple):
         still = np.zeros_like(tau_e)
         return cls(q, still, still, tau_e, still, still, {})
 
+    def variables(self) -> JointVariables:
+        """Return the record of the joint that has only these variables."""
+        return JointVariables(*self[:-1], **self.commanded)
+
     def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name."""
         return {**dict(zip(self._fields[:-1], self[:-1], strict=True)), **self.commanded}
 
 
-def single_motor(**variables: AnyArray) -> OfJoint:
+class InternalMotion(NamedTuple):
+    """Internal motion of a transmission with a damper.
+
+    Attributes:
+        phi: State of the springs, (2, samples): its spread is used, the rest is a guess from which (14) is
+            solved for the stiffness.
+        velocity: w, the rate of the spread, (samples,); None if it follows from the damping.
+        acceleration: Derivative of w, (samples,); None with `velocity`.
+    """
+
+    phi: FloatArray
+    velocity: FloatArray | None
+    acceleration: FloatArray | None
+
+
+ABSENT: Any = None
+"""Variable that a joint does not have, or that is not computed yet."""
+
+
+class JointVariables(NamedTuple):
+    """Variables of one joint, arrays (samples,), those of its motors (2, samples).
+
+    `Actuator.transmit` computes the springs and the motion of the motors, `drive` the torques. Names and
+    units are those of `vsacli.base.variables`; a motor that the actuator lacks is NaN.
+    """
+
+    q: AnyArray = ABSENT
+    dq: AnyArray = ABSENT
+    ddq: AnyArray = ABSENT
+    tau_e: AnyArray = ABSENT
+    dtau_e: AnyArray = ABSENT
+    ddtau_e: AnyArray = ABSENT
+    stiffness: AnyArray = ABSENT
+    dstiffness: AnyArray = ABSENT
+    ddstiffness: AnyArray = ABSENT
+    damping: AnyArray = ABSENT
+    ddamping: AnyArray = ABSENT
+    dddamping: AnyArray = ABSENT
+    phi: AnyArray = ABSENT
+    dphi: AnyArray = ABSENT
+    theta: AnyArray = ABSENT
+    dtheta: AnyArray = ABSENT
+    ddtheta: AnyArray = ABSENT
+    tau_transmission: AnyArray = ABSENT
+    tau_motor: AnyArray = ABSENT
+    elastic_energy: AnyArray = ABSENT
+    motor_power: AnyArray = ABSENT
+    det_A: AnyArray = ABSENT  # noqa: N815
+    stiffness_min: AnyArray = ABSENT
+    stiffness_max: AnyArray = ABSENT
+    flags: AnyArray = ABSENT
+    tau_damper: AnyArray = ABSENT
+    current: AnyArray = ABSENT
+    voltage: AnyArray = ABSENT
+    copper_loss: AnyArray = ABSENT
+    dissipated_power: AnyArray = ABSENT
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, AnyArray]) -> JointVariables:
+        """Return the record of arrays by name; other names are ignored."""
+        return cls(**{name: arrays[name] for name in cls._fields if name in arrays})
+
+    def by_name(self) -> dict[str, AnyArray]:
+        """Return the variables present, by name."""
+        return {name: array for name, array in zip(self._fields, self, strict=True) if array is not None}
+
+
+def single_motor(command: Command, **variables: AnyArray) -> JointVariables:
     """Return the result of `Actuator.transmit` for one motor without a commanded stiffness.
 
     Args:
+        command: Command of the joint.
         variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `theta`, `dtheta`, `ddtheta`,
             `tau_transmission`, `elastic_energy` and `flags`, each (samples,).
     """
     none = np.full_like(variables["phi"], np.nan)
-    transmitted = {
+    transmitted: dict[str, AnyArray] = {
         name: np.stack((values, none)) if "motor" in VARIABLES[name].dims else values
         for name, values in variables.items()
     }
-    return {**transmitted, "det_A": none, "stiffness_min": none, "stiffness_max": none}
+    return command.variables()._replace(**transmitted, det_A=none, stiffness_min=none, stiffness_max=none)

@@ -7,14 +7,15 @@ phi_1 and phi_2 of an antagonistic pair, deflection phi and setting theta_2 of a
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import cached_property
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import OfJoint, deflections_within_reach
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.reach import deflections_within_reach
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
 
@@ -30,7 +31,7 @@ class VariableStiffness(Actuator):
     motor_count = 2
     commanded = (STIFFNESS.key,)
 
-    @property
+    @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
         """Motors 1 and 2."""
         return tuple(motor.at_joint for motor in self.motor)
@@ -43,7 +44,7 @@ class VariableStiffness(Actuator):
         """Return phi, (2, samples), from the unknowns, or its rates; NaN for a motor without a deflection."""
         return unknowns
 
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> OfJoint:
+    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
         """Compute deflections on the actuator's branch, motion of the motors, and torques of the springs.
 
         NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones. See
@@ -56,19 +57,16 @@ class VariableStiffness(Actuator):
         rates = np.stack(springs.rates(command.dtau_e, dstiffness, command.dq))  # (68)
         rates = np.where(reached.singular, np.nan, rates)
         ddtheta = springs.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness)  # (70)-(72)
-        return {
-            "stiffness": stiffness,
-            "dstiffness": dstiffness,
-            "ddstiffness": ddstiffness,
-            "phi": self.deflections(unknowns),
-            "dphi": self.deflections(rates),
-            "theta": self.motor_positions(unknowns, command.q),  # (69)
-            "dtheta": self.motor_positions(rates, command.dq),  # (69)
-            "ddtheta": np.stack(ddtheta),
-            "tau_transmission": np.stack(springs.tau_transmission),  # (62)
-            "elastic_energy": springs.energy,
-            "det_A": springs.determinant,  # (67)
-            "stiffness_min": solution.lower,
-            "stiffness_max": solution.upper,
-            "flags": reached.flags,
-        }
+        return command.variables()._replace(
+            phi=self.deflections(unknowns),
+            dphi=self.deflections(rates),
+            theta=self.motor_positions(unknowns, command.q),  # (69)
+            dtheta=self.motor_positions(rates, command.dq),  # (69)
+            ddtheta=np.stack(ddtheta),
+            tau_transmission=np.stack(springs.tau_transmission),  # (62)
+            elastic_energy=springs.energy,
+            det_A=springs.determinant,  # (67)
+            stiffness_min=solution.lower,
+            stiffness_max=solution.upper,
+            flags=reached.flags,
+        )

@@ -8,8 +8,7 @@ The nearest sample receives the flags that hold there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,11 +25,11 @@ from vsacli.analysis.minima import (
 )
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import usual_block
 from vsacli.dynamics.limits import Finding
-from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.analysis.run_dynamics import RunDynamics
+    from vsacli.analysis.run_uncertainty import RunUncertainty
 
 NEAR = 0.1
 """Relative clearance below which a minimum is searched for."""
@@ -91,11 +90,9 @@ class Between:
     """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
-        robot: Robot.
-        trajectory: Trajectory of the run.
+        dynamics: Inverse dynamics along the trajectory of the run.
         min_margin: Margin that is flagged.
-        compute: Function that computes the block of a motion.
-        judged: Function that corrects the flags of a block for uncertainty.
+        uncertainty: Uncertainty of recorded signals, which corrects flags of limits; None without any.
 
     Attributes:
         quantities: Quantities with bounds.
@@ -103,17 +100,13 @@ class Between:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        trajectory: Trajectory,
-        min_margin: float,
-        compute: Callable[[Motion], Block],
-        judged: Callable[[Block], Block] = lambda block: block,
+        self, dynamics: RunDynamics, min_margin: float, uncertainty: RunUncertainty | None = None
     ) -> None:
-        self.quantities = bounded_quantities(robot)
+        trajectory = dynamics.trajectory
+        self.quantities = bounded_quantities(dynamics.robot)
         self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
-        self._trajectory, self._compute, self._judged = trajectory, compute, judged
-        self._joints = len(robot.joints)
+        self._dynamics, self._trajectory, self._uncertainty = dynamics, trajectory, uncertainty
+        self._joints = len(dynamics.robot.joints)
         self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
         self._sides = Sides(self.quantities, min_margin)
@@ -188,7 +181,8 @@ class Between:
         steps = self._trajectory.times.block(0, self._trajectory.samples)
         each = -(-SCANNED // (len(steps) - 1))
         time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
-        known = Known(0, time, np.hstack([values for _, values in self._computed(time)]))
+        values = [self._sides.values(block) for _, block in self._dynamics.blocks_at(time)]
+        known = Known(0, time, np.hstack(values))
         self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
 
     def _search(self, known: Known, steps: Known) -> None:
@@ -235,33 +229,24 @@ class Between:
     def _keep(self, found: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         clearance = self._sides.clearance(found.function, found.value[:, 1])
-        for part in self._parts(len(steps)):
-            quantity, time = self._sides.quantity[found.function[part]], found.time[part, 1]
-            block, joint = self._judged(self._compute(self._trajectory.at(time))), self._joint[quantity]
-            each = np.arange(len(time)), joint, np.newaxis
-            own = {name: array[each] for name, array in _of_joints(block).items()}
+        for part, block in self._dynamics.blocks_at(found.time[:, 1]):
+            quantity = self._sides.quantity[found.function[part]]
+            joint = self._joint[quantity]
+            judged = block if self._uncertainty is None else self._uncertainty.judged(block)
+            at_minima = np.arange(len(joint)), joint, np.newaxis
+            own = {name: array[at_minima] for name, array in _of_joints(judged).items()}
             own["flags"] &= self._bits[quantity, None]
             rows = quantity, joint, clearance[part], steps[part]
-            self._found.append(Minima(block.replaced(**own), *rows))
+            self._found.append(Minima(judged.replaced(**own), *rows))
 
     def _evaluated(self, side: IndexArray, times: FloatArray) -> FloatArray:
         """Return the values of sides (n,) at times of their own, (n, times)."""
         wanted = np.repeat(side, times.shape[1])
         parts = [
-            values[wanted[part], np.arange(values.shape[1])] for part, values in self._computed(times.ravel())
+            self._sides.values(block)[wanted[part], np.arange(len(block.time))]
+            for part, block in self._dynamics.blocks_at(times.ravel())
         ]
         return np.concatenate(parts).reshape(times.shape)
-
-    def _computed(self, time: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """Yield the values of all sides at any times, in blocks."""
-        for part in self._parts(len(time)):
-            block = self._compute(self._trajectory.at(time[part]))
-            yield part, self._sides.values(block)
-
-    def _parts(self, times: int) -> Iterator[slice]:
-        """Yield times in blocks of the usual size."""
-        count = usual_block(self._joints)
-        return (slice(start, start + count) for start in range(0, times, count))
 
 
 def _of_joints(block: Block) -> dict[str, AnyArray]:

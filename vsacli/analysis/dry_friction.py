@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from vsacli.base.units import TORQUE, time_text
 from vsacli.base.variables import Block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.analysis.run_dynamics import RunDynamics
 
 REACH = 3.0
 """Velocity, in widths, up to which smooth friction changes: tanh is within 0.5 % of its limit there."""
@@ -65,8 +67,9 @@ class FrictionPassages:
             fastest = np.sort(np.argsort(-np.abs(every[:, 3] - every[:, 2]), kind="stable")[:MOST])
             self._passages[number] = every[fastest]
 
-    def notes(self, trajectory: Trajectory, compute: Callable[[Motion], Block]) -> Iterator[str]:
+    def notes(self, dynamics: RunDynamics) -> Iterator[str]:
         """Yield a sentence for each joint on friction that the samples do not show."""
+        trajectory = dynamics.trajectory
         for (index, joint, width), passages, peak in zip(
             self._joints, self._passages, self._peaks, strict=True
         ):
@@ -78,8 +81,8 @@ class FrictionPassages:
             if not trajectory.known_between:
                 yield f"{what}; what the motors do meanwhile is not known: {advice}"
                 continue
-            torques = np.abs(compute(trajectory.at(_times(trajectory, passages, index, width))).tau_motor)
-            torques = torques[:, index]
+            passing = dynamics.at(_times(trajectory, passages, index, width))
+            torques = np.abs(passing.tau_motor[:, index])
             most = float(np.max(torques, where=np.isfinite(torques), initial=0.0))
             if most > MORE * peak:
                 sizes = f"{most:.3g} {TORQUE.unit(joint.type)} there, {peak:.3g} at the samples"

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from vsacli.analysis import report_text as text
-from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.trouble_text import (
     NOT_DETERMINED,
     counts,

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
 from vsacli.analysis.joint_report import DETERMINED, JointDrift, JointReport
+from vsacli.analysis.self_check import SHAFT_BOUND, SelfCheck
 from vsacli.base.texts import EXPONENT, counted, significant, together
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
 from vsacli.dynamics.energy import JointEnergy

@@ -1,38 +1,37 @@
 """Inverse dynamics along a trajectory, computed block by block.
 
-`Run` yields blocks of samples: each is computed by the kernel `BalancedDynamics`, searched for minima between
-samples, merged into the summaries of the report, and released. `inverse_dynamics` joins them in memory.
+`Run` yields blocks of samples. Each is computed by `RunDynamics`, searched for minima between samples, which
+set flags of the nearest sample, judged by the uncertainty of recorded signals, merged into the summaries of
+the report, and released. `inverse_dynamics` joins the blocks in memory.
 """
 
 from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.analysis.between_samples import Between
-from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, BalanceCheck, SelfCheck, ladder
+from vsacli.analysis.between_samples import Between, Minima
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
+from vsacli.analysis.run_dynamics import RunDynamics, choose_deflections, damped_motions
+from vsacli.analysis.self_check import RunCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
-from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, choose
-from vsacli.dynamics.balances import BALANCES, BalancedDynamics
+from vsacli.dynamics.balances import BALANCES
 from vsacli.dynamics.energy import JointEnergy, RunEnergy
-from vsacli.dynamics.inverse import block_of, fitted, usual_block
+from vsacli.dynamics.inverse import fitted, usual_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -40,10 +39,6 @@ if TYPE_CHECKING:
     from vsacli.analysis.result import Result
     from vsacli.analysis.run_uncertainty import RunUncertainty
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
-    from vsacli.dynamics.internal_motion import InternalMotions
-
-DEFLECTION_SOLVERS = ("root", "ode")
-"""Methods for deflections: the root of (14) at each sample, or integration of (19) from the first root."""
 
 
 class Run:
@@ -93,24 +88,24 @@ class Run:
         self._stop_on_infeasible = stop_on_infeasible
         self._min_margin = min_margin
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
-        self._deflections = _integrated(deflection_solver, robot, trajectory)
-        frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        self._internal = _internal_motions(robot, trajectory)
-        inside = () if self._internal is None else self._internal.joints
-        integrated = self._deflections is not None
-        self._kernel = BalancedDynamics(
-            robot, frame, min_margin=min_margin, integrated=integrated, internal=inside
+        self._dynamics = RunDynamics(
+            robot,
+            trajectory,
+            min_margin=min_margin,
+            deflections=choose_deflections(deflection_solver, robot, trajectory),
+            internal=damped_motions(robot, trajectory),
         )
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
-        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)
-        self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
-        self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
-        self._energy = RunEnergy(robot, self.choice.engine)
-        self._passages = FrictionPassages(robot)
+        self.choice = choose(engine, self._dynamics.kernel, trajectory.samples, threads, tell, busy=busy)
+        self._dynamics.engine = self.choice.engine
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
-        self._between = Between(robot, trajectory, min_margin, self._compute, self._judged)
-        self._balances = BalanceCheck(robot, trajectory.samples)
+        self._between = Between(self._dynamics, min_margin, self._uncertainty)
+        self._passages = FrictionPassages(robot)
+        self._check = RunCheck(self._dynamics)
+        self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
+        self._drifts = _drift_summaries(robot, self._dynamics.deflections)
+        self._energy = RunEnergy(robot, self.choice.engine)
         self._samples = 0
         self._stopped = False
 
@@ -123,7 +118,7 @@ class Run:
             waiting.append(block)
             del block  # else this name would keep the block alive while the next is computed
             while waiting and self._between.knows(len(waiting[0].time)) and not self._stopped:
-                yield self._merged(waiting.popleft())
+                yield self._finish(waiting.popleft())
             if self._stopped:
                 return
 
@@ -132,51 +127,47 @@ class Run:
         starts = range(0, self.trajectory.samples, self._block_samples)
         motions = (self.trajectory.block(start, start + self._block_samples) for start in starts)
         if self.choice.threads == 1 or not self._ahead:
-            return map(self._compute, motions)
+            return map(self._dynamics.compute, motions)
         from vsacli.base.background import ahead
 
-        return ahead(self._compute, motions)
+        return ahead(self._dynamics.compute, motions)
 
-    def _compute(self, motion: Motion) -> Block:
-        integrated = None if self._deflections is None else self._deflections.at(motion.time)
-        internal = {} if self._internal is None else self._internal.at(motion.time - self.trajectory.start)
-        engine = self.choice.engine
-        return block_of(self._kernel, motion, engine, integrated=integrated, internal=internal)
-
-    def _judged(self, block: Block) -> Block:
-        """Return the block with flags only of limits exceeded beyond the uncertainty of recorded signals."""
-        return block if self._uncertainty is None else self._uncertainty.judged(block)
-
-    def _merged(self, block: Block) -> Block:
-        """Merge the next block into the summaries, up to the first infeasible sample if the run stops there.
-
-        Returns:
-            The block with flags of minima between its samples, standard deviations and motor energy.
-        """
+    def _finish(self, block: Block) -> Block:
+        """Take the next block through the stages after the search between samples; return what is stored."""
         between = self._between.nearest(block)
-        for minima in between:
-            minima.mark(block.flags)
+        _mark_minima(between, block)
         if self._stop_on_infeasible:
-            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
-            self._stopped = bool(infeasible.any())
-        if self._stopped:
-            last = int(infeasible.argmax())
-            block, between = block.taken(slice(last + 1)), [each.where(each.step <= last) for each in between]
+            block, between = self._until_infeasible(block, between)
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
-            for minima in between:  # again, since the samples themselves may keep limits within it
-                minima.mark(block.flags)
+            _mark_minima(between, block)  # again, since the samples themselves may keep limits within it
+        self._summarize(block, between)
+        return self._without_balances(block)
+
+    def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:
+        """Return a block up to its first infeasible sample, with the minima of these samples."""
+        infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+        if not infeasible.any():
+            return block, between
+        self._stopped, last = True, int(infeasible.argmax())
+        return block.taken(slice(last + 1)), [minima.where(minima.step <= last) for minima in between]
+
+    def _summarize(self, block: Block, between: Sequence[Minima]) -> None:
+        """Merge a block and the minima between its samples into the report."""
         self._samples += len(block.time)
         for minima in between:
             self._between.add(minima)
             for index in set(minima.joint.tolist()):
                 self._summaries[index].add_bounded(minima.of_joint(index), between=True)
         self._passages.add(block)
-        self._balances.add(block)
+        self._check.add(block)
         for summary in self._summaries:
             summary.add(block)
         for drift in self._drifts:
             drift.add(block)
+
+    def _without_balances(self, block: Block) -> Block:
+        """Return a block without the quantities of the self-check, and with the energy of its motors."""
         stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
         return Block(**stored, motor_energy=self._energy.add(block))
 
@@ -186,7 +177,7 @@ class Run:
         options = {
             "stop_on_infeasible": self._stop_on_infeasible,
             "min_margin": self._min_margin,
-            "deflection_solver": "root" if self._deflections is None else "ode",
+            "deflection_solver": "root" if self._dynamics.deflections is None else "ode",
         }
         return {**self.choice.provenance, "options": json.dumps(options)}
 
@@ -207,9 +198,9 @@ class Run:
                 *self.trajectory.notes,
                 *self._between.notes,
                 *self._internal_stops(),
-                *self._passages.notes(self.trajectory, self._compute),
+                *self._passages.notes(self._dynamics),
             ),
-            self_check=self._self_check(),
+            self_check=self._check.outcome(),
             joints=tuple(
                 summary.report(*of_joint, complete=complete)
                 for summary, of_joint in zip(self._summaries, found, strict=True)
@@ -238,17 +229,17 @@ class Run:
 
     def _internal_stops(self) -> Iterator[str]:
         """Yield a note for each internal motion that ends before the trajectory does."""
-        for index, stop in self._internal.stops.items() if self._internal is not None else ():
+        internal = self._dynamics.internal
+        for index, stop in internal.stops.items() if internal is not None else ():
             joint = self.robot.joint_names[index]
             when = f"cannot go on beyond t = {time_text(stop.time)}"
             yield f"{joint}: what moves inside its damped transmission {when}: {stop.reason}"
 
-    def _self_check(self) -> SelfCheck:
-        """Return the self-check; its bound is larger for integrated deflections, which drift off (14)."""
-        bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
-        error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
-        of_springs, of_shafts = self._balances.residuals()
-        return SelfCheck(of_springs, error, bound, error_bound, of_shafts)
+
+def _mark_minima(between: Iterable[Minima], block: Block) -> None:
+    """Set the flags of minima in those of the nearest samples."""
+    for minima in between:
+        minima.mark(block.flags)
 
 
 def _is_long(robot: Robot) -> bool:
@@ -295,31 +286,6 @@ def inverse_dynamics(
     return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
-def _integrated(
-    deflection_solver: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
-) -> IntegratedDeflections | None:
-    """Return the deflections to use instead of the root of (14) at each sample; None for the root."""
-    if not isinstance(deflection_solver, str):
-        return deflection_solver
-    if deflection_solver not in DEFLECTION_SOLVERS:
-        hint = did_you_mean(deflection_solver, DEFLECTION_SOLVERS)
-        raise InputError.one(f"unknown deflection solver {deflection_solver!r}{hint}")
-    if deflection_solver == "root":
-        return None
-    from vsacli.dynamics.integrated_deflections import integrate_deflections
-
-    return integrate_deflections(robot, trajectory)
-
-
-def _internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions | None:
-    """Return the internal motions of damped transmissions; None without a damped transmission."""
-    if not any(joint.damper_at("transmission") for joint in robot.joints):
-        return None
-    from vsacli.dynamics.internal_motion import internal_motions
-
-    return internal_motions(robot, trajectory)
-
-
 def _uncertainty(
     robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
 ) -> RunUncertainty | None:
@@ -331,7 +297,9 @@ def _uncertainty(
     return RunUncertainty(robot, trajectory, judged_variables(asked, robot), engine)
 
 
-def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[DriftSummary]:
+def _drift_summaries(robot: Robot, deflections: IntegratedDeflections | None) -> list[DriftSummary]:
+    if deflections is None:
+        return []
     pairs = zip(robot.joints, deflections.stops, strict=True)
     return [
         DriftSummary(joint, index, stop)

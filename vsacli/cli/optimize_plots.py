@@ -55,6 +55,6 @@ def _moved(result: Result, place: FloatArray, index: int) -> Moved:
 
 def _torque_limits(joint: Joint) -> FloatArray:
     """Return the interval (2,) of torque that all motors of a joint allow."""
-    ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]
+    ranges = [check.range for check in joint.actuator.limits if check.variable == "tau_motor"]
     lower, upper = zip(*ranges, strict=True) if ranges else ((-np.inf,), (np.inf,))
     return np.array([max(lower), min(upper)])

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate, pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from vsacli.base.arrays import AnyArray
 
@@ -55,6 +55,10 @@ class RowKernel(ABC):
     @abstractmethod
     def results(self) -> RowLayout:
         """Layout of the output rows."""
+
+    @abstractmethod
+    def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
+        """Return the output rows."""
 
     @property
     def inputs(self) -> int:

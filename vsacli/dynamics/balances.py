@@ -1,14 +1,15 @@
 """Balances that every result must satisfy, for the self-check: springs (14), shafts (73)-(74), link energy.
 
 `BalancedDynamics` computes the residuals of springs and shafts with every sample. The energies and powers of
-shafts and links are for `analysis.derivative_check`, which compares an energy's derivative with the power.
+shafts and links are for `analysis.self_check`, which compares an energy's derivative with the power.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import reduce
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -16,26 +17,20 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.elasticity import Components
 from vsacli.actuators.friction import REST, Friction
-from vsacli.actuators.motor import ELECTRICAL, JointMotor
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
-from vsacli.compute.control_flow import call
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import motor_torques
 from vsacli.dynamics.elastic_torques import link_constants
-from vsacli.dynamics.inverse import InverseDynamics, behind_link, rows_of_joints
+from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
-
-SHAFT_VARIABLES = (
-    *("q", "dq", "tau_e", "stiffness", "damping", "theta", "dtheta", "ddtheta", "dphi", "tau_damper"),
-    *("tau_motor", "motor_power", "current", "voltage", "copper_loss", "dissipated_power"),
-)
-"""Variables of a joint that enter the balances, where it has them."""
 
 POSITION_ROUNDING = 8 * np.finfo(float).eps
 """Error of phi = theta - q by rounding, relative to the size of q and theta: a few roundings."""
@@ -45,13 +40,13 @@ Residual = tuple[FloatArray, FloatArray]
 
 
 def shaft_error(
-    joint: Joint, of_joint: OfJoint, tau_transmission: Components, regular: BoolArray
+    joint: Joint, of_joint: JointVariables, tau_transmission: Components, regular: BoolArray
 ) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
         joint: Joint.
-        of_joint: Variables of the joint by name, `SHAFT_VARIABLES` among them.
+        of_joint: Variables of the joint.
         tau_transmission: Torque of the springs against each motor by their laws, each (samples,).
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
@@ -62,22 +57,25 @@ def shaft_error(
     return reduce(np.maximum, errors)
 
 
-def _residuals(joint: Joint, of_joint: OfJoint, tau_transmission: Components) -> Iterator[Residual]:
+def _residuals(joint: Joint, of_joint: JointVariables, tau_transmission: Components) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
-        own = {name: of_joint[name][index] for name in ("tau_motor", "dtheta", "motor_power")}
+        torque, dtheta, power = (
+            rows[index] for rows in (of_joint.tau_motor, of_joint.dtheta, of_joint.motor_power)
+        )
         yield _torque_residual(joint, index, of_joint, tau_transmission[index])
-        yield _residual(own["motor_power"], own["tau_motor"] * own["dtheta"])
+        yield _residual(power, torque * dtheta)
         if motor.torque_constant is not None:
-            electrical = {name: of_joint[name][index] for name in ELECTRICAL if name in of_joint}
-            yield from _winding_residuals(motor, **own, **electrical)
+            electrical = (of_joint.current, of_joint.voltage, of_joint.copper_loss)
+            rows = (None if array is None else array[index] for array in electrical)
+            yield from _winding_residuals(motor, torque, dtheta, power, *rows)
     if joint.damper is not None:
         yield _residual(
-            of_joint["tau_damper"],
-            *(of_joint["damping"] * velocity for velocity in _damper_velocities(joint, of_joint).values()),
+            of_joint.tau_damper,
+            *(of_joint.damping * velocity for velocity in _damper_velocities(joint, of_joint).values()),
         )
-    if of_joint.get("dissipated_power") is not None:
+    if of_joint.dissipated_power is not None:
         lost = (*link_losses(joint, of_joint), *shaft_losses(joint, of_joint))
-        yield _residual(of_joint["dissipated_power"], *lost)
+        yield _residual(of_joint.dissipated_power, *lost)
 
 
 def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
@@ -85,18 +83,20 @@ def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
     return given - reduce(np.add, terms, np.zeros_like(given)), size
 
 
-def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_transmission: FloatArray) -> Residual:
+def _torque_residual(
+    joint: Joint, index: int, of_joint: JointVariables, tau_transmission: FloatArray
+) -> Residual:
     """Return the residual of a shaft, without the effect of rounded positions on the springs."""
-    motor, dtheta = joint.actuator.motors[index], of_joint["dtheta"][index]
-    terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_transmission]
+    motor, dtheta = joint.actuator.motors[index], of_joint.dtheta[index]
+    terms = [*_momentum_rates(joint, index, of_joint.ddtheta), tau_transmission]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
     damped = _damper_velocities(joint, of_joint).get(index)
     if damped is not None:
-        terms.append(of_joint["damping"] * damped)
-    missing, size = _residual(of_joint["tau_motor"][index], *terms)
+        terms.append(of_joint.damping * damped)
+    missing, size = _residual(of_joint.tau_motor[index], *terms)
     if joint.actuator.sprung:
-        positions = np.abs(of_joint["q"]) + np.abs(of_joint["theta"][index])
-        rounding = POSITION_ROUNDING * of_joint["stiffness"] * positions
+        positions = np.abs(of_joint.q) + np.abs(of_joint.theta[index])
+        rounding = POSITION_ROUNDING * of_joint.stiffness * positions
         missing = np.maximum(np.abs(missing) - rounding, 0.0)
     return missing, size
 
@@ -141,52 +141,52 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
     return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
 
 
-def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, FloatArray]:
+def _damper_velocities(joint: Joint, of_joint: JointVariables) -> dict[int | None, FloatArray]:
     """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
     if joint.damper_at("link"):
-        return {None: of_joint["dq"]}
+        return {None: of_joint.dq}
     behind = joint.actuator.has(VARIABLES["phi"])
-    return {motor: of_joint["dphi"][motor] for motor, there in enumerate(behind) if there}
+    return {motor: of_joint.dphi[motor] for motor, there in enumerate(behind) if there}
 
 
-def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def link_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the power lost between the two links of a joint, term by term."""
-    dq = of_joint["dq"]
+    dq = of_joint.dq
     lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
     if joint.damper_at("link"):
-        lost.append(of_joint["damping"] * dq * dq)
+        lost.append(of_joint.damping * dq * dq)
     return lost
 
 
-def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def shaft_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the power lost between the motors and the link of a joint, term by term."""
     lost = []
-    for motor, dtheta in zip(joint.actuator.motors, of_joint["dtheta"], strict=False):
+    for motor, dtheta in zip(joint.actuator.motors, of_joint.dtheta, strict=False):
         lost.append(motor.damping * dtheta * dtheta)
         lost.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
     if joint.damper_at("transmission"):
         velocities = _damper_velocities(joint, of_joint).values()
-        lost.extend(of_joint["damping"] * velocity * velocity for velocity in velocities)
+        lost.extend(of_joint.damping * velocity * velocity for velocity in velocities)
     return lost
 
 
-def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
+def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
     """Return the kinetic energy of the rotors of a joint plus the energy in its springs, (samples,), J."""
-    energy: FloatArray = of_joint["elastic_energy"]
-    motors, dtheta = joint.actuator.motors, of_joint["dtheta"]
+    energy: FloatArray = of_joint.elastic_energy
+    motors, dtheta = joint.actuator.motors, of_joint.dtheta
     for motor, velocity in zip(motors, dtheta, strict=False):
         energy = energy + motor.inertia / 2 * velocity * velocity
     coupling = joint.actuator.coupled_rotors
     return energy + coupling * dtheta[0] * dtheta[1] if coupling else energy
 
 
-def shaft_powers(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
     motors = len(joint.actuator.motors)
-    taken = [of_joint["tau_e"] * of_joint["dq"], *shaft_losses(joint, of_joint)]
-    return [*of_joint["motor_power"][:motors], *(-power for power in taken)]
+    taken = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
+    return [*of_joint.motor_power[:motors], *(-power for power in taken)]
 
 
 BALANCES = {
@@ -205,42 +205,47 @@ BALANCES = {
 """Quantities of the balances; they are computed with the result variables, but not stored."""
 
 
-BALANCED = {*SHAFT_VARIABLES, "phi", "flags"}
-"""Variables from which the balances of springs and shafts are computed."""
-
-
 class BalancedBlock(Block):
     """A block with the result variables and `BALANCES`."""
 
     declared: ClassVar[Mapping[str, Variable]] = {**VARIABLES, **BALANCES}
 
 
-class BalancedDynamics(InverseDynamics):
+@dataclass(frozen=True)
+class BalancedDynamics(BlockKernel):
     """Kernel of a run: inverse dynamics with `BALANCES` at each sample.
 
     As part of one program the balances take hardly any time.
+
+    Attributes:
+        dynamics: Inverse dynamics that are balanced.
     """
 
     block = BalancedBlock
 
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of the computed variables at one instant, by name."""
-        motors, damped = (len(self.robot.joints), SIDES), (len(damped_joints(self.robot.joints)),)
-        return {
-            **super().shapes(),
-            **dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True)),
-        }
+    dynamics: InverseDynamics
 
-    def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
-        """Return the rows of each result by name, those of `BALANCES` last."""
-        joints = self.robot.joints
-        passed = [
-            call(rows[0], behind_link(passed_power, joint), of_joint)
-            for joint, of_joint in zip(joints, of_joints, strict=True)
-        ]
+    @property
+    def arguments(self) -> RowLayout:
+        """Layout of the input rows."""
+        return self.dynamics.arguments
+
+    @cached_property
+    def results(self) -> RowLayout:
+        """Layout of the output rows: those of inverse dynamics, then `BALANCES`."""
+        joints = self.dynamics.robot.joints
+        motors, damped = (len(joints), SIDES), (len(damped_joints(joints)),)
+        shapes = dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True))
+        return RowLayout({**self.dynamics.results.shapes, **shapes})
+
+    def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
+        """Run (36)-(74) and the balances."""
+        joints, of_joints = self.dynamics.robot.joints, self.dynamics.at_joints(rows)
+        passed = call_at_joints(rows[0], passed_power, joints, zip(of_joints, strict=True))
         powers, rates = zip(*passed, strict=True)
         by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
-        return {**super().rows_of(rows, of_joints), **by_motor, **balances(joints, of_joints)}
+        computed = self.dynamics.rows_of(rows, of_joints)
+        return self.results.pack({**computed, **by_motor, **balances(joints, of_joints)})
 
 
 def damped_joints(joints: Sequence[Joint]) -> list[int]:
@@ -248,7 +253,7 @@ def damped_joints(joints: Sequence[Joint]) -> list[int]:
     return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
 
 
-def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
+def balances(joints: Sequence[Joint], of_joints: Sequence[JointVariables]) -> dict[str, list[FloatArray]]:
     """Return the residuals of (14), by the springs' laws at phi, and of the shafts, by name.
 
     They are zero at infeasible and singular samples. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k|
@@ -256,10 +261,10 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
     damper the torque of the springs may pass zero while nothing else is small, so the torque residual is
     returned unscaled, with its size: only the whole run has a scale for it.
     """
-    springs, shafts, missing, sizes = [np.zeros_like(of_joints[0]["tau_e"])], [], [], []
-    for joint, of_joint in zip(joints, of_joints, strict=True):
-        found = call(of_joint["tau_e"], behind_link(_balance, joint), of_joint)
-        of_stiffness, of_torque, size, of_shafts = found
+    row = of_joints[0].tau_e
+    springs, shafts, missing, sizes = [np.zeros_like(row)], [], [], []
+    balanced = call_at_joints(row, _balance, joints, zip(of_joints, strict=True))
+    for of_stiffness, of_torque, size, of_shafts in balanced:
         shafts.append(of_shafts)
         if of_stiffness is not None:
             springs.append(of_stiffness)
@@ -272,17 +277,17 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str,
     return {**largest, "damped_error": missing, "damped_size": sizes}
 
 
-def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
+def _balance(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray | None, ...]:
     """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
-    regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
-    tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
+    regular = ~has(of_joint.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+    tau_e, stiffness = of_joint.tau_e, of_joint.stiffness
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
     springs = joint.actuator.springs_of(of_joint)
-    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint["phi"], of_joint["theta"]))
+    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint.phi, of_joint.theta))
     of_shafts = shaft_error(joint, of_joint, springs.tau_transmission, regular)
     of_stiffness = np.abs(springs.stiffness - stiffness) / np.where(regular, stiffness_size, 1.0)
     of_stiffness = np.where(regular, of_stiffness, 0.0)
@@ -290,30 +295,30 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
     if not joint.damper_at("transmission"):
         of_torque = np.where(regular, np.abs(springs.tau_e - tau_e) / size, 0.0)
         return of_stiffness, of_torque, None, of_shafts
-    residual = np.abs(springs.tau_e + of_joint["tau_damper"] - tau_e)
+    residual = np.abs(springs.tau_e + of_joint.tau_damper - tau_e)
     residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
     size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
     return of_stiffness, np.where(regular, residual, 0.0), size, of_shafts
 
 
-def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:
+def _rounding_of_damper(of_joint: JointVariables) -> FloatArray:
     """Return the rounding of the torque of a damper, whose velocity is the difference theta' - q'."""
-    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint["damping"] * np.abs(of_joint["dq"])
+    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint.damping * np.abs(of_joint.dq)
     return rounding
 
 
-def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
+def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the power of motors into springs, dampers and damping, and its rate, W, W/s.
 
     It is the motor power without that of inertia and dry friction, which `energy` integrates separately. Each
     (2, samples), NaN where there is no motor.
     """
-    dtheta, ddtheta = of_joint["dtheta"], of_joint["ddtheta"]
+    dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
     motors = [motor.damping for motor in joint.actuator.motors]
     damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
-    torque = damping * dtheta + of_joint["tau_transmission"]
+    torque = damping * dtheta + of_joint.tau_transmission
     rate = damping * ddtheta
-    none = np.full_like(of_joint["q"], np.nan)
+    none = np.full_like(of_joint.q, np.nan)
     rate = rate + np.stack([*_transmission_rates(joint.actuator, of_joint), none][:SIDES])
     if joint.damper_at("transmission"):
         against, its_rate = motor_torques(joint, of_joint)
@@ -321,11 +326,11 @@ def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArra
     return torque * dtheta, rate * dtheta + torque * ddtheta
 
 
-def _transmission_rates(actuator: Actuator, of_joint: OfJoint) -> Sequence[FloatArray]:
+def _transmission_rates(actuator: Actuator, of_joint: JointVariables) -> Sequence[FloatArray]:
     """Return the rates of the torques that act on each motor beside its own losses."""
     if not actuator.sprung:
-        return [of_joint["dtau_e"]]
-    rates = *actuator.unknowns(of_joint["dphi"], of_joint["dtheta"]), of_joint["dq"]
+        return [of_joint.dtau_e]
+    rates = *actuator.unknowns(of_joint.dphi, of_joint.dtheta), of_joint.dq
     return actuator.springs_of(of_joint).transmission_rates(rates)
 
 
@@ -369,8 +374,8 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
     """
     powers = []
     for index, joint in enumerate(robot.joints):
-        of_joint = block.of_joint(index)
-        powers.append(of_joint["tau_e"] * of_joint["dq"])
+        of_joint = JointVariables.of(block.of_joint(index))
+        powers.append(of_joint.tau_e * of_joint.dq)
         powers.extend(-lost for lost in link_losses(joint, of_joint))
     return powers if frame is None else [*powers, _wrench_power(robot, block, frame)]
 

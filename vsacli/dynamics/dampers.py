@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
@@ -44,16 +44,19 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
 
 
-def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
+def motor_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
     damping, d_damping, dphi, ddtheta = (
-        of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
+        of_joint.damping,
+        of_joint.ddamping,
+        of_joint.dphi,
+        of_joint.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
     for motor, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
         if there:
             torque[motor] = damping * dphi[motor]
-            rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint["ddq"])
+            rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
     return torque, rate
 
 

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,18 +13,13 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
-
-if TYPE_CHECKING:
-    from vsacli.actuators.damped_springs import InternalMotion
-
 
 ACTUATED = (
     *("stiffness", "dstiffness", "ddstiffness", "phi", "dphi", "theta", "dtheta", "ddtheta"),
@@ -50,58 +44,50 @@ def drive(
     joint: Joint,
     command: Command,
     min_margin: float = MIN_MARGIN,
-    integrated: FloatArray | None = None,
-    internal: InternalMotion | None = None,
-) -> OfJoint:
+    deflections: FloatArray | InternalMotion | None = None,
+) -> JointVariables:
     """Compute motor motion and motor torques of a joint, (61)-(74).
 
     Args:
         joint: Joint with its actuator.
         command: Commanded motion and stiffness, and the elastic torque with its two derivatives.
         min_margin: Margin below which a sample is near-singular.
-        integrated: Deflections to use instead of the root of (14), (2, samples); a sample where they are
-            NaN is infeasible.
-        internal: Internal motion of a damped transmission.
+        deflections: Deflections to use instead of the root of (14), (2, samples); a sample where they are
+            NaN is infeasible. Of a damped transmission, its internal motion.
 
     Returns:
-        The variables `ACTUATED`, and those of `OF_DEVICES` that the joint has. At infeasible samples all
-        motor variables are NaN; at singular samples those that need the inverse of the decoupling matrix. A
-        motor that the actuator does not have is NaN throughout.
+        The command, the variables `ACTUATED`, and those of `OF_DEVICES` that the joint has. At infeasible
+        samples all motor variables are NaN; at singular samples those that need the inverse of the decoupling
+        matrix. A motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, min_margin, integrated, internal)
-    of_joint = {**command.arrays(), **driven}
-    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven["flags"]))
-    unexplained = not_finite_flags(_not_finite(joint, of_joint))
-    return {**driven, "flags": driven["flags"] | exceeded | unexplained}
+    driven = driven_by(joint, command, min_margin, deflections)
+    exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
+    unexplained = not_finite_flags(_not_finite(joint, driven))
+    return driven._replace(flags=driven.flags | exceeded | unexplained)
 
 
 def driven_by(
     joint: Joint,
     command: Command,
     min_margin: float,
-    integrated: FloatArray | None = None,
-    internal: InternalMotion | None = None,
-) -> OfJoint:
+    deflections: FloatArray | InternalMotion | None = None,
+) -> JointVariables:
     """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
-    if internal is None:
-        found = dict(actuator.transmit(command, min_margin, integrated))  # (61)-(72)
-    else:
+    if isinstance(deflections, InternalMotion):
         from vsacli.actuators.damped_springs import DampedSprings
 
-        found = dict(DampedSprings(actuator).transmit(command, internal, min_margin))
-    dtheta = found["dtheta"]
-    tau_motor = motor_torques(actuator, dtheta, found["ddtheta"], found["tau_transmission"])
-    tau_damper, beside = _damper_torques(joint, command, found["dphi"])
-    if tau_damper is not None:
-        found["tau_damper"] = tau_damper
+        moved = DampedSprings(actuator).transmit(command, deflections, min_margin)
+    else:
+        moved = actuator.transmit(command, min_margin, deflections)  # (61)-(72)
+    tau_motor = motor_torques(actuator, moved.dtheta, moved.ddtheta, moved.tau_transmission)
+    tau_damper, beside = _damper_torques(joint, command, moved.dphi)
     if beside is not None:
         tau_motor = tau_motor + beside
     windings = Windings.of(actuator.sides)
-    if windings is not None:
-        found |= windings.with_axis_behind().variables(tau_motor, dtheta)
-    found |= {"tau_motor": tau_motor, "motor_power": tau_motor * dtheta}
-    return {name: found[name] for name in (*ACTUATED, *(each for each in OF_DEVICES if each in found))}
+    electrical = {} if windings is None else windings.with_axis_behind().variables(tau_motor, moved.dtheta)
+    driven = moved._replace(tau_motor=tau_motor, motor_power=tau_motor * moved.dtheta, **electrical)
+    return driven if tau_damper is None else driven._replace(tau_damper=tau_damper)
 
 
 def motor_torques(
@@ -137,7 +123,7 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     return own + coupling * ddtheta[::-1] if coupling else own
 
 
-def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
+def _not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
     Samples with a demand that is not finite count, too.
@@ -145,12 +131,12 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
     # Three variables suffice: by (69) and (73)-(74) every variable of a motor enters its position or its
     # power. Singular samples have no power.
     theta, tau_transmission, power = (
-        finite(of_joint[name][: joint.actuator.motor_count])
-        for name in ("theta", "tau_transmission", "motor_power")
+        finite(rows[: joint.actuator.motor_count])
+        for rows in (of_joint.theta, of_joint.tau_transmission, of_joint.motor_power)
     )
-    infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
+    infeasible, singular = (has(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta & tau_transmission & (singular | power))
-    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in joint.commanded)])
+    demand = finite([of_joint.tau_e, *(getattr(of_joint, key) for key in joint.commanded)])
     return ~(demand & explained)
 
 

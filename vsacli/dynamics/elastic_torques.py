@@ -126,7 +126,15 @@ class LinkTorques(RowKernel):
         ]
         wrench = [given[name] for name in WRENCH_NAMES if name in given]
         tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
-        return Chain(list(map(link_constants, joints)), states, base_gravity(self.robot), tip)
+        return Chain(self._links, states, self._gravity, tip)
+
+    @cached_property
+    def _links(self) -> list[LinkConstants]:
+        return list(map(link_constants, self.robot.joints))
+
+    @cached_property
+    def _gravity(self) -> Vector:
+        return base_gravity(self.robot)
 
 
 class ElasticTorques(NamedTuple):
@@ -282,8 +290,10 @@ def joint_state(
 
 def link_resistance(joint: Joint, rates: Sequence[Scalar], damping: Sequence[Scalar]) -> TorqueDerivatives:
     """Return the torque of dry friction and of a damper between the links; arguments as for `joint_state`."""
-    damper = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
-    return TorqueDerivatives(*map(add, damper, joint_friction(joint.friction, rates)))
+    friction = joint_friction(joint.friction, rates)
+    if not joint.damper_at("link"):
+        return friction
+    return TorqueDerivatives(*map(add, damper_torque(damping, rates[:3]), friction))
 
 
 def link_damped(robot: Robot) -> bool:

@@ -242,16 +242,11 @@ TOLERANCE = 1e-12
 """Relative tolerance of the integrator; the drift is about as large."""
 
 
-@dataclass(frozen=True)
-class _Course:
+class _Course(NamedTuple):
     """Deflections of some joints over a part of the trajectory."""
 
     joints: list[int]
     solution: OdeSolution
-
-    def deflections(self, time: FloatArray) -> FloatArray:
-        """Return the deflections, (joints, 2, samples)."""
-        return by_joint(self.solution(time))
 
 
 @dataclass(frozen=True)
@@ -276,7 +271,9 @@ class IntegratedDeflections:
         for course in self._courses:
             here = (course.solution.t_min <= elapsed) & (elapsed <= course.solution.t_max)
             if here.any():
-                for joint, deflections in zip(course.joints, course.deflections(elapsed[here]), strict=True):
+                for joint, deflections in zip(
+                    course.joints, by_joint(course.solution(elapsed[here])), strict=True
+                ):
                     phi[joint][:, here] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
@@ -316,6 +313,6 @@ def integrate_deflections(
         if integration.times[-1] > time:
             time = integration.times[-1]
             courses.append(_Course(going, integration.solution()))
-            phi[going] = courses[-1].deflections(np.array([time]))
+            phi[going] = by_joint(courses[-1].solution(np.array([time])))
         stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
     return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(courses), first)

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.damped_springs import DampedSprings, InternalMotion
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.damped_springs import DampedSprings
+from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
@@ -30,54 +30,35 @@ STAGES = 12
 """Stages per cell: with 12, half a second from rest to rest is exact to rounding in about 40 cells."""
 
 
-class _Rule(NamedTuple):
-    """Collocation in the cell [-1, 1].
-
-    Attributes:
-        nodes: Nodes, (stages,), the last at 1.
-        to_coefficients: Matrix from values at -1 and the nodes to coefficients of Chebyshev polynomials.
-        through_nodes: Matrix from values at the nodes alone to coefficients.
-        slopes: Derivatives at the nodes from values at -1 and at the nodes.
-    """
-
-    nodes: FloatArray
-    to_coefficients: FloatArray
-    through_nodes: FloatArray
-    slopes: FloatArray
-
-
-def _rule(stages: int) -> _Rule:
-    from numpy.polynomial import chebyshev
-    from scipy.special import roots_jacobi
-
-    nodes = np.append(roots_jacobi(stages - 1, 1, 0)[0], 1.0)
-    to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, nodes), stages))
-    slopes: FloatArray = chebyshev.chebvander(nodes, stages - 1) @ chebyshev.chebder(to_coefficients)
-    through_nodes = np.linalg.inv(chebyshev.chebvander(nodes, stages - 1))
-    return _Rule(nodes, to_coefficients, through_nodes, slopes)
-
-
 class Collocation:
-    """The collocation rule, scaled to cells of time."""
+    """Collocation at the Radau points of the cell [-1, 1], scaled to cells of time."""
 
     def __init__(self, stages: int = STAGES) -> None:
-        self._rule = _rule(stages)
+        from numpy.polynomial import chebyshev
+        from scipy.special import roots_jacobi
+
+        self._nodes = np.append(roots_jacobi(stages - 1, 1, 0)[0], 1.0)
+        # From values at -1 and the nodes to coefficients of Chebyshev polynomials, and from the nodes alone.
+        self._to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, self._nodes), stages))
+        self._through_nodes = np.linalg.inv(chebyshev.chebvander(self._nodes, stages - 1))
+        derivatives = chebyshev.chebder(self._to_coefficients)
+        self._slopes: FloatArray = chebyshev.chebvander(self._nodes, stages - 1) @ derivatives
 
     def times(self, start: float, end: float) -> FloatArray:
         """Return the nodes of a cell, (stages,), s."""
-        return start + (end - start) / 2 * (1 + self._rule.nodes)
+        return start + (end - start) / 2 * (1 + self._nodes)
 
     def slopes(self, start: float, end: float) -> FloatArray:
         """Return the matrix from values at start and nodes to rates at nodes, (stages, stages + 1), 1/s."""
-        return self._rule.slopes * (2 / (end - start))
+        return self._slopes * (2 / (end - start))
 
     def coefficients(self, values: FloatArray) -> FloatArray:
         """Return the coefficients from values at the start and at the nodes, (..., stages + 1)."""
-        return values @ self._rule.to_coefficients.T
+        return values @ self._to_coefficients.T
 
     def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
         """Return the coefficients from values at the nodes, (..., stages)."""
-        return values @ self._rule.through_nodes.T
+        return values @ self._through_nodes.T
 
 
 class Piecewise:

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import repeat
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import MIN_MARGIN
@@ -27,6 +27,7 @@ from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import KEPT_PROGRAMS, NUMPY, Engine, engine_of_call, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar
+from vsacli.dynamics.deflection_rows import IntegratedRows, InternalRows, internal_rows
 from vsacli.dynamics.drive import ACTUATED, OF_DEVICES, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
@@ -38,15 +39,8 @@ from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from vsacli.actuators.damped_springs import InternalMotion
-
 COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 """The variables that inverse dynamics computes, where the robot has them."""
-
-
-INTERNAL = ("internal_phi", "internal_velocity", "internal_acceleration")
-"""Names of the rows of internal motion in damped transmissions, in the order of `InternalMotion`."""
 
 
 def usual_block(joints: int) -> int:
@@ -66,142 +60,137 @@ class Stop(Stored):
     reason: str
 
 
-@dataclass(frozen=True)
-class InverseDynamics(RowKernel):
-    """Inverse dynamics (36)-(74) over rows of samples, for an engine.
-
-    Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, deflections
-    if they are integrated, and internal motion. Outputs are the variables of `COMPUTED`, in that order.
+class BlockKernel(RowKernel):
+    """A kernel whose inputs are commands of a robot, and whose results are variables of a block.
 
     Attributes:
-        robot: Robot whose motion is computed.
-        frame: Frame of the wrench; None without a wrench.
-        min_margin: Margin below which a sample is near-singular.
-        integrated: Whether deflections are inputs; otherwise (14) is solved for them.
-        internal: Joints with damped transmissions, by index; their internal motion is an input.
-        driven: Whether only the internal deflections are inputs; their rates then follow from the damping.
         block: Class of the blocks that hold the results.
     """
 
     block: ClassVar[type[Block]] = Block
 
+
+@dataclass(frozen=True)
+class InverseDynamics(BlockKernel):
+    """Inverse dynamics (36)-(74) over rows of samples, for an engine.
+
+    Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, and
+    deflections that replace the root of (14). Outputs are the variables of `COMPUTED`, in that order.
+
+    Attributes:
+        robot: Robot whose motion is computed.
+        frame: Frame of the wrench; None without a wrench.
+        min_margin: Margin below which a sample is near-singular.
+        deflections: Deflections that are inputs; where a joint has several, the last counts.
+    """
+
     robot: Robot
     frame: str | None = None
     min_margin: float = MIN_MARGIN
-    integrated: bool = False
-    internal: tuple[int, ...] = ()
-    driven: bool = False
+    deflections: tuple[IntegratedRows | InternalRows, ...] = ()
 
-    @property
+    @cached_property
     def links(self) -> LinkTorques:
         """Kernel of the recursion alone."""
         return LinkTorques(self.robot, self.frame)
 
     @cached_property
-    def variables(self) -> frozenset[str]:
-        """Names of the variables that results of the robot have."""
-        return frozenset(name for name, variable in VARIABLES.items() if self.robot.has(variable))
-
-    @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
         joints = len(self.robot.joints)
-        names = (name for signal in self.robot.signals for name in signal.names)
-        commanded = dict.fromkeys(names, (joints,))
-        integrated = {"phi": (joints, SIDES)} if self.integrated else {}
-        inside = (len(self.internal),)
-        shapes = ((*inside, SIDES),) if self.driven else ((*inside, SIDES), inside, inside)
-        internal = dict(zip(INTERNAL, shapes, strict=False)) if self.internal else {}
-        return RowLayout({**self.links.arguments.shapes, **commanded, **integrated, **internal})
+        shapes = dict(self.links.arguments.shapes)
+        shapes |= {name: (joints,) for signal in self.robot.signals for name in signal.names}
+        for rows in self.deflections:
+            shapes |= rows.shapes(joints)
+        return RowLayout(shapes)
 
     @cached_property
     def results(self) -> RowLayout:
         """Layout of the output rows."""
-        return RowLayout(self.shapes())
-
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Return the shapes of the computed variables at one instant, by name."""
-        joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
-        return {
-            variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
-            for variable in declared
-            if self.robot.has(variable)
-        }
+        joints = len(self.robot.joints)
+        return RowLayout(
+            {
+                name: (joints, SIDES) if "motor" in VARIABLES[name].dims else (joints,)
+                for name in COMPUTED
+                if self.robot.has(VARIABLES[name])
+            }
+        )
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
-        # `BalancedDynamics`, the kernel of a run, overrides `rows_of` to append the rows of the self-check.
         return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
 
-    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
-        """Return the variables of each joint by name, without those that it does not have."""
-        links, given = self.links, self.arguments.unpack(rows)
-        demanded = links(links.arguments.pack(given))  # (36)-(60)
-        torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
-        of_all = {**given, **torques}
-        names = Command.names(signal.key for signal in self.robot.signals)
-        found = []
-        for index, joint in enumerate(self.robot.joints):
-            command = Command.of({name: of_all[name][index] for name in names})
-            phi = np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None
-            internal = self._internal(index, given)
-            # Computes drive(joint, ...), (61)-(74). `call` lets equal joints share one recorded body.
-            driving = behind_link(drive, joint, joint.limits)
-            driven = call(rows[0], driving, command, self.min_margin, phi, internal)
-            found.append({**command.arrays(), **driven})
-            _check_limits(joint, found[-1])
-        if self.robot.has(VARIABLES["dissipated_power"]):
-            for joint, of_joint in zip(self.robot.joints, found, strict=True):
-                of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
-        return found
+    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[JointVariables]:
+        """Return the variables of each joint."""
+        inputs = self.arguments.unpack(rows)
+        torques = self.links(self.links.arguments.pack(inputs))  # (36)-(60)
+        # The recursion gives the integer 0 for joints that move no mass.
+        rows_of_links = [np.full_like(rows[0], row) if np.ndim(row) == 0 else row for row in torques]
+        of_all = {**inputs, **self.links.results.unpack(rows_of_links)}
+        names, joints = Command.names(signal.key for signal in self.robot.signals), self.robot.joints
+        commands = (Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints)))
+        deflections = (self._deflections(index, inputs) for index in range(len(joints)))
+        demands = zip(commands, repeat(self.min_margin), deflections, strict=False)
+        limits = [joint.limits for joint in joints]
+        of_joints: list[JointVariables] = call_at_joints(rows[0], drive, joints, demands, limits)  # (61)-(74)
+        for joint, of_joint in zip(joints, of_joints, strict=True):
+            _check_limits(joint, of_joint)
+        if "dissipated_power" in self.results.shapes:
+            powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
+            of_joints = [
+                of_joint._replace(dissipated_power=power)
+                for of_joint, power in zip(of_joints, powers, strict=True)
+            ]
+        return of_joints
 
-    def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
+    def _deflections(
+        self, index: int, inputs: Mapping[str, Sequence[Scalar]]
+    ) -> FloatArray | InternalMotion | None:
+        states = (rows.of_joint(index, inputs) for rows in reversed(self.deflections))
+        return next((state for state in states if state is not None), None)
+
+    def rows_of(
+        self, rows: Sequence[Scalar], of_joints: Sequence[JointVariables]
+    ) -> dict[str, Iterable[Any]]:
         """Return the rows of each result by name, from the input rows and the variables of the joints."""
-        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
+        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0].dtheta, np.nan)}
+        present = [of_joint.by_name() for of_joint in of_joints]
         return {
-            name: rows_of_joints(
-                [of_joint.get(name, absent[len(VARIABLES[name].dims)]) for of_joint in of_joints]
-            )
-            for name in COMPUTED
-            if self.robot.has(VARIABLES[name])
+            name: rows_of_joints([arrays.get(name, absent[len(VARIABLES[name].dims)]) for arrays in present])
+            for name in self.results.shapes
         }
 
-    def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
-        """Return the internal motion of a joint; None unless its transmission is damped."""
-        if index not in self.internal:
-            return None
-        from vsacli.actuators.damped_springs import InternalMotion
 
-        place = self.internal.index(index)
-        deflections = np.stack(given[INTERNAL[0]][SIDES * place : SIDES * (place + 1)])
-        rates = [None, None] if self.driven else [given[name][place] for name in INTERNAL[1:]]
-        return InternalMotion(deflections, *rates)
-
-
-def _check_limits(joint: Joint, of_joint: OfJoint) -> None:
+def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
     for check in limit_checks(joint):
-        if check.variable not in of_joint:
+        if getattr(of_joint, check.variable, None) is None:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
-def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:
-    """Wrap `function(joint, ...)` so that `call` records one body for joints with equal actuators.
+def call_at_joints(
+    row: Scalar,
+    function: Callable[..., Any],
+    joints: Sequence[Joint],
+    arguments: Iterable[Sequence[Any]],
+    keys: Iterable[Hashable] = repeat(None),
+) -> list[Any]:
+    """Return `function(joint, ...)` of each joint; a program has one body for joints with equal actuators.
 
-    Name, DH row and link of the joint are ignored in the comparison.
+    Name, DH row and link of the joints are ignored in the comparison.
 
     Args:
+        row: Any row of samples, for `call`.
         function: Function whose first argument is the joint.
-        joint: Joint to bind to it.
-        further: Keys to compare in addition.
+        joints: Joints.
+        arguments: Further arguments for each joint.
+        keys: Keys of the joints to compare in addition.
     """
-    counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
-    return Keyed((function, *counting, *further), partial(function, joint))
-
-
-def _as_row(torque: Scalar, row: Scalar) -> Scalar:
-    """Return a torque as a row of samples; the recursion gives the integer 0 for joints that move no mass."""
-    return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
+    bodies = []
+    for joint, key in zip(joints, keys, strict=False):
+        counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
+        bodies.append(Keyed((function, *counting, key), partial(function, joint)))
+    return [call(row, body, *of_joint) for body, of_joint in zip(bodies, arguments, strict=True)]
 
 
 def compute_block(
@@ -225,12 +214,13 @@ def compute_block(
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal
     kernel = _kernel(robot, frame, min_margin, tuple(internal))
-    return block_of(kernel, motion, engine, internal=internal)
+    return block_of(kernel, motion, engine, internal_rows(internal))
 
 
 @lru_cache(KEPT_PROGRAMS)
-def _kernel(robot: Robot, frame: str | None, min_margin: float, internal: tuple[int, ...]) -> InverseDynamics:
-    return InverseDynamics(robot, frame, min_margin, internal=internal)
+def _kernel(robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]) -> InverseDynamics:
+    deflections = (InternalRows(damped),) if damped else ()
+    return InverseDynamics(robot, frame, min_margin, deflections)
 
 
 def motor_torques(
@@ -283,35 +273,26 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
 
 
 def block_of(
-    kernel: InverseDynamics,
+    kernel: BlockKernel,
     motion: Motion,
     engine: Engine = NUMPY,
-    *,
-    integrated: FloatArray | None = None,
-    internal: Mapping[int, InternalMotion] = MappingProxyType({}),
+    deflections: Mapping[str, FloatArray] = MappingProxyType({}),
 ) -> Block:
-    """Return the variables that a kernel of inverse dynamics computes for a block of samples.
+    """Return the variables that a kernel computes for a block of samples.
 
     Args:
         kernel: Kernel to run; it names the class of the block.
         motion: Commanded motion, as for `compute_block`.
         engine: Backend.
-        integrated: Deflections, (joints, 2, samples), if they are inputs of the kernel; a sample where they
-            are NaN is infeasible.
-        internal: Internal motion of the joints in `kernel.internal`, by index and in that order.
+        deflections: Rows of the deflections that are inputs of the kernel, (rows, samples), by name.
     """
-    given = {name: array for name, array in motion.variables().items() if name in kernel.variables}
-    rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
-    if integrated is not None:
-        rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
-    # All joints' deflections, then all velocities, then all accelerations, as in `arguments`.
-    for name, values in zip(INTERNAL, zip(*internal.values(), strict=True), strict=False):
-        of_joints = np.concatenate(values) if name == INTERNAL[0] else np.stack(values)
-        rows[name] = np.ascontiguousarray(of_joints)
-    found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
-    computed = {name: over_time(array) for name, array in found.items()}
-    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(FLAG_TYPE)}
-    return kernel.block(**arrays)
+    inputs = kernel.arguments.shapes
+    commanded = {name: array for name, array in motion.variables().items() if name in inputs}
+    rows = {name: by_joint(array) for name, array in commanded.items()}
+    results = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack({**rows, **deflections})))
+    computed: dict[str, AnyArray] = {name: over_time(array) for name, array in results.items()}
+    computed["flags"] = computed["flags"].astype(FLAG_TYPE)
+    return kernel.block(time=motion.time, **{**commanded, **computed})
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
@@ -323,7 +304,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     }
     if not damped:
         return {}
-    from vsacli.actuators.damped_springs import DampedSprings, InternalMotion
+    from vsacli.actuators.damped_springs import DampedSprings
 
     commanded = {**motion.variables(), **elastic_torques(robot, motion)}
     found = {}

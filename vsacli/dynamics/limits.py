@@ -32,7 +32,7 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
     ]
     if joint.damper is not None:
         checks.append(LimitCheck(Flag.DAMPING_LIMIT, DAMPING.key, None, joint.damper.range))
-    checks += joint.actuator.limits()
+    checks += joint.actuator.limits
     return [check for check in checks if any(map(math.isfinite, check.range))]
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.control_flow import where_needed
@@ -104,19 +105,18 @@ DAMPED = ("damping", "ddamping", "dphi")
 """Variables from which losses in dampers follow."""
 
 
-def dissipated_power(joint: Joint, motion: Mapping[str, Any]) -> FloatArray:
+def dissipated_power(joint: Joint, motion: JointVariables) -> FloatArray:
     """Return the power dissipated by friction and damping of a joint and its motors, (samples,), W.
 
     Args:
         joint: Joint with its actuator.
-        motion: Variables of the joint by name: `dq`, (samples,), and `dtheta`, (2, samples), among others;
-            for a joint with a damper also `damping` and `dphi`.
+        motion: Velocities `dq` and `dtheta`, and for a joint with a damper `damping` and `dphi`.
     """
-    power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion["dq"])
-    for velocity in damper_velocities(joint, motion["dq"], motion["dphi"]) if joint.damper else ():
-        power = power + motion["damping"] * velocity * velocity
+    power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
+    for velocity in damper_velocities(joint, motion.dq, motion.dphi) if joint.damper else ():
+        power = power + motion.damping * velocity * velocity
     for index, motor in enumerate(joint.actuator.motors):
-        power = power + _taken(motor.damping, FrictionLaws.of([motor.friction]), motion["dtheta"][index])
+        power = power + _taken(motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index])
     return power
 
 

@@ -22,7 +22,14 @@ from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.inverse import COMPUTED, block_of, command_of, elastic_torques, usual_block
+from vsacli.dynamics.inverse import (
+    COMPUTED,
+    InverseDynamics,
+    block_of,
+    command_of,
+    elastic_torques,
+    usual_block,
+)
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -157,7 +164,8 @@ def deviations(
     """
     undamped = _without_inner_dampers(robot)
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = BalancedDynamics(undamped, frame)  # equal to that of the run, so that compiled code is shared
+    # Equal to that of the run, so that compiled code is shared.
+    kernel = BalancedDynamics(InverseDynamics(undamped, frame))
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         block = block_of(kernel, shifted, engine)
@@ -193,8 +201,8 @@ def deviations_of_joint(
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
-        found = {**command.arrays(), **drive(undamped.joints[index], command)}
-        return {name: found[name].T[:, None] for name in _COMPUTED}
+        driven = drive(undamped.joints[index], command)
+        return {name: getattr(driven, name).T[:, None] for name in _COMPUTED}
 
     components = {  # what other joints are commanded beside their motion has no effect on this one
         signal: [index] if signal.key in COMMANDED else range(len(covariance))

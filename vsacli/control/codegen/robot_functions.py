@@ -12,8 +12,9 @@ from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.vector import Scalar
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure, unpacked
+from vsacli.dynamics.deflection_rows import INTERNAL, InternalRows
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
-from vsacli.dynamics.inverse import INTERNAL, InverseDynamics
+from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
 
 DRIVE_NAMES = (
@@ -90,7 +91,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
         frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without one.
     """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
-    kernel = InverseDynamics(robot, frame, internal=damped, driven=True)
+    kernel = InverseDynamics(robot, frame, deflections=(InternalRows(damped, INTERNAL[:1]),))
     inside = internal_structure(robot) if damped else None
     arguments = (
         ("command", command_structure(robot)),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FLAG_TYPE, FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import COMMANDS, ERRORS, SIMULATION_VARIABLES, TRACKED, error
 from vsacli.base.variables import VARIABLES, Block
@@ -203,7 +204,7 @@ def _history(
     commanded = {name: reference[name] for name in TRACKED}
     found = _simulated(loop, integrated, work)
     if robot.has(VARIABLES["dissipated_power"]):
-        of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
+        of_joints = (JointVariables.of(of_joint(found, index)) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
     for name in ("stiffness", "dstiffness"):  # without a command, the reference is the actual value

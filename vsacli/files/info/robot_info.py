@@ -188,7 +188,7 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     with np.errstate(all="ignore"):  # a load may be infinite or NaN
         if "stiffness" not in joint.actuator.commanded:
             at_rest = Command.at_rest(tau_e, np.full(3, q))
-            held = joint.actuator.transmit(at_rest, MIN_MARGIN, None)["stiffness"]
+            held = joint.actuator.transmit(at_rest, MIN_MARGIN, None).stiffness
             return {
                 "unloaded": [float(held[0])] * 2,
                 "loaded": [float(held[1:].min()), float(held[1:].max())],

@@ -18,8 +18,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import MIN_MARGIN, Flag, has
 from vsacli.base.signals import COMMANDED
@@ -172,8 +171,8 @@ class ActuatorChart:
         """Return the unit of a variable at these joints."""
         return VARIABLES[variable].quantity.unit(self.joints[0].type)
 
-    def at_rest(self, tau_e: FloatArray, stiffness: FloatArray) -> OfJoint:
-        """Return the variables of the joint at rest, by name; arrays of one shape (samples,).
+    def at_rest(self, tau_e: FloatArray, stiffness: FloatArray) -> JointVariables:
+        """Return the variables of the joint at rest; arrays of one shape (samples,).
 
         The torque of a motor at rest is that of its transmission; dry friction, which would help to hold the
         load, is left out.
@@ -183,12 +182,12 @@ class ActuatorChart:
         command = Command.at_rest(tau_e, still + self.q)._replace(commanded=signal)
         with np.errstate(all="ignore"):  # springs overflow at the largest torques of the search
             found = self.actuator.transmit(command, MIN_MARGIN, None)
-        return {**found, "tau_e": tau_e, "tau_motor": found["tau_transmission"]}
+        return found._replace(tau_motor=found.tau_transmission)
 
     def ends(self, tau_e: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
         """Return minimum and maximum stiffness at torques, and where each is a singularity; (samples,)."""
         if not self.commanded:
-            stiffness = np.asarray(self.at_rest(tau_e, tau_e)["stiffness"], dtype=np.float64)
+            stiffness = np.asarray(self.at_rest(tau_e, tau_e).stiffness, dtype=np.float64)
             regular = np.zeros(tau_e.shape, dtype=bool)
             return stiffness, stiffness, regular, regular
         with np.errstate(all="ignore"):
@@ -199,14 +198,14 @@ class ActuatorChart:
         """Return the distances to limits, and the coordinates of the springs, as in `StiffnessMap`."""
         torques = np.broadcast_to(tau_e, levels.shape).ravel()
         state = self.at_rest(torques, levels.ravel())
-        infeasible = has(state["flags"], Flag.INFEASIBLE).reshape(levels.shape)
+        infeasible = has(state.flags, Flag.INFEASIBLE).reshape(levels.shape)
         clearance: dict[str, FloatArray] = {}
-        for check in self.actuator.limits():
+        for check in self.actuator.limits:
             if check.variable in LIMITS and math.isfinite(check.range[1]):
-                values = np.where(infeasible, np.nan, check.clearance(state).reshape(levels.shape))
+                values = np.where(infeasible, np.nan, check.clearance(state.by_name()).reshape(levels.shape))
                 words = LIMITS[check.variable]
                 clearance[words] = np.minimum(clearance.get(words, np.inf), values)
-        unknowns = np.stack(self.actuator.unknowns(state["phi"], state["theta"]))
+        unknowns = np.stack(list(self.actuator.unknowns(state.phi, state.theta)))
         return clearance, np.where(infeasible, np.nan, unknowns.reshape(-1, *levels.shape))
 
     @cached_property
@@ -342,7 +341,7 @@ def _drawn(actuator: Actuator) -> tuple[object, ...]:
         for each in fields(cast("DataclassInstance", actuator))
         if each.name not in ROTORS
     ]
-    limits = [check for check in actuator.limits() if check.variable in LIMITS]
+    limits = [check for check in actuator.limits if check.variable in LIMITS]
     return type(actuator), parts, limits
 
 

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base import units
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
@@ -64,16 +63,16 @@ def _stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the stiffness at rest of single springs, over the weight at full reach, per rad."""
     for joint, measured, held in _single_springs(checked):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(float(held["stiffness"][0]), checked.sizes.scale(joint)))
+            yield measured._replace(size=ratio(float(held.stiffness[0]), checked.sizes.scale(joint)))
 
 
 def _soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield 1 rad, or the reach, over the deflection under the largest weight, if there is gravity."""
     for joint, measured, held in _single_springs(checked) if any(checked.gravity) else ():
-        yield measured._replace(size=ratio(_travel(checked, joint), float(held["phi"][0, 1])))
+        yield measured._replace(size=ratio(_travel(checked, joint), float(held.phi[0, 1])))
 
 
-def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, OfJoint]]:
+def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, JointVariables]]:
     """Yield joints without commanded stiffness, with the spring solved at rest and under the largest weight.
 
     The measured number is the stiffness or the law; callers replace its size.
@@ -135,7 +134,7 @@ def _least_stiffness(joint: Joint, found: Corridor | None) -> float:
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
     held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
-    return float(held["stiffness"][0])
+    return float(held.stiffness[0])
 
 
 def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:

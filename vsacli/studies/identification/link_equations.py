@@ -15,8 +15,9 @@ import numpy as np
 import scipy
 
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.duals import Dual, tangent_of, value_of
+from vsacli.compute.duals import tangent_of, value_of
 from vsacli.dynamics.drive import motor_torques
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.robot.model import Robot
@@ -30,6 +31,7 @@ from vsacli.studies.identification.motor_equations import (
     WIDTH,
     MotorSystem,
     admissible,
+    as_duals,
     group_of,
     joint_motion,
     unknowns,
@@ -181,7 +183,7 @@ def _link_combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool)
     if links:
         columns[:, :first] = regressor(robot, q, dq, ddq)
     for index in range(joints):
-        motion = {"dq": Dual(dq[:, index], {}), "ddq": Dual(ddq[:, index], {})}
+        motion = as_duals({"dq": dq[:, index], "ddq": ddq[:, index]})
         columns[index, first:] = _resistance(robot, index, motion, parts)[1]
     order = np.concatenate((preferred_order(joints), np.arange(first, first + len(parts))))
     return BaseParameters.of_columns(np.moveaxis(columns, 1, -1).reshape(-1, columns.shape[1]), order)
@@ -220,14 +222,14 @@ def _carried(
 
 
 def _resistance(
-    robot: Robot, index: int, motion: dict[str, Any], numbers: Sequence[Parameter]
+    robot: Robot, index: int, motion: JointVariables, numbers: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the resisting torque of a joint and its rigid drive, (samples,), and its slopes."""
     joint = apart(seeded(robot, numbers).joints[index])
-    dq = motion["dq"]
+    dq: Any = motion.dq
     torque: Any = joint.damping * dq + joint_friction(joint.friction, (dq, 0, 0, 0)).tau
     if not joint.actuator.sprung:
-        dtheta, ddtheta = (np.stack([motion[name]] * SIDES) for name in ("dq", "ddq"))
+        dtheta, ddtheta = (np.stack([rows] * SIDES) for rows in (dq, motion.ddq))
         torque = torque + motor_torques(joint.actuator, dtheta, ddtheta, np.zeros_like(dtheta))[0]
     return value_of(torque), tangent_of(torque, len(numbers), np.shape(dq.value))
 

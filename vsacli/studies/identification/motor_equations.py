@@ -6,7 +6,7 @@ springs, motors and friction that words or patterns of paths select; `MotorSyste
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
@@ -140,15 +141,15 @@ def describe_lack(robot: Robot, joints: Sequence[int], fit: Sequence[str]) -> st
     return f"{lacking}; they have {listed}; zero terms are identified if their paths are given"
 
 
-def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
-    """Return the torques of both motors, (2, samples), from the motion of joint and motors by name.
+def predicted_torques(actuator: Actuator, motion: JointVariables) -> Any:
+    """Return the torques of both motors, (2, samples), from the motion of joint and motors.
 
     They are NaN for a motor that does not exist.
     """
     tau_transmission = np.stack(actuator.springs_of(motion).tau_transmission)
     missing = np.full((SIDES - len(tau_transmission), *tau_transmission.shape[1:]), np.nan)
     against = np.concatenate((tau_transmission, missing))
-    return motor_torques(actuator, motion["dtheta"], motion["ddtheta"], against)
+    return motor_torques(actuator, motion.dtheta, motion.ddtheta, against)
 
 
 def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
@@ -159,10 +160,16 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
     return tuple(f"motor {number} of {joint.name}" for number, _ in enumerate(joint.actuator.motors, 1))
 
 
-def joint_motion(signals: Signals, index: int) -> dict[str, Any]:
+def joint_motion(signals: Signals, index: int) -> JointVariables:
     """Return the motion of a joint and its motors, samples last, as duals without derivatives."""
     # NumPy functions of duals accept robot parameters that are duals, which those of arrays do not
-    return {name: Dual(values, {}) for name, values in _arrays(signals, index).items()}
+    return as_duals(_arrays(signals, index))
+
+
+def as_duals(arrays: Mapping[str, FloatArray]) -> JointVariables:
+    """Return the motion of a joint from arrays by name, as duals without derivatives."""
+    motion: dict[str, Any] = {name: Dual(values, {}) for name, values in arrays.items()}
+    return JointVariables(**motion)
 
 
 def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
@@ -326,7 +333,7 @@ def _motor_combinations(
     arrays = {"q": q[chosen], "phi": phi, "theta": q[chosen] + phi, "dtheta": dtheta, "ddtheta": ddtheta}
     carrying = apart(seeded(robot, parts).joints[index]).actuator
     with np.errstate(all="ignore"):  # a deflection nearby may be out of reach
-        torques = predicted_torques(carrying, {name: Dual(each, {}) for name, each in arrays.items()})
+        torques = predicted_torques(carrying, as_duals(arrays))
     columns = tangent_of(torques, len(parts), np.shape(value_of(torques))).reshape(len(parts), -1).T
     columns = columns[np.isfinite(columns).all(axis=1)]
     return BaseParameters.of_columns(columns, np.arange(len(parts))) if columns.any(axis=0).all() else None

@@ -168,7 +168,7 @@ class Acceptance:
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """Return all variables of one joint, by name."""
-        return {**load.command.arrays(), **drive(joint, load.command, self.min_margin)}
+        return drive(joint, load.command, self.min_margin).by_name()
 
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])

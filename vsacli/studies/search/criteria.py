@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck, OfJoint
+from vsacli.actuators.reach import LimitCheck
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -120,7 +121,9 @@ class Criterion:
             InputError: the joint lacks a parameter.
         """
 
-    def integrands(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
+    def integrands(
+        self, joint: Joint, driven: JointVariables, level: Values | None, scale: Scale
+    ) -> Sequence[Any]:
         """Return the integrands of the scaled cost, each (instants,).
 
         Args:
@@ -140,15 +143,17 @@ class Criterion:
         """Return the number of `bounds`."""
         return 0
 
-    def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
+    def bounds(
+        self, _joint: Joint, _driven: JointVariables, _level: Values | None, _scale: Scale
+    ) -> Sequence[Any]:
         """Return bounds, each (instants,), which a sufficiently large level makes negative."""
         return ()
 
-    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the cost, in its unit."""
         raise NotImplementedError
 
-    def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def size(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return a scale for the cost from its value for some motion."""
         return self.of(joint, driven, time)
 
@@ -167,7 +172,7 @@ class NoCost(Criterion):
     over_time = ()
 
     def integrands(
-        self, _joint: Joint, _driven: OfJoint, _level: Values | None, _scale: Scale
+        self, _joint: Joint, _driven: JointVariables, _level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
         """Return no integrand."""
         return ()
@@ -188,9 +193,11 @@ class Torque(Criterion):
     quantity = TORQUE
     relative = True
 
-    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+    def integrands(
+        self, joint: Joint, driven: JointVariables, _level: Values | None, scale: Scale
+    ) -> Sequence[Any]:
         """Return the mean square of the motor torques."""
-        torques = _of_motors(joint, driven["tau_motor"])
+        torques = _of_motors(joint, driven.tau_motor)
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -198,7 +205,7 @@ class Torque(Criterion):
         weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
         return weights
 
-    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the rms torque, N m (N)."""
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
@@ -227,11 +234,13 @@ class CopperLoss(Criterion):
                 "torque_constant and resistance to the robot file, or use --minimize torque"
             )
 
-    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+    def integrands(
+        self, joint: Joint, driven: JointVariables, _level: Values | None, scale: Scale
+    ) -> Sequence[Any]:
         """Return the copper loss of all motors."""
-        return [sum(_of_motors(joint, driven["copper_loss"])) / scale.cost]
+        return [sum(_of_motors(joint, driven.copper_loss)) / scale.cost]
 
-    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the heat, J."""
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
@@ -253,12 +262,14 @@ class Energy(Criterion):
     words = "positive motor work"
     smoothings = SMOOTHINGS
 
-    def integrands(self, joint: Joint, driven: OfJoint, _level: Values | None, scale: Scale) -> Sequence[Any]:
+    def integrands(
+        self, joint: Joint, driven: JointVariables, _level: Values | None, scale: Scale
+    ) -> Sequence[Any]:
         """Return the smoothed positive part of the motor power, and the energy in the springs."""
         width = scale.smoothing * scale.cost / scale.duration
-        powers = _of_motors(joint, driven["motor_power"])
+        powers = _of_motors(joint, driven.motor_power)
         positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
-        return [sum(positive) / scale.cost, driven["elastic_energy"] / scale.cost]
+        return [sum(positive) / scale.cost, driven.elastic_energy / scale.cost]
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of an integral over time, and of the value at the start."""
@@ -266,19 +277,19 @@ class Energy(Criterion):
         loaded[0] = 0.0 if self.repeating else 1.0
         return np.stack([trapezoidal(time), loaded])
 
-    def of(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the energy, J."""
-        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven["motor_power"]))
-        return float(np.sum(self.weights(time) * np.stack([spent, driven["elastic_energy"]])))
+        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven.motor_power))
+        return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the positive work in the report of the run and the initial spring energy, J."""
         spent = run.energies[index].spent
         return spent if self.repeating else spent + float(run.elastic_energy[0, index])
 
-    def size(self, joint: Joint, driven: OfJoint, time: FloatArray) -> float:
+    def size(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
-        passed = sum(map(np.abs, _of_motors(joint, driven["motor_power"])))
+        passed = sum(map(np.abs, _of_motors(joint, driven.motor_power)))
         return float(trapezoidal(time) @ passed) or 1.0
 
 
@@ -293,7 +304,7 @@ class Peak(Criterion):
     levels = 1
 
     def integrands(
-        self, _joint: Joint, _driven: OfJoint, level: Values | None, _scale: Scale
+        self, _joint: Joint, _driven: JointVariables, level: Values | None, _scale: Scale
     ) -> Sequence[Any]:
         """Return the level."""
         return [level]
@@ -306,14 +317,16 @@ class Peak(Criterion):
         """Return two bounds for each motor."""
         return 2 * joint.actuator.motor_count
 
-    def bounds(self, joint: Joint, driven: OfJoint, level: Values | None, scale: Scale) -> Sequence[Any]:
+    def bounds(
+        self, joint: Joint, driven: JointVariables, level: Values | None, scale: Scale
+    ) -> Sequence[Any]:
         """Return the excess of each torque, in both directions, over the level."""
-        torques = _of_motors(joint, driven["tau_motor"])
+        torques = _of_motors(joint, driven.tau_motor)
         return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
 
-    def of(self, joint: Joint, driven: OfJoint, _time: FloatArray) -> float:
+    def of(self, joint: Joint, driven: JointVariables, _time: FloatArray) -> float:
         """Return the peak torque, N m (N)."""
-        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven["tau_motor"])))
+        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the peak torque, N m (N)."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.actuators.motor import SHAFT
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
@@ -86,10 +86,10 @@ class FixedMotion:
         low, high = (row[instants] for row in self.admissible)
         size = self.stiffness
         bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
-        bounds += limit_bounds(self._limits, driven, self._clearance)
+        bounds += limit_bounds(self._limits, driven.by_name(), self._clearance)
         return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
 
-    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> OfJoint:
+    def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> JointVariables:
         """Return the variables of the motors for a stiffness and its derivatives."""
         load = self.load.at(instants).command
         plain, carrying = self._joints(self.scale.smoothing)
@@ -103,13 +103,13 @@ class FixedMotion:
         asked = np.repeat(constants, len(instants))
         still = np.zeros_like(asked)
         driven = self.driven(np.stack([asked, still, still]), np.tile(instants, len(constants)))
-        excess = np.max([still - 1, *limit_bounds(self._limits, driven, self._clearance)], axis=0)
+        excess = np.max([still - 1, *limit_bounds(self._limits, driven.by_name(), self._clearance)], axis=0)
         kept = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
         time, costs = self.load.time[instants], np.full(len(constants), np.inf)
         for number in np.flatnonzero(kept).tolist():
             part = slice(number * len(instants), (number + 1) * len(instants))
-            own = {name: variable[..., part] for name, variable in driven.items()}
-            costs[number] = self.criterion.of(self.joint, own, time)
+            own = {name: variable[..., part] for name, variable in driven.by_name().items()}
+            costs[number] = self.criterion.of(self.joint, JointVariables.of(own), time)
         return np.where(np.isnan(costs), np.inf, costs)
 
     def _joints(self, smoothing: float) -> tuple[Joint, Joint]:

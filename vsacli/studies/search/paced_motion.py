@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vsacli.actuators.reach import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, by_joint
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.compute.duals import Dual, value_of
@@ -237,21 +236,21 @@ class PacedJoint:
                 command = command._replace(commanded={**command.commanded, **asked})
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint
             driven = driven_by(joint, command, self._min_margin)
-            variables = {**command.arrays(), **driven}
-            bounds = [*self._corridor(driven), *limit_bounds(self._checks, variables, self._clearance)]
+            excess = limit_bounds(self._checks, driven.by_name(), self._clearance)
+            bounds = [*self._corridor(driven), *excess]
             costed = (self._joint, driven, level[0] if len(level) else None, self.scale)
             integrands = list(self.criterion.integrands(*costed))
             for index in self.criterion.over_time:  # dt = pace ds
                 integrands[index] = integrands[index] * pace[0]
         return integrands, [*bounds, *self.criterion.bounds(*costed)]
 
-    def _corridor(self, driven: OfJoint) -> Iterator[Any]:
+    def _corridor(self, driven: JointVariables) -> Iterator[Any]:
         if self._chosen:
             min_margin = self._min_margin
-            yield driven["stiffness_min"] / ((1 - min_margin) * driven["stiffness"]) - 1 + CLEARANCE
-            unbounded = np.isinf(driven["stiffness_max"])
-            required = (1 + min_margin) * driven["stiffness"]
-            upper = np.where(unbounded, 1.0, driven["stiffness_max"]) / required
+            yield driven.stiffness_min / ((1 - min_margin) * driven.stiffness) - 1 + CLEARANCE
+            unbounded = np.isinf(driven.stiffness_max)
+            required = (1 + min_margin) * driven.stiffness
+            upper = np.where(unbounded, 1.0, driven.stiffness_max) / required
             yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
 
 

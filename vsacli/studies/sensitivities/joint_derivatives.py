@@ -192,8 +192,8 @@ def drive_derivatives(
     object.__setattr__(carrying.actuator, "solve", implicit.solve)  # a search would lose the derivatives
     with np.errstate(invalid="ignore", divide="ignore"):
         driven = driven_by(carrying, command._replace(**torques), MIN_MARGIN)
-        gap = margin(driven["stiffness"], driven["stiffness_min"], driven["stiffness_max"])
-    found = {name: driven[name] for name in (*OF_MOTORS, SPEED)} | {MARGIN: gap}
+        gap = margin(driven.stiffness, driven.stiffness_min, driven.stiffness_max)
+    found = {name: getattr(driven, name) for name in (*OF_MOTORS, SPEED)} | {MARGIN: gap}
     tangents = {
         name: np.where(np.isnan(each), np.nan, tangent_of(each, directions, np.shape(each)))
         for name, each in found.items()

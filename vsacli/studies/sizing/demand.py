@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import Flag, has
@@ -145,13 +145,13 @@ class SpringDemand(Published):
 
 
 def _spring_loads(
-    actuator: Actuator, of_joint: OfJoint
+    actuator: Actuator, of_joint: JointVariables
 ) -> Iterator[tuple[str, float, FloatArray, FloatArray, FloatArray]]:
     """Yield name, largest admissible deflection, energy, torque and deflection of springs of a joint.
 
     Those of a mechanism are taken together: their deflection is that between motor 1 and link.
     """
-    phi, limits = of_joint["phi"], actuator.max_deflections
+    phi, limits = of_joint.phi, actuator.max_deflections
     if isinstance(actuator, Antagonistic):
         springs = [("spring 1", phi[0], limits[0]), ("spring 2", phi[1], limits[1])]
         springs.append(("coupling", phi[0] - phi[1], math.inf))
@@ -159,7 +159,7 @@ def _spring_loads(
             law = element.law
             yield name, limit, law.energy(deflection), law.torque(deflection), deflection
     elif actuator.sprung:
-        yield "springs", limits[0], of_joint["elastic_energy"], of_joint["tau_transmission"][0], phi[0]
+        yield "springs", limits[0], of_joint.elastic_energy, of_joint.tau_transmission[0], phi[0]
 
 
 class SpringPeaks:
@@ -172,7 +172,7 @@ class SpringPeaks:
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
         for index, joint in enumerate(self._robot.joints):
-            for name, limit, *load in _spring_loads(joint.actuator, block.of_joint(index)):
+            for name, limit, *load in _spring_loads(joint.actuator, JointVariables.of(block.of_joint(index))):
                 energy, torque, deflection = (Peak.of(values, block.time, trajectory) for values in load)
                 new = SpringDemand(joint.name, joint.type, name, energy, torque, deflection, limit)
                 key = joint.name, name
@@ -271,7 +271,7 @@ def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     load = block.tau_transmission.copy()
     for index, joint in enumerate(robot.joints):
         if joint.damper_at("transmission"):
-            load[:, index] += motor_torques(joint, block.of_joint(index))[0].T
+            load[:, index] += motor_torques(joint, JointVariables.of(block.of_joint(index)))[0].T
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
     load[has(block.flags, UNDONE)] = np.nan

@@ -1,0 +1,304 @@
+"""The self-check of a run: residuals of its equations, and derivatives against finite differences.
+
+All bounds stand first. A `RunCheck` collects the residuals of (14) and of the shafts at all samples; then
+`ladder` compares each derivative of `RUNGS`, and the energy balances, with differences over several steps at
+about 200 times, or fewer for long chains. The equations are in `dynamics.balances`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.reach import margin
+from vsacli.actuators.transmission import JointVariables
+from vsacli.analysis.difference_errors import MIDDLE, NEIGHBORS, OFFSETS, DifferenceErrors
+from vsacli.analysis.run_dynamics import RunDynamics
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
+from vsacli.base.flags import Flag, has
+from vsacli.base.json_records import Stored, named
+from vsacli.base.signals import COMMANDED
+from vsacli.base.variables import VARIABLES, Block
+from vsacli.compute.engine import NUMPY, Engine
+from vsacli.dynamics.balances import (
+    balances,
+    damped_joints,
+    link_energy,
+    link_powers,
+    shaft_energy,
+    shaft_powers,
+)
+from vsacli.dynamics.inverse import usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.dynamics.internal_motion import InternalMotions
+
+SPRING_BOUND = 1e-11
+"""Bound on the scaled residual of (14); solutions have 1e-15, and 1e-12 is required of them."""
+
+DRIFT_BOUND = 1e-6
+"""Bound on the residual of (14) of integrated deflections: below the accuracy of spring constants."""
+
+SHAFT_BOUND = 1e-11
+"""Bound on the scaled residual of motors and windings, sums of a few products: 2e-15 is usual."""
+
+LADDER_BOUND = 1e-8
+"""Bound on derivative errors relative to their peak: a hundred times the usual rounding. Differences over
+short steps have larger rounding, see `ROUNDING_GAIN`."""
+
+ROUNDING_GAIN = 30.0
+"""Bound on the rounding of a difference over the step h relative to the derivative, in eps T/h.
+
+A time up to T is rounded by eps T/2, a value v by about eps v, so that a difference has the error
+eps (T v' + v)/h. Relative to the peak of v' this is a few eps T/h, since v is hardly above T v'. For declared
+motions T/h is 4000, and `LADDER_BOUND` is larger. Recordings have a knot at each sample, and h must stay
+between knots: with 1e6 samples T/h is 5e7 and the bound 3e-7. On 34 recordings of 2 to 30 s at 5 to 50 kHz,
+of arms of 2 to 7 joints, at most 2 eps T/h occurred, and once 21, with interpolated time stamps since 1970.
+"""
+
+NOISE_GAIN = 12.0
+"""Multiple of the estimated noise beyond which an error fails. The largest of 10^6 normally distributed
+errors lies at 5 widths, and the estimate may be a third of the width."""
+
+CLEAR = 1e-10
+"""Error below which smaller steps are not tried, a hundredth of the bound."""
+
+
+@dataclass(frozen=True)
+class SelfCheck(Stored):
+    """Outcome of the self-check.
+
+    Attributes:
+        spring_residual: Largest scaled residual of (14); NaN if a value is missing.
+        ladder: Largest relative error of a derivative against finite differences; NaN if a value is missing.
+        spring_bound: Bound on the residual of (14).
+        ladder_bound: Bound on the error of a derivative, where it is nearest to its bound.
+        shaft_residual: Largest scaled residual of motors and windings; NaN if a value is missing; 0 in
+            results from before these were checked.
+    """
+
+    spring_residual: float
+    ladder: float
+    spring_bound: float = SPRING_BOUND
+    ladder_bound: float = LADDER_BOUND
+    shaft_residual: float = 0.0
+
+    shape: ClassVar = {
+        **named("passed", "spring_residual", "shaft_residual", "ladder"),
+        "bound": "ladder_bound",
+    }
+
+    @property
+    def passed(self) -> bool:
+        """Return whether all residuals and errors are within their bounds."""
+        springs_and_shafts = self.spring_residual <= self.spring_bound and self.shaft_residual <= SHAFT_BOUND
+        return springs_and_shafts and self.ladder <= self.ladder_bound
+
+
+class RunCheck:
+    """Self-check of a run; `add` its blocks in order, then call `outcome`.
+
+    The program of the run computes residuals at all samples, but would be wrong where the program is. So
+    NumPy recomputes them from the variables at `PROBES` samples. Except for branches, loops and tables, a
+    program has no path that depends on values; if one of these, or the whole program, is wrong, so is a
+    stretch of the run, and a stretch of more than a 199th of the samples is met.
+    """
+
+    def __init__(self, dynamics: RunDynamics) -> None:
+        self._dynamics, self._joints = dynamics, dynamics.robot.joints
+        self._probed = evenly(dynamics.trajectory.samples, PROBES)
+        self._excerpts: list[dict[str, AnyArray]] = []
+        self._samples = 0
+        self._error, self._shaft_error = 0.0, 0.0
+        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(self._joints))))
+
+    def add(self, block: Block) -> None:
+        """Merge a block of `BalancedDynamics`."""
+        first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
+        probed = self._probed[first:last] - self._samples
+        self._excerpts.append(
+            {name: array[probed] for name, array in block.arrays().items() if name in JointVariables._fields}
+        )
+        self._samples += len(block.time)
+        self._error = np.maximum(self._error, block.spring_error.max())
+        self._shaft_error = np.maximum(self._shaft_error, block.shaft_error.max())
+        self._damped_error = np.maximum(self._damped_error, block.damped_error.max(axis=0))
+        self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
+
+    def outcome(self) -> SelfCheck:
+        """Return the self-check of the blocks so far; integrated deflections drift off (14)."""
+        run = self._dynamics
+        error, error_bound = ladder(run.robot, run.trajectory, run.engine, run.internal)
+        springs, shafts = self._residuals()
+        bound = SPRING_BOUND if run.deflections is None else DRIFT_BOUND
+        return SelfCheck(springs, error, bound, error_bound, shafts)
+
+    def _residuals(self) -> tuple[float, float]:
+        """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
+        probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
+        of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(self._joints))]
+        apart = balances(self._joints, of_joints)
+        error = np.max(apart["spring_error"], initial=self._error)
+        damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        size = np.maximum(self._damped_size, np.finfo(float).tiny)
+        springs = float(np.max(damped_error / size, initial=error))
+        return springs, float(np.max(apart["shaft_error"], initial=self._shaft_error))
+
+
+class Rung(NamedTuple):
+    """A variable and its derivative, which is the derivative `order` of another variable."""
+
+    value: str
+    derivative: str
+    whole: str
+    order: int
+
+
+RUNGS = (
+    Rung("tau_e", "dtau_e", "tau_e", 1),
+    Rung("dtau_e", "ddtau_e", "tau_e", 2),
+    Rung("phi", "dphi", "phi", 1),
+    Rung("theta", "dtheta", "theta", 1),
+    Rung("dtheta", "ddtheta", "theta", 2),
+    Rung("stiffness", "dstiffness", "stiffness", 1),
+    Rung("dstiffness", "ddstiffness", "stiffness", 2),
+)
+"""Compared variables; the deflections too, since the motion of the joint can hide them in theta, and the
+stiffness where it is not commanded."""
+
+PROBES = 200
+"""Approximate number of times of the derivative check, and of samples at which `RunCheck` recomputes."""
+
+JOINTS_AT_ALL_TIMES = 80
+"""Number of joints up to which derivatives are checked at `PROBES` times, longer chains at fewer, in inverse
+proportion: their blocks are shorter, so that the check would take a time in the square of the joints. A time
+compares all joints, whose equations are the same."""
+
+STEP_SCALES = np.array([8.0**-power for power in range(5)])
+"""Difference steps tried at each time; the best decides, since a wrong derivative is wrong at every step.
+
+The smallest are for motions that leave the attainable range within a thousandth of their duration.
+"""
+
+FIRST_SCALES = STEP_SCALES[:2]
+"""Scales tried first: for most motions the smaller ones only add rounding."""
+
+
+def ladder(
+    robot: Robot,
+    trajectory: Trajectory,
+    engine: Engine = NUMPY,
+    internal: InternalMotions | None = None,
+) -> tuple[float, float]:
+    """Return the largest error of a derivative of `RUNGS` or of a power, relative to its peak, and its bound.
+
+    Differences are taken at about 200 times, for long chains at fewer, with individual steps, over which the
+    trajectory is analytic.
+    Motor motion is compared where it is smooth over the difference. The error returned is the one nearest to,
+    or farthest beyond, its bound. Engine and internal motions of damped transmissions are those of the run.
+    """
+    trajectory = trajectory.from_zero()
+    times, reach = trajectory.check_points(_number_of_times(len(robot.joints)))
+    steps = np.minimum(reach / 3, trajectory.duration / 500)
+    # Its kernel equals that of the run, so that compiled code is shared.
+    dynamics = RunDynamics(robot, trajectory, internal=internal, engine=engine)
+    errors, bounds, everywhere = _compare(dynamics, times, FIRST_SCALES[:, None] * steps)
+    if not (everywhere and errors.max() <= CLEAR):
+        errors, bounds, _ = _compare(dynamics, times, STEP_SCALES[:, None] * steps)
+    rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
+    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
+    worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
+    return float(errors[worst]), float(bounds[worst])
+
+
+def _number_of_times(joints: int) -> int:
+    """Return the number of times to check, at least as many as estimate the noise."""
+    return max(2 * NEIGHBORS + 1, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES))
+
+
+def _compare(
+    dynamics: RunDynamics, times: FloatArray, steps: FloatArray
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Return errors (derivatives, times) at the best scale, bounds by noise, and whether all was compared.
+
+    Times are computed together up to the size of a block, which bounds the memory as in a run.
+
+    Args:
+        dynamics: Inverse dynamics along a trajectory that starts at zero.
+        times: Times to check, (times,), s.
+        steps: Difference steps, (scales, times), s.
+    """
+    robot, duration, everywhere = dynamics.robot, dynamics.trajectory.duration, True
+    differences = [DifferenceErrors(steps, LADDER_BOUND, NOISE_GAIN) for _ in (*RUNGS, "energy")]
+    together = max(1, usual_block(len(robot.joints)) // (len(steps) * len(OFFSETS)))
+    for start in range(0, len(times), together):
+        part = slice(start, start + together)
+        grid = times[part] + steps[:, None, part] * OFFSETS[:, None]
+        block = dynamics.at(grid.ravel())
+        smooth = _motors_move_smoothly(block, grid.shape)
+        everywhere = everywhere and bool(smooth.any(axis=0).all())
+        for rung, of_rung in zip(RUNGS, differences, strict=False):
+            value, derivative, whole = (
+                _on_grid(robot, block, name, grid.shape) for name in (rung.value, rung.derivative, rung.whole)
+            )
+            compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
+            slowest = np.abs(whole[0, MIDDLE]) / duration**rung.order
+            of_rung.add(value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), slowest))
+        energy, power, size, grain = (
+            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(dynamics, block)
+        )
+        compared = np.concatenate((smooth, np.ones_like(smooth[..., :1])), axis=-1)
+        slowest = np.abs(energy[0, MIDDLE]) / duration
+        differences[-1].add(energy, power, compared, np.maximum(size[0, MIDDLE], slowest), grain[:, MIDDLE])
+    relative = [each.relative() for each in differences]
+    return np.stack([error for error, _ in relative]), np.stack([bound for _, bound in relative]), everywhere
+
+
+def _energy_balances(dynamics: RunDynamics, block: Block) -> Iterator[FloatArray]:
+    """Return energy, the power that changes it, the size of its terms, and the grain; (samples, joints + 1).
+
+    The columns are rotors and springs of each joint, then all links together. The grain is the rounding of
+    elastic energies that a formula computes as a difference of terms of the size of stiffness times a radian
+    squared, such as K (1 - cos(2 phi)): the result changes by jumps, between which it shows no noise.
+    """
+    robot, frame = dynamics.robot, dynamics.kernel.dynamics.frame
+    of_joints = [JointVariables.of(block.of_joint(index)) for index in range(len(robot.joints))]
+    pairs = list(zip(robot.joints, of_joints, strict=True))
+    powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, frame)]
+    yield np.stack([*(shaft_energy(*pair) for pair in pairs), link_energy(robot, block)], axis=-1)
+    yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
+    yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
+    grains = [np.finfo(float).eps * np.nan_to_num(of_joint.stiffness) for of_joint in of_joints]
+    turns = [1.0 if joint.is_revolute else of_joint.q**2 for joint, of_joint in pairs]
+    yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
+
+
+def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
+    """Return a variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
+    values: FloatArray = getattr(block, name).reshape(*shape, len(robot.joints), -1)
+    return np.where([_compared(joint.actuator, name) for joint in robot.joints], values, 0.0)
+
+
+def _compared(actuator: Actuator, name: str) -> list[bool]:
+    """Return whether each column of a variable is computed, not commanded, for this actuator."""
+    commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
+    return [False] if name in commanded else actuator.has(VARIABLES[name])
+
+
+def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
+    """Return which differences, (scales, times, joints), are smooth in a block (scales, offsets, times).
+
+    No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
+    motion has features as short as the distance to the end of the attainable range.
+    """
+    troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
+    gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
+    hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
+    smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)
+    return smooth
