@@ -8,8 +8,14 @@ import re
 from collections import Counter
 from pathlib import Path
 
+from samples.call_paths import returns, visited
+from samples.command_line import REST_TO_REST, ROBOT
+from samples.defined_names import defined_twice, share_of_empty_words
 from samples.python_processes import run_python
 from samples.sources import PACKAGE, SOURCES, contents
+
+from vsacli import load_robot, load_trajectory
+from vsacli.dynamics.inverse import motor_torques
 
 REPOSITORY = Path(__file__).parents[1]
 ROW = re.compile(r"^\| `(?P<entry>\w+(?:\.\w+)?)` \| .+ \|$", re.MULTILINE)
@@ -30,6 +36,14 @@ MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 480, 51_518, 19,
 """How many files and statements of Python the package has at most, names of files that several folders
 have, and docstrings that begin without a verb or a noun. A change that needs more raises these, with its
 reason in its message; one that needs less lowers them."""
+
+MOST_CLASS_NAMES_TWICE, MOST_FUNCTION_NAMES_TWICE, LARGEST_SHARE_OF_EMPTY_WORDS = 92, 299, 0.028
+"""How many names of classes and functions several modules define at most, private ones included, commands
+not; and the share of names that are a word without content. Like the counts above, they are lowered, or
+raised with a reason."""
+
+MOST_RETURNS = {"robot file": 697, "trajectory file": 2297, "block": 440}
+"""How often reading a robot or a trajectory, and computing a block, come back to a module they have left."""
 
 HEADLESS = re.compile(
     r"(and|as|at|but|by|each|for|from|has|how|if|in|is|its?|of|on|so|than|that|those|to|what|when|where|which|while"
@@ -111,6 +125,24 @@ def test_the_package_grows_only_on_purpose() -> None:
     trees = (ast.parse(source.read_text(encoding="utf-8")) for source in SOURCES)
     assert sum(isinstance(node, ast.stmt) for tree in trees for node in ast.walk(tree)) <= MOST_STATEMENTS
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
+
+
+def test_names_are_defined_once_and_say_something() -> None:
+    assert len(defined_twice(ast.ClassDef)) <= MOST_CLASS_NAMES_TWICE
+    assert len(defined_twice(ast.FunctionDef)) <= MOST_FUNCTION_NAMES_TWICE
+    assert share_of_empty_words() <= LARGEST_SHARE_OF_EMPTY_WORDS
+
+
+def test_data_seldom_return_to_a_module_that_they_have_left() -> None:
+    robot = load_robot(ROBOT)
+    trajectory = load_trajectory(REST_TO_REST, robot)
+    stages = {
+        "robot file": lambda: load_robot(ROBOT),
+        "trajectory file": lambda: load_trajectory(REST_TO_REST, robot),
+        "block": lambda: motor_torques(robot, trajectory.block(0, 100)),
+    }
+    counts = {name: returns(visited(stage)) for name, stage in stages.items()}
+    assert {name: count for name, count in counts.items() if count > MOST_RETURNS[name]} == {}
 
 
 def test_docstrings_begin_with_their_subject() -> None:
