@@ -37,7 +37,7 @@ def check_bodies(robot: Robot) -> None:
     Raises:
         InputError: MuJoCo refuses links; names each with the reason.
     """
-    reasons = [reason for joint in robot.joints for reason in _reasons(joint)]
+    reasons = [reason for joint in robot.joints for reason in _refused_bodies(joint)]
     if reasons:
         raise InputError(Problem(file_of(robot), 0, reason) for reason in reasons)
 
@@ -47,7 +47,7 @@ def file_of(robot: Robot) -> str:
     return next((source.path for source in robot.sources), "")
 
 
-def _reasons(joint: Joint) -> Iterator[str]:
+def _refused_bodies(joint: Joint) -> Iterator[str]:
     link = joint.link
     low, middle, high = link.inertia.principal_moments
     whose = f"link of joint {joint.name}"
@@ -202,7 +202,9 @@ class Sections(NamedTuple):
 def has_springs_of(joint: Joint) -> bool:
     """Return whether MJCF can express the springs of a joint; True if it has none."""
     elements = joint.actuator.spring_elements
-    polynomial = elements is not None and all(_terms(each.law) is not None for each in elements)
+    polynomial = elements is not None and all(
+        _polynomial_stiffness(each.law) is not None for each in elements
+    )
     return polynomial or joint.actuator.lever_spring is not None
 
 
@@ -210,7 +212,7 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
     """Add motors, springs and torques of a joint; `below` is the body before the joint, `body` its link's."""
     rotors = rotors_of(joint, sections.tendons)
     for rotor in rotors:
-        _actuate(sections.actuators, rotor)
+        _add_actuator(sections.actuators, rotor)
     lever = joint.actuator.lever_spring
     if not joint.actuator.sprung:
         _drive_directly(body, joint, rotors)
@@ -229,7 +231,7 @@ def _drive_directly(body: Element, joint: Joint, rotors: Sequence[Rotor]) -> Non
     add(moving, armature=rotor.inertia, damping=joint.damping + rotor.motor.damping)
 
 
-def _actuate(actuators: Element, rotor: Rotor) -> None:
+def _add_actuator(actuators: Element, rotor: Rotor) -> None:
     actuator = element(actuators, "motor", name=f"{rotor.name}.torque", joint=rotor.name)
     most = rotor.motor.max_torque
     if math.isfinite(most):
@@ -247,11 +249,13 @@ def _add_spring(tendons: Element, name: str, joint: Joint, spring: SpringElement
     motors = [motor_name(joint, number) for number in range(1, 1 + len(spring.motors))]
     weights = zip((joint.name, *motors), (spring.joint, *spring.motors), strict=True)
     tendon = add_sum(tendons, name, {position: turned * weight for position, weight in weights if weight})
-    terms = [term * turned ** (power + 1) for power, term in enumerate(_terms(spring.law) or (), 1)]
+    terms = [
+        term * turned ** (power + 1) for power, term in enumerate(_polynomial_stiffness(spring.law) or (), 1)
+    ]
     add(tendon, stiffness=terms, springlength=SLACK if spring.law.pulls_only else 0)
 
 
-def _terms(law: SpringLaw) -> tuple[float, ...] | None:
+def _polynomial_stiffness(law: SpringLaw) -> tuple[float, ...] | None:
     """Return the stiffness of a tendon, one number if linear; None if MuJoCo has no such spring."""
     terms = law.polynomial
     if terms is None or len(terms) > POLYNOMIAL_TERMS:

@@ -67,7 +67,7 @@ def check_friction(robot: Robot) -> None:
             "sticks: give the friction a width",
         )
         for joint in robot.joints
-        for where, friction in _frictions(joint)
+        for where, friction in _named_frictions(joint)
         if friction.sharp
     ]
     if problems:
@@ -104,7 +104,7 @@ def forces_text(robot: Robot) -> str | None:
     )
 
 
-def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
+def _named_frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
     if joint.friction is not None:
         yield f"joint {joint.name}: its friction", joint.friction
     for number, motor in enumerate(joint.actuator.motors, 1):
@@ -124,17 +124,21 @@ def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
     forces = []
     for joint in joints:
         count = len(_coordinates(joint))
-        forces += _forces_of(joint, positions[:count], velocities[:count])
+        forces += _joint_forces(joint, positions[:count], velocities[:count])
         del positions[:count], velocities[:count]
     return forces
 
 
-def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
+def _joint_forces(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
     """Return the torques of springs minus friction on the coordinates of a joint."""
     forces = [np.zeros_like(position) for position in positions]
     if not has_springs_of(joint):
         elements = joint.actuator.spring_elements
-        forces = _of_mechanism(joint, positions) if elements is None else _of_elements(elements, positions)
+        forces = (
+            _mechanism_forces(joint, positions)
+            if elements is None
+            else _spring_element_forces(elements, positions)
+        )
     frictions = [joint.friction, *(motor.friction for motor in joint.actuator.motors)]
     for number, friction in enumerate(frictions):
         law = FrictionLaws.of([friction])
@@ -144,7 +148,7 @@ def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]
     return forces
 
 
-def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
+def _spring_element_forces(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
     """Return the torques of springs on coordinates by their weights; springs that only pull may be slack."""
     forces = [np.zeros_like(position) for position in positions]
     for spring in elements:
@@ -157,7 +161,7 @@ def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) ->
     return forces
 
 
-def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
+def _mechanism_forces(joint: Joint, positions: Sequence[Any]) -> list[Any]:
     """Return the torques of the springs of a joint from its elasticity, if they have no spring elements."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))

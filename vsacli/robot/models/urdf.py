@@ -46,14 +46,14 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
         link = f"{joint.name}_link"
         dh = joint.dh
         _add_link(root, link, joint, rod_radius(robot))
-        moving = _add_joint(root, joint.name, _type(joint), parent, link)
-        _place(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
-        _add_drive(moving, joint)
+        moving = _add_joint(root, joint.name, _urdf_joint_type(joint), parent, link)
+        _add_origin(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
+        _add_joint_properties(moving, joint)
         parent, end = link, pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
     element(root, "link", name=TOOL)
     fixed = _add_joint(root, "tool.mount", "fixed", parent, TOOL)
-    _place(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
-    notes = tuple(_left_out(robot))
+    _add_origin(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
+    notes = tuple(_describe_losses(robot))
     return ExportedModel(document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
 
 
@@ -68,10 +68,10 @@ def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
     inertia = link.inertia
     entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
     element(body, "inertia", **entries)
-    _draw(whole, joint, radius)
+    _add_visual(whole, joint, radius)
 
 
-def _draw(link: Element, joint: Joint, radius: float) -> None:
+def _add_visual(link: Element, joint: Joint, radius: float) -> None:
     """Draw a rod from origin to origin of the Denavit-Hartenberg frames, without collision geometry."""
     a, d = joint.dh.a, joint.dh.d
     visual = element(link, "visual")
@@ -90,17 +90,17 @@ def _add_joint(root: Element, name: str, kind: str, parent: str, child: str) -> 
     return joint
 
 
-def _place(joint: Element, pose: FloatArray) -> None:
+def _add_origin(joint: Element, pose: FloatArray) -> None:
     element(joint, "origin", xyz=pose[:3, 3], rpy=roll_pitch_yaw(pose[:3, :3]))
 
 
-def _type(joint: Joint) -> str:
+def _urdf_joint_type(joint: Joint) -> str:
     if not joint.is_revolute:
         return "prismatic"
     return "continuous" if joint.limits.position == UNBOUNDED else "revolute"
 
 
-def _add_drive(moving: Element, joint: Joint) -> None:
+def _add_joint_properties(moving: Element, joint: Joint) -> None:
     """Add axis, damping, friction and limits of a joint; two motors together have no effort limit."""
     element(moving, "axis", xyz=(0, 0, 1))
     friction = {} if joint.friction is None else {"friction": max(joint.friction.coulomb)}
@@ -109,12 +109,12 @@ def _add_drive(moving: Element, joint: Joint) -> None:
     effort = motors[0].max_torque if len(motors) == 1 else math.inf
     speed = min(map(abs, joint.limits.velocity))
     limit = element(moving, "limit", effort=min(effort, NO_LIMIT), velocity=min(speed, NO_LIMIT))
-    if _type(joint) != "continuous":
+    if _urdf_joint_type(joint) != "continuous":
         lower, upper = (max(-NO_LIMIT, min(NO_LIMIT, end)) for end in joint.limits.position)
         add(limit, lower=lower, upper=upper)
 
 
-def _left_out(robot: Robot) -> Iterator[str]:
+def _describe_losses(robot: Robot) -> Iterator[str]:
     yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
     if robot.gravity != STANDARD_GRAVITY:
         gravity = ", ".join(f"{each:g}" for each in robot.gravity)

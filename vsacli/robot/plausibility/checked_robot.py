@@ -123,7 +123,7 @@ class BodySizes:
         before = np.cumsum(lengths) - lengths
         coms = np.array([_com_distance(joint) for joint in joints])
         extents = before + coms
-        self.gyrations = np.array([_gyration(joint.link) for joint in joints])
+        self.gyrations = np.array([_radius_of_gyration(joint.link) for joint in joints])
         self.reach = float(max(np.max(extents), np.sum(lengths)))
         self.levers = self.reach - before
         mass, moment = _from_tip(masses), _from_tip(masses * extents)
@@ -167,7 +167,7 @@ def _sum_of_moments(link: Link) -> float:
     return link.inertia.xx + link.inertia.yy + link.inertia.zz
 
 
-def _gyration(link: Link) -> float:
+def _radius_of_gyration(link: Link) -> float:
     return math.sqrt(max(_sum_of_moments(link), 0.0) / 2 / link.mass) if link.mass else 0.0
 
 

@@ -83,11 +83,14 @@ def welded(bodies: list[Body]) -> Body:
     mass = math.fsum(body.mass for body in bodies)
     moment = sum((body.mass * body.com for body in bodies), np.zeros(3))
     com = moment / mass if mass > 0 else np.zeros(3)
-    inertia = sum((body.inertia + _steiner(body.mass, body.com - com) for body in bodies), np.zeros((3, 3)))
+    inertia = sum(
+        (body.inertia + _parallel_axis_inertia(body.mass, body.com - com) for body in bodies),
+        np.zeros((3, 3)),
+    )
     return Body(mass, com, (inertia + inertia.T) / 2)
 
 
-def _steiner(mass: float, arm: FloatArray) -> FloatArray:
+def _parallel_axis_inertia(mass: float, arm: FloatArray) -> FloatArray:
     cross = cross_matrix(arm)
     result: FloatArray = -mass * cross @ cross
     return result
@@ -270,9 +273,9 @@ def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
     Raises:
         InputError: a link or path does not exist, or no joint moves on it.
     """
-    start = urdf.root if base is None else _known(urdf, base, "--base")
-    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "--tip")
-    path = _path(urdf, start, end)
+    start = urdf.root if base is None else _check_link_name(urdf, base, "--base")
+    end = _only_tip(urdf, start) if tip is None else _check_link_name(urdf, tip, "--tip")
+    path = _chain_between(urdf, start, end)
     if start == end:
         same = f"--base and --tip are the same link, {quoted(start)}"
         raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
@@ -282,14 +285,14 @@ def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
     return path
 
 
-def _known(urdf: Urdf, name: str, option: str) -> str:
+def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
     if name not in urdf.links:
         near = did_you_mean(name, urdf.links)
         raise InputError.one(f"{option}: there is no link {quoted(name)}{near}", urdf.file)
     return name
 
 
-def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
+def _chain_between(urdf: Urdf, base: str, tip: str) -> ChainPath:
     above = urdf.above(tip)
     links = [joint.parent for joint in above] + [tip]
     if base not in links:
@@ -299,7 +302,7 @@ def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
 
 def _only_tip(urdf: Urdf, base: str) -> str:
     """Return the end of the only branch that moves; raise an InputError if it is ambiguous."""
-    leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
+    leaves = {leaf: _chain_between(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
     longest = max(leaves.values(), key=len, default=())
     tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
     straight = all(moving == longest[: len(moving)] for moving in leaves.values())
@@ -307,7 +310,7 @@ def _only_tip(urdf: Urdf, base: str) -> str:
         raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
     if not straight or len(tips) > 1:
         offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
-        raise InputError.one(_ambiguous(urdf, base, list(dict.fromkeys(offered))), urdf.file)
+        raise InputError.one(_describe_possible_tips(urdf, base, list(dict.fromkeys(offered))), urdf.file)
     return tips[0]
 
 
@@ -321,15 +324,15 @@ def _forks(urdf: Urdf, base: str) -> Iterator[str]:
     """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
     branches: dict[str, set[str]] = {}
     for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
-        for joint in _path(urdf, base, moving.child).joints:
+        for joint in _chain_between(urdf, base, moving.child).joints:
             branches.setdefault(joint.parent, set()).add(joint.child)
     for link, ways in branches.items():
-        if len(ways) > 1 and _path(urdf, base, link).moving:
+        if len(ways) > 1 and _chain_between(urdf, base, link).moving:
             yield link
 
 
-def _ambiguous(urdf: Urdf, base: str, tips: list[str]) -> str:
-    counts = [len(_path(urdf, base, tip).moving) for tip in tips]
+def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
+    counts = [len(_chain_between(urdf, base, tip).moving) for tip in tips]
     found = [f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)]
     more = f" and {len(found) - MAX_TIPS} more" if len(found) > MAX_TIPS else ""
     offered = ", ".join(found[:MAX_TIPS])

@@ -80,7 +80,7 @@ class Placeholders(NamedTuple):
         if field == "motor":
             return f"{MOTOR_SHARE:g} times the largest inertia that it moves"
         give = f"{DEFLECTION[joint.is_revolute]:g} {joint.urdf.unit()}"
-        torque = f"{_rounded(load.torque):g} {joint.urdf.unit(TORQUE)}"
+        torque = f"{_round_constant(load.torque):g} {joint.urdf.unit(TORQUE)}"
         return f"gives way by {give} under {torque}, its largest load"
 
 
@@ -107,16 +107,16 @@ class JointLoad(NamedTuple):
         """
         if not self.is_there:
             return UNLOADED
-        stiffness = _rounded(self.torque / deflection)
-        k = _rounded(stiffness / 2)
+        stiffness = _round_constant(self.torque / deflection)
+        k = _round_constant(stiffness / 2)
         return PlaceholderConstants(
-            motor_inertia=_rounded(MOTOR_SHARE * self.inertia / gear**2) * gear**2,
+            motor_inertia=_round_constant(MOTOR_SHARE * self.inertia / gear**2) * gear**2,
             stiffness=stiffness,
-            spring=(k, _rounded(HARDENING * k / deflection**2)),
+            spring=(k, _round_constant(HARDENING * k / deflection**2)),
         )
 
 
-def _rounded(number: float) -> float:
+def _round_constant(number: float) -> float:
     return float(f"{number:.{DIGITS - 1}e}")
 
 
@@ -157,7 +157,7 @@ def joint_loads(
     """
     loads, beyond = [], _Masses()  # beyond joint i, as seen from the origin of frame i
     for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
-        radius, height = _center(row, link)
+        radius, height = _cylindrical_center_of_mass(row, link)
         about_axis = beyond.farther(abs(row.a)).joined(link, radius)
         inertia = about_axis.second if joint.is_revolute else about_axis.mass
         weight = STANDARD_GRAVITY * math.sqrt(about_axis.mass * inertia)
@@ -169,7 +169,7 @@ def joint_loads(
     return loads[::-1]
 
 
-def _center(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
+def _cylindrical_center_of_mass(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
     """Return the distance of a link's center of mass from its joint axis, and its height along it above d."""
     x, y, z = link.com
     c, s = math.cos(row.alpha), math.sin(row.alpha)

@@ -59,7 +59,7 @@ def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[
             elif name in ratios or len(joints) > 1 or not _is_simple(transmission):
                 unread.left_out[name].append(("transmission that is not simple left out", ""))
             else:
-                ratios[name] = _reduction(transmission, problems)
+                ratios[name] = _net_reduction(transmission, problems)
     return ratios
 
 
@@ -74,11 +74,11 @@ def _is_simple(transmission: Element) -> bool:
     types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
     motors = list(transmission.all("actuator"))
-    is_one = len(motors) == 1 >= len(_reductions(transmission))
+    is_one = len(motors) == 1 >= len(_declared_reductions(transmission))
     return any(word.endswith(SIMPLE) for word in says_so) and is_one
 
 
-def _reductions(transmission: Element) -> list[tuple[int, str, str]]:
+def _declared_reductions(transmission: Element) -> list[tuple[int, str, str]]:
     """Return line, word and text of each gear reduction, an element or an attribute."""
     parts = list(transmission.everything())
     elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
@@ -91,9 +91,9 @@ def _reductions(transmission: Element) -> list[tuple[int, str, str]]:
     return elements + attributes
 
 
-def _reduction(transmission: Element, problems: Problems) -> float:
+def _net_reduction(transmission: Element, problems: Problems) -> float:
     """Return the reduction of a simple transmission; 1 without one."""
-    for line, word, text in _reductions(transmission):
+    for line, word, text in _declared_reductions(transmission):
         try:
             ratio = float(text.replace("_", "?"))
         except ValueError:
@@ -136,19 +136,19 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if version not in VERSIONS:
         unread.warn(root.line, f"version {quoted(version)} is unknown; read as {VERSIONS[-1]}")
     reader = _Reader(problems, version, read_gear_ratios(root, unread, problems), unread)
-    links = _by_name(map(reader.link, root.all("link")), "link", problems)
-    joints = _by_name(map(reader.joint, root.all("joint")), "joint", problems)
+    links = _index_by_name(map(reader.link, root.all("link")), "link", problems)
+    joints = _index_by_name(map(reader.joint, root.all("joint")), "joint", problems)
     name = reader.word(root, "name")
     if not links:
         problems.fail(root.line, "the file describes no links")
     _check_ends(links, joints, problems)
     _check_leaders(joints, problems)
     problems.check()
-    root_link = _root(links, joints, problems)
+    root_link = _root_link(links, joints, problems)
     return Urdf(source.path, name, links, joints, root_link, tuple(sorted(unread.warnings())))
 
 
-def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
+def _index_by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
     named: dict[str, _Named] = {}
     for record in records:
         if record.name in named:
@@ -178,12 +178,12 @@ def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], 
 
 def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
     for joint in joints.values():
-        if joint.name in _leaders(joint, joints):
+        if joint.name in _followed_joints(joint, joints):
             message = "follows itself: the <mimic> of joints form a circle"
             problems.add(joint.line, f"joint {quoted(joint.name)} {message}")
 
 
-def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
+def _followed_joints(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
     """Return the names of the joints that a joint follows, directly or indirectly."""
     leaders: set[str] = set()
     while joint.mimic is not None and joint.mimic.leader in joints.keys() - leaders:
@@ -192,7 +192,7 @@ def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
     return leaders
 
 
-def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
+def _root_link(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
     """Return the name of the only link without a parent, and check that all others are below it."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in links if name not in children]

@@ -68,7 +68,7 @@ class HeldJoint(NamedTuple):
         mimic, limit = self.urdf.mimic, self.urdf.limit.position
         if mimic is not None and self.released:
             yield f"{self}: it follows {mimic.leader} (<mimic>), and its motion with that joint is neglected"
-        elif mimic is not None and not self.follows and self.position == _resting(self.urdf):
+        elif mimic is not None and not self.follows and self.position == _default_position(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
             yield f"{self}: {reason}; if it stands elsewhere, say so by --hold {self.leader}=VALUE"
         if limit is not None and not limit[0] - LIMIT_ROUNDING <= self.position <= limit[1] + LIMIT_ROUNDING:
@@ -93,10 +93,10 @@ def held_joints(
         InputError: a position cannot be given, or has no effect.
     """
     followed = [(joint, urdf.followed(joint, hold)) for joint in standing]
-    leaders = {mimic.leader: _resting(urdf.joints[mimic.leader]) for _, mimic in followed}
+    leaders = {mimic.leader: _default_position(urdf.joints[mimic.leader]) for _, mimic in followed}
     problems = Problems(urdf.file)
     for name, value in hold.items():
-        leaders[name] = _given(urdf, name, value, leaders, moving, problems)
+        leaders[name] = _read_hold_position(urdf, name, value, leaders, moving, problems)
     problems.check()
     held = [
         HeldJoint(
@@ -115,12 +115,12 @@ def held_joints(
     return held
 
 
-def _resting(joint: UrdfJoint) -> float:
+def _default_position(joint: UrdfJoint) -> float:
     """Return the default position of a joint: zero, or that at which its missing leader is at zero."""
     return 0.0 if joint.mimic is None else joint.mimic.offset
 
 
-def _given(
+def _read_hold_position(
     urdf: Urdf,
     name: str,
     value: float | str,
@@ -243,10 +243,10 @@ def serial_chain(
             requested.
     """
     path = find_path(urdf, base, tip)
-    carried = _carried(urdf, path)
+    carried = _carried_links(urdf, path)
     below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
     names, hold = [joint.name for joint in path.moving], hold or {}
-    side = _beside(urdf, carried, path)
+    side = _side_branch_joints(urdf, carried, path)
     follow = {
         joint.name: urdf.followed(joint, hold).leader in names and _is_massless(urdf, joint) for joint in side
     }
@@ -254,7 +254,7 @@ def serial_chain(
     _check_joints(urdf, path, below_base, beside, hold)
     _check_links(urdf, carried)
     held = held_joints(urdf, [*below_base, *beside], names, hold)
-    poses = _poses(urdf, held)
+    poses = _link_poses(urdf, held)
     to_base = inverse(poses[path.base])
     return SerialChain(
         robot_name=urdf.name,
@@ -262,7 +262,7 @@ def serial_chain(
         tip=path.tip,
         up=to_base[:3, 2],
         joints=tuple(
-            ChainJoint(joint, to_base @ poses[joint.child], links, _body(links, poses, to_base))
+            ChainJoint(joint, to_base @ poses[joint.child], links, _rigid_body_of(links, poses, to_base))
             for joint, links in zip(path.moving, carried, strict=True)
         ),
         tip_pose=to_base @ poses[path.tip],
@@ -310,7 +310,7 @@ def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
     problems.check()
 
 
-def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
+def _link_poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     """Return the pose of every link in the root, with some joints held and all others at zero."""
     positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
@@ -320,7 +320,7 @@ def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     return poses
 
 
-def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
+def _carried_links(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
     """Return the links that each moving joint of the chain carries, side branches included."""
     number = {joint.name: index for index, joint in enumerate(path.moving)}
     owner = {path.base: -1}
@@ -332,12 +332,12 @@ def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
     return [tuple(links) for links in carried]
 
 
-def _beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
+def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
     names = {link.name for links in carried for link in links}
     moving = {joint.name for joint in path.moving}
     candidates = (joint for joint in urdf.joints.values() if joint.child in names and not joint.is_fixed)
     return [joint for joint in candidates if joint.name not in moving]
 
 
-def _body(links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray) -> Body:
+def _rigid_body_of(links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray) -> Body:
     return welded([link.body.moved(to_base @ poses[link.name]) for link in links if link.body is not None])

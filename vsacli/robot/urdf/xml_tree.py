@@ -55,7 +55,7 @@ def parse_xml(text: str, problems: Problems, expected: str) -> Element:
         found = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
         if found:
             problems.fail(0, f"is {found}, expected {expected} (XML)")
-    builder = _Builder(problems)
+    builder = _XmlTreeBuilder(problems)
     try:
         builder.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -64,7 +64,7 @@ def parse_xml(text: str, problems: Problems, expected: str) -> Element:
     return builder.root
 
 
-class _Builder:
+class _XmlTreeBuilder:
     """A builder of the tree from the events of the parser; `root` is its result."""
 
     root: Element
