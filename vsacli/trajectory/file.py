@@ -24,7 +24,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import with_devices
-from vsacli.trajectory.plausibility import CheckedTrajectory, implausible
+from vsacli.trajectory.plausibility import CheckedTrajectory, trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -232,7 +232,7 @@ def declared_trajectory(
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
             *_warnings(document, declared, joints),
-            *implausible(checked, source),
+            *trajectory_findings(checked, source),
         ],
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
         sources=[source, *(recording.source for recording in recordings)],

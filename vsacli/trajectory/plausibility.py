@@ -19,7 +19,7 @@ from vsacli.documents.record_values import Entry, Number
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.plausibility import strange_of_robot
+from vsacli.robot.plausibility import robot_rules_with_findings
 from vsacli.robot.plausibility.bodies import (
     CENTIMETERS,
     DEGREES,
@@ -28,7 +28,7 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.checked_robot import BodySizes, Corridor, ratio
+from vsacli.robot.plausibility.checked_robot import BodySizes, UnloadedStiffnessRange, ratio
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
@@ -62,9 +62,9 @@ RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 
 
-def implausible(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
+def trajectory_findings(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
     """Return the findings of the rules, each with its line of the trajectory file."""
-    known = strange_of_robot(checked.robot.checked, checked.robot.sources)
+    known = robot_rules_with_findings(checked.robot.checked, checked.robot.sources)
     return findings(TRAJECTORY_RULES, checked, Written(source), known)
 
 
@@ -95,9 +95,9 @@ class CheckedTrajectory:
         return None if self.motion is None else self.motion.at(np.linspace(*self.times.span, INSTANTS))
 
     @property
-    def corridors(self) -> tuple[Corridor | None, ...]:
+    def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
         """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return self.robot.checked.corridors
+        return self.robot.checked.unloaded_ranges
 
     @property
     def revolute(self) -> BoolArray:
@@ -177,10 +177,10 @@ def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
 
-def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, Corridor]]:
+def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, UnloadedStiffnessRange]]:
     """Yield every stiffness except amplitudes, with its joint and the attainable range at rest."""
     for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
-        found = checked.corridors[number]
+        found = checked.unloaded_ranges[number]
         if found is not None and AMPLITUDES.isdisjoint(measured.path):
             ends = {"lower": f"{found.lower:.4g}", "upper": f"{found.upper:.4g}", "unit": measured.unit}
             yield measured._replace(beside=ends), checked.robot.joints[number], found

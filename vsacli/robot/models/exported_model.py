@@ -13,18 +13,18 @@ Element: TypeAlias = ElementTree.Element
 Value: TypeAlias = str | bool | float | Iterable[float]
 
 
-def element(parent: Element, tag: str, /, **attributes: Value) -> Element:
+def add_element(parent: Element, tag: str, /, **attributes: Value) -> Element:
     """Add a new element to another one, and return it."""
-    return add(ElementTree.SubElement(parent, tag), **attributes)
+    return set_attributes(ElementTree.SubElement(parent, tag), **attributes)
 
 
-def add(to: Element, /, **attributes: Value) -> Element:
+def set_attributes(to: Element, /, **attributes: Value) -> Element:
     """Add or replace attributes of an element, and return it."""
     to.attrib.update({name: _format_attribute(value) for name, value in attributes.items()})
     return to
 
 
-def document(root: Element, comment: str) -> str:
+def xml_document(root: Element, comment: str) -> str:
     """Return the text of an XML file, indented, with a comment at its beginning."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")

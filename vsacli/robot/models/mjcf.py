@@ -16,11 +16,11 @@ from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import (
     Element,
     ExportedModel,
-    add,
+    add_element,
     arm_length,
-    document,
-    element,
     rod_radius,
+    set_attributes,
+    xml_document,
 )
 from vsacli.robot.models.mjcf_drives import (
     DRAWN,
@@ -58,29 +58,31 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     check_bodies(robot)
     check_friction(robot)
     root = ElementTree.Element("mujoco", model=robot.name)
-    element(root, "compiler", angle="radian")
-    option = element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
-    element(option, "flag", contact="disable")
-    element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
+    add_element(root, "compiler", angle="radian")
+    option = add_element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
+    add_element(option, "flag", contact="disable")
+    add_element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
     _add_light(root)
-    sections = Sections(*(element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
+    sections = Sections(*(add_element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
     body = _add_body(sections.world, "base", robot.base)
     radius = rod_radius(robot)
     for joint in robot.joints:
         below, body = body, _add_link_body(body, joint, radius)
         add_drive(sections, joint, below, body)
     add_dampers(sections, robot.joints)
-    element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
+    add_element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
     if start is not None:
         add_start(root, sections.world, robot, start)
-    return ExportedModel(document(root, _header_comment(robot)), forces_text(robot), ())
+    return ExportedModel(xml_document(root, _header_comment(robot)), forces_text(robot), ())
 
 
 def _add_light(root: Element) -> None:
     """Add a bright sky, against which a model without a ground is visible."""
-    element(element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
-    sky = element(element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384)
-    add(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
+    add_element(add_element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
+    sky = add_element(
+        add_element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384
+    )
+    set_attributes(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
 
 
 def _header_comment(robot: Robot) -> str:
@@ -90,7 +92,7 @@ def _header_comment(robot: Robot) -> str:
 
 
 def _add_body(parent: Element, name: str, pose: Pose) -> Element:
-    return element(parent, "body", name=name, pos=pose.xyz, quat=_quaternion(pose))
+    return add_element(parent, "body", name=name, pos=pose.xyz, quat=_quaternion(pose))
 
 
 def _add_link_body(parent: Element, joint: Joint, radius: float) -> Element:
@@ -98,10 +100,10 @@ def _add_link_body(parent: Element, joint: Joint, radius: float) -> Element:
     dh, link = joint.dh, joint.link
     sa, ca = math.sin(dh.alpha), math.cos(dh.alpha)
     place = (dh.a * math.cos(dh.theta), dh.a * math.sin(dh.theta), dh.d)
-    body = element(parent, "body", name=f"{joint.name}.link", pos=place, quat=_row_quaternion(joint))
-    element(body, "inertial", pos=link.com, mass=link.mass, fullinertia=full_inertia(link))
+    body = add_element(parent, "body", name=f"{joint.name}.link", pos=place, quat=_row_quaternion(joint))
+    add_element(body, "inertial", pos=link.com, mass=link.mass, fullinertia=full_inertia(link))
     origin = (-dh.a, -dh.d * sa, -dh.d * ca)
-    hinge = element(
+    hinge = add_element(
         body,
         "joint",
         name=joint.name,
@@ -111,7 +113,7 @@ def _add_link_body(parent: Element, joint: Joint, radius: float) -> Element:
         damping=joint.damping,
     )
     if all(map(math.isfinite, joint.limits.position)):
-        add(hinge, range=joint.limits.position, limited=False)
+        set_attributes(hinge, range=joint.limits.position, limited=False)
     _draw_link(body, origin, radius)
     return body
 
@@ -120,7 +122,7 @@ def _draw_link(body: Element, origin: tuple[float, float, float], radius: float)
     if math.hypot(*origin) > radius:
         draw_rod(body, origin, radius, LINK_COLOR)
     else:
-        element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOR, **GHOST)
+        add_element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOR, **GHOST)
 
 
 def _row_quaternion(joint: Joint) -> tuple[float, ...]:

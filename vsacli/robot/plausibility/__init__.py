@@ -18,7 +18,7 @@ from vsacli.robot.plausibility.springs import SPRING_RULES
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
-def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
+def robot_findings(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
     """Return impossible links and the findings of the rules, with lines of the robot file.
 
     The robot file is the first of the sources.
@@ -27,7 +27,7 @@ def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Probl
     return (*impossible_links(checked.joints, lines), *findings(ROBOT_RULES, checked, lines))
 
 
-def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
+def robot_rules_with_findings(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Return the names of the rules that have findings."""
     return frozenset(strange(ROBOT_RULES, checked, _robot_file_lines(sources)))
 

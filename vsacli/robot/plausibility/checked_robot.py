@@ -23,19 +23,19 @@ SPHERE = 0.4
 """Moment of inertia of a solid sphere, over mass times radius squared."""
 
 
-class Corridor(NamedTuple):
+class UnloadedStiffnessRange(NamedTuple):
     """Attainable stiffness of a joint without load, N m/rad (N/m)."""
 
     lower: float
     upper: float
 
 
-def corridor(joint: Joint) -> Corridor | None:
+def unloaded_stiffness_range(joint: Joint) -> UnloadedStiffnessRange | None:
     """Return the attainable range of a joint without load; None if its stiffness is not commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return None
     solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
-    return Corridor(float(solution.lower[0]), float(solution.upper[0]))
+    return UnloadedStiffnessRange(float(solution.lower[0]), float(solution.upper[0]))
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ class CheckedRobot:
         return BodySizes(self.joints)
 
     @cached_property
-    def corridors(self) -> tuple[Corridor | None, ...]:
+    def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
         """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return tuple(map(corridor, self.joints))
+        return tuple(map(unloaded_stiffness_range, self.joints))
 
     @property
     def driven(self) -> Iterator[tuple[int, Joint]]:
@@ -89,7 +89,7 @@ def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
     return ("joints", Entry(number, joint.name), *steps)
 
 
-def motors(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
+def motors_in_file(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
     """Return the motors of a joint as written in the file, each with its path from the joint."""
     return written_once(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
 

@@ -13,7 +13,7 @@ from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors_in_file, ratio
 
 TINY = 0.1
 """Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
@@ -95,7 +95,7 @@ def _nan_if_infinite(value: float) -> float:
 
 def _checked_motors(checked: CheckedRobot) -> Iterator[_CheckedMotor]:
     for number, joint in checked.driven:
-        for path, motor in motors(joint):
+        for path, motor in motors_in_file(joint):
             yield _CheckedMotor(checked, number, joint, path, motor)
 
 

@@ -16,7 +16,13 @@ from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, Corridor, joint_path, ratio, written_once
+from vsacli.robot.plausibility.checked_robot import (
+    CheckedRobot,
+    UnloadedStiffnessRange,
+    joint_path,
+    ratio,
+    written_once,
+)
 
 HALF_TURN = math.pi
 TOO_SOFT = (
@@ -44,10 +50,12 @@ def _reference_travel(checked: CheckedRobot, joint: Joint) -> float:
     return 1.0 if joint.is_revolute else checked.sizes.extent
 
 
-def _joints_with_commanded_stiffness(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
+def _joints_with_commanded_stiffness(
+    checked: CheckedRobot,
+) -> Iterator[tuple[int, Joint, UnloadedStiffnessRange]]:
     """Yield the joints with commanded stiffness, with index and attainable range."""
     for index, joint in checked.driven:
-        attainable = checked.corridors[index]
+        attainable = checked.unloaded_ranges[index]
         if attainable is not None:
             yield index, joint, attainable
 
@@ -132,7 +140,7 @@ def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
                 yield Measured(path, limit, _stiffness_unit(joint), size, beside)
 
 
-def _least_stiffness(joint: Joint, attainable: Corridor | None) -> float:
+def _least_stiffness(joint: Joint, attainable: UnloadedStiffnessRange | None) -> float:
     """Return the minimum stiffness of a joint without load, N m/rad (N/m), given its attainable range."""
     if attainable is not None:
         return attainable.lower if attainable.lower > 0 else attainable.upper
@@ -144,7 +152,7 @@ def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
     for number, joint in checked.driven:
         if joint.damper is not None and joint.actuator.sprung:
-            product = float(checked.sizes.moved[number]) * _least_stiffness(joint, checked.corridors[number])
+            product = float(checked.sizes.moved[number]) * _least_stiffness(joint, checked.unloaded_ranges[number])
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
             path = joint_path(number, joint, "damper", "range", Entry(1))

@@ -26,15 +26,15 @@ from vsacli.robot.model import Robot
 from vsacli.robot.urdf.dh import (
     SNAP_ANGLE,
     Frames,
-    Residual,
+    KinematicResidual,
     Snap,
     dh_frames,
     kinematic_residual,
     tidy,
     tidy_angle,
 )
-from vsacli.robot.urdf.link_tree import POSITION_LIMITS, Body, UrdfJoint, inverse, roll_pitch_yaw
-from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, joint_loads
+from vsacli.robot.urdf.link_tree import POSITION_LIMITS, RigidBody, UrdfJoint, inverse_pose, roll_pitch_yaw
+from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, largest_joint_loads
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.serial_chain import (
     STANDARD_GRAVITY,
@@ -76,7 +76,7 @@ class Conversion:
     placeholders: Placeholders
     loads: tuple[JointLoad, ...]
     snaps: tuple[Snap, ...]
-    residual: Residual
+    residual: KinematicResidual
     file_warnings: tuple[Problem, ...] = ()
 
     @property
@@ -158,7 +158,7 @@ def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[s
         yield f"held {place}: {', '.join(elsewhere)}"
 
 
-def _describe_residual(residual: Residual) -> str:
+def _describe_residual(residual: KinematicResidual) -> str:
     verdict = "the same as" if max(residual) <= EXACT_RESIDUAL else "not quite"
     position, orientation = (max(error, SMALLEST_RESIDUAL) for error in residual)
     errors = f"{position:.1e} m and {orientation:.1e} rad"
@@ -211,7 +211,7 @@ def import_urdf(
     chain = serial_chain(urdf, base, tip, hold)
     frames = dh_frames(chain.joints, chain.tip_pose, snap)
     links = _convert_links(file, chain.joints, frames)
-    loads = joint_loads(chain.joints, frames.rows, links)
+    loads = largest_joint_loads(chain.joints, frames.rows, links)
     actuators = [
         ACTUATORS[chosen.actuator].placeholder(chosen.constants(joint, load))
         for joint, load in zip(chain.joints, loads, strict=True)
@@ -273,7 +273,7 @@ def _convert_links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> l
     problems, links = Problems(path), []
     for joint, pose in zip(joints, frames.poses, strict=True):
         try:
-            links.append(_convert_link(joint.body.moved(inverse(pose)), frames.scale))
+            links.append(_convert_link(joint.body.moved(inverse_pose(pose)), frames.scale))
         except InvalidRecordError as error:
             own, *others = joint.links
             whole = f"{quoted(own.name)}{' with the links it carries' if others else ''}"
@@ -283,7 +283,7 @@ def _convert_links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> l
     return links
 
 
-def _convert_link(body: Body, scale: float) -> Link:
+def _convert_link(body: RigidBody, scale: float) -> Link:
     largest = float(abs(body.inertia).max())
     inertia = (
         tidy(body.inertia, largest)

@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import DenavitHartenberg, Pose
 from vsacli.robot.kinematics import frames
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.link_tree import inverse, pose_matrix, transform
+from vsacli.robot.urdf.link_tree import inverse_pose, pose_matrix, transform
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
 SNAP_ANGLE = 1e-4
@@ -86,9 +86,9 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
     scale = float(max(abs(pose[:3, 3]).max() for pose in (*poses, tip)))
     return Frames(
         base=poses[0],
-        rows=tuple(_dh_row(inverse(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
+        rows=tuple(_dh_row(inverse_pose(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
         poses=tuple(poses[1:]),
-        tool=inverse(poses[-1]) @ tip,
+        tool=inverse_pose(poses[-1]) @ tip,
         snaps=snaps,
         scale=scale,
     )
@@ -231,20 +231,20 @@ DRAWN_HALF_WIDTH = {True: np.pi, False: 1.0}
 """Half the range of random positions of a revolute (rad) or prismatic (m) joint without limits."""
 
 
-class Residual(NamedTuple):
+class KinematicResidual(NamedTuple):
     """Largest distance, m, and angle, rad, between the tips, over random joint positions."""
 
     position: float
     orientation: float
 
 
-def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
+def kinematic_residual(chain: SerialChain, robot: Robot) -> KinematicResidual:
     """Compare the tips of chain and robot at random positions within the limits."""
     q = _random_joint_positions(chain.joints)
     expected, found = _chain_tips(chain, q), _robot_tips(robot, q)
     shift = np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1)
     turn = np.linalg.norm(found[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
-    return Residual(float(shift.max()), float(turn.max()))
+    return KinematicResidual(float(shift.max()), float(turn.max()))
 
 
 def _random_joint_positions(joints: Sequence[ChainJoint]) -> FloatArray:
@@ -262,9 +262,9 @@ def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
     poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     before = np.eye(4)
     for joint, positions in zip(chain.joints, q.T, strict=True):
-        poses = poses @ (inverse(before) @ joint.frame) @ joint.urdf.motions(positions)
+        poses = poses @ (inverse_pose(before) @ joint.frame) @ joint.urdf.motions(positions)
         before = joint.frame
-    result: FloatArray = poses @ (inverse(before) @ chain.tip_pose)
+    result: FloatArray = poses @ (inverse_pose(before) @ chain.tip_pose)
     return result
 
 

@@ -53,7 +53,7 @@ def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def inverse(pose: FloatArray) -> FloatArray:
+def inverse_pose(pose: FloatArray) -> FloatArray:
     """Return the inverse of a rigid motion."""
     rotation = pose[:3, :3].T
     return transform(rotation, -rotation @ pose[:3, 3])
@@ -65,20 +65,20 @@ def cross_matrix(vector: FloatArray) -> FloatArray:
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-class Body(NamedTuple):
+class RigidBody(NamedTuple):
     """A rigid body in some frame: mass, kg, center of mass, (3,), m, inertia about it, (3, 3), kg m^2."""
 
     mass: float
     com: FloatArray
     inertia: FloatArray
 
-    def moved(self, pose: FloatArray) -> Body:
+    def moved(self, pose: FloatArray) -> RigidBody:
         """Return the body in another frame, in which its own frame has this pose."""
         rotation = pose[:3, :3]
-        return Body(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
+        return RigidBody(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
 
 
-def welded(bodies: list[Body]) -> Body:
+def welded(bodies: list[RigidBody]) -> RigidBody:
     """Return bodies given in one frame as a single body; without mass, it is at the origin."""
     mass = math.fsum(body.mass for body in bodies)
     moment = sum((body.mass * body.com for body in bodies), np.zeros(3))
@@ -87,7 +87,7 @@ def welded(bodies: list[Body]) -> Body:
         (body.inertia + _parallel_axis_inertia(body.mass, body.com - com) for body in bodies),
         np.zeros((3, 3)),
     )
-    return Body(mass, com, (inertia + inertia.T) / 2)
+    return RigidBody(mass, com, (inertia + inertia.T) / 2)
 
 
 def _parallel_axis_inertia(mass: float, arm: FloatArray) -> FloatArray:
@@ -115,7 +115,7 @@ class UrdfLink:
 
     name: str
     line: int
-    body: Body | None
+    body: RigidBody | None
     flaw: tuple[int, str] | None = None
 
 
@@ -238,7 +238,7 @@ class Urdf:
         return mimic
 
 
-def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
+def joints_below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
     """Yield the joints below a link, parents before children."""
     children: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
@@ -315,7 +315,7 @@ def _only_tip(urdf: Urdf, base: str) -> str:
 
 
 def _leaves(urdf: Urdf, base: str) -> list[str]:
-    joints = list(below(base, urdf.joints.values()))
+    joints = list(joints_below(base, urdf.joints.values()))
     parents = {joint.parent for joint in joints}
     return [joint.child for joint in joints if joint.child not in parents]
 
@@ -323,7 +323,7 @@ def _leaves(urdf: Urdf, base: str) -> list[str]:
 def _forks(urdf: Urdf, base: str) -> Iterator[str]:
     """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
     branches: dict[str, set[str]] = {}
-    for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
+    for moving in (joint for joint in joints_below(base, urdf.joints.values()) if not joint.is_fixed):
         for joint in _chain_between(urdf, base, moving.child).joints:
             branches.setdefault(joint.parent, set()).add(joint.child)
     for link, ways in branches.items():

@@ -145,7 +145,7 @@ class _Masses(NamedTuple):
         return _Masses(self.mass + link.mass, self.first + own, self.second + own * distance + moment)
 
 
-def joint_loads(
+def largest_joint_loads(
     joints: Sequence[ChainJoint], rows: Sequence[DenavitHartenberg], links: Sequence[Link]
 ) -> list[JointLoad]:
     """Return the largest load of each joint over all configurations.

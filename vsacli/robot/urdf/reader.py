@@ -25,13 +25,13 @@ from vsacli.robot.urdf.link_tree import (
     POSITION_LIMITS,
     TYPES,
     UNLIMITED,
-    Body,
     Mimic,
+    RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLimit,
     UrdfLink,
-    below,
+    joints_below,
     pose_matrix,
     quaternion_rotation,
     transform,
@@ -199,7 +199,7 @@ def _root_link(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], p
     if len(roots) != 1:
         found = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
         problems.fail(1, f"the links must form one tree, which has one root, but {found}")
-    circles = set(links) - {roots[0]} - {joint.child for joint in below(roots[0], joints.values())}
+    circles = set(links) - {roots[0]} - {joint.child for joint in joints_below(roots[0], joints.values())}
     if circles:
         names = sorted(circles, key=lambda name: links[name].line)
         message = f"the link {quoted(names[0])} is its own ancestor: the joints form a circle"
@@ -228,10 +228,10 @@ class _Reader:
             return UrdfLink(name, element.line, None, flaw)
         return UrdfLink(name, element.line, self._body(inertial, mass, inertia))
 
-    def _body(self, inertial: Element, mass: Element, inertia: Element) -> Body:
+    def _body(self, inertial: Element, mass: Element, inertia: Element) -> RigidBody:
         xx, xy, xz, yy, yz, zz = (self._number(inertia, name) for name in _MOMENTS)
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Body(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
+        return RigidBody(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
 
     def joint(self, element: Element) -> UrdfJoint:
         name = self.word(element, "name")

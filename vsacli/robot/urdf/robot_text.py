@@ -20,7 +20,7 @@ MAX_LINKS = 4
 """Most links that a comment names before it counts the rest."""
 
 
-def robot_text(conversion: Conversion) -> str:
+def converted_robot_text(conversion: Conversion) -> str:
     """Return the text of the robot file; `load_robot` returns the same robot from it."""
     robot = conversion.robot
     lines = [

@@ -21,14 +21,14 @@ from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
-    Body,
     ChainPath,
+    RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLink,
-    below,
     find_path,
-    inverse,
+    inverse_pose,
+    joints_below,
     welded,
 )
 
@@ -176,7 +176,7 @@ class ChainJoint:
     urdf: UrdfJoint
     frame: FloatArray
     links: tuple[UrdfLink, ...]
-    body: Body
+    body: RigidBody
 
     @property
     def is_revolute(self) -> bool:
@@ -255,7 +255,7 @@ def serial_chain(
     _check_links(urdf, carried)
     held = held_joints(urdf, [*below_base, *beside], names, hold)
     poses = _link_poses(urdf, held)
-    to_base = inverse(poses[path.base])
+    to_base = inverse_pose(poses[path.base])
     return SerialChain(
         robot_name=urdf.name,
         base=path.base,
@@ -274,7 +274,7 @@ def serial_chain(
 
 def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
     """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
-    links = [urdf.links[moved.child] for moved in (joint, *below(joint.child, urdf.joints.values()))]
+    links = [urdf.links[moved.child] for moved in (joint, *joints_below(joint.child, urdf.joints.values()))]
     return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
 
 
@@ -314,7 +314,7 @@ def _link_poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     """Return the pose of every link in the root, with some joints held and all others at zero."""
     positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
-    for joint in below(urdf.root, urdf.joints.values()):
+    for joint in joints_below(urdf.root, urdf.joints.values()):
         (motion,) = joint.motions(np.array([positions.get(joint.name, 0.0)]))
         poses[joint.child] = poses[joint.parent] @ joint.placement @ motion
     return poses
@@ -325,7 +325,7 @@ def _carried_links(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
     number = {joint.name: index for index, joint in enumerate(path.moving)}
     owner = {path.base: -1}
     carried: list[list[UrdfLink]] = [[] for _ in number]
-    for joint in below(path.base, urdf.joints.values()):
+    for joint in joints_below(path.base, urdf.joints.values()):
         index = owner[joint.child] = number.get(joint.name, owner[joint.parent])
         if index >= 0:
             carried[index].append(urdf.links[joint.child])
@@ -339,5 +339,7 @@ def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: C
     return [joint for joint in candidates if joint.name not in moving]
 
 
-def _rigid_body_of(links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray) -> Body:
+def _rigid_body_of(
+    links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
+) -> RigidBody:
     return welded([link.body.moved(to_base @ poses[link.name]) for link in links if link.body is not None])

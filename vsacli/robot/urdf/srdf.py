@@ -19,14 +19,14 @@ MAX_BYTES = 10_000_000
 """Largest file, as for a URDF; most of an SRDF are pairs of links that may collide."""
 
 
-class Ends(NamedTuple):
+class ChainEnds(NamedTuple):
     """The base link and the tip link of a chain."""
 
     base: str
     tip: str
 
 
-def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> Ends:
+def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> ChainEnds:
     """Return the base and tip link of the chain of a group.
 
     Args:
@@ -60,7 +60,7 @@ class _Groups:
     def __init__(self, groups: Mapping[str, Element], urdf: Urdf, problems: Problems) -> None:
         self._groups, self._urdf, self._problems = groups, urdf, problems
 
-    def ends(self, name: str) -> Ends:
+    def ends(self, name: str) -> ChainEnds:
         group = self._groups[name]
         joints = self._joints(name, ())
         moving = [joint for joint in joints.values() if not joint.is_fixed]
@@ -80,7 +80,7 @@ class _Groups:
             names = ", ".join(quoted(joint.name) for joint in missing)
             self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its chain")
         chain = next(group.all("chain"), None)
-        return Ends(first.parent if chain is None else chain.attributes["base_link"], tip)
+        return ChainEnds(first.parent if chain is None else chain.attributes["base_link"], tip)
 
     def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
         """Return the joints of a group by name: its own, and those of its links, chains and groups."""
