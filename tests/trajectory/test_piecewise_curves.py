@@ -9,8 +9,8 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.steps import Chain, Jump, stepwise
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile, stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
 
 SPAN = (0.1, 2.8)  # times that are no binary fractions
@@ -21,11 +21,11 @@ def move(span, start, end, degree=9):
 
 
 def hold(span, value):
-    return Constant(signal=POSITION, span=span, value=value)
+    return ConstantProfile(signal=POSITION, span=span, value=value)
 
 
 def chain(*parts):
-    return Chain(signal=POSITION, span=(parts[0].span[0], parts[-1].span[1]), parts=parts)
+    return PiecewiseProfile(signal=POSITION, span=(parts[0].span[0], parts[-1].span[1]), parts=parts)
 
 
 HERE, THERE, BACK = (0.0, 1.0), (1.0, -0.5), (0.25, 0.5)
@@ -124,7 +124,7 @@ def test_parts_must_adjoin():
     with pytest.raises(InputError, match="must adjoin and fill its span"):
         chain(hold((0.0, 1.0), HERE), hold((1.5, 2.0), HERE))
     with pytest.raises(InputError, match="must adjoin and fill its span"):
-        Chain(signal=POSITION, span=(0.0, 2.0), parts=(hold((0.0, 1.0), HERE),))
+        PiecewiseProfile(signal=POSITION, span=(0.0, 2.0), parts=(hold((0.0, 1.0), HERE),))
 
 
 def test_parts_must_have_the_same_joints():

@@ -35,7 +35,7 @@ from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.commanded_joints import takers
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -370,7 +370,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")
-    trajectory = with_devices(trajectory, robot)
+    trajectory = set_uncommanded_dampers(trajectory, robot)
     for key, signal in COMMANDED.items():
         lacking = [
             joint.name

@@ -23,7 +23,7 @@ from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
-from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.plausibility import CheckedTrajectory, trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
@@ -31,7 +31,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vsacli.trajectory.fits import FitChoice
-    from vsacli.trajectory.recorded.recording import Recording
+    from vsacli.trajectory.recorded.recording import RecordedSignals
 
 DEFAULT_RATE = 1000.0
 
@@ -270,19 +270,19 @@ def _blaming(changes: Changes, path: str) -> Iterator[None]:
 
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
     try:
-        return with_devices(trajectory, robot)
+        return set_uncommanded_dampers(trajectory, robot)
     except InputError as error:
         raise InputError.one(str(error), trajectory.sources[0].path) from None
 
 
 def _read_recordings(
     document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
-) -> list[Recording]:
+) -> list[RecordedSignals]:
     """Read each CSV file once, for all signals declared from it; check that all files have equal times."""
     if not document.recorded:
         return []
     from vsacli.documents.column_mapping import ColumnMapping
-    from vsacli.trajectory.recorded.recording import read_recording
+    from vsacli.trajectory.recorded.recording import read_recorded_signals
 
     wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
     mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
@@ -293,7 +293,7 @@ def _read_recordings(
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
-        read_recording(
+        read_recorded_signals(
             file, joints, fits, mappings[file], resampled=resampled, unwrap=unwrap, progress=progress
         )
         for file, fits in wanted.items()
@@ -303,14 +303,16 @@ def _read_recordings(
     return recordings
 
 
-def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str) -> Times:
+def _times(document: TrajectoryFile, recordings: Sequence[RecordedSignals], file: str) -> Times:
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
     return _uniform_times(document.lasts, document.rate)
 
 
-def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
+def _profiles(
+    document: TrajectoryFile, times: Times, recordings: Sequence[RecordedSignals]
+) -> dict[str, Profile]:
     """Return the profiles by signal key, at the declared pace."""
     first, last = times.span
     formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}

@@ -16,7 +16,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_n
 from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import Continued, Profile, WrenchProfile
 from vsacli.trajectory.times import Times
@@ -120,9 +120,9 @@ class Trajectory:
                     f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
 
-    def _nothing(self, signal: Signal) -> Constant:
+    def _nothing(self, signal: Signal) -> ConstantProfile:
         """Return the profile of a signal that commands no joint."""
-        return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
+        return ConstantProfile(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
     def from_samples(
@@ -201,7 +201,7 @@ class Trajectory:
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
         """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
         same = copy(self)
-        constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
+        constant = ConstantProfile(signal=signal, span=(0.0, self.duration), value=value)
         same.commanded = {**self.commanded, signal.key: constant}
         same._source_notes = (*self._source_notes, note)
         return same

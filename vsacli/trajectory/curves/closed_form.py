@@ -91,7 +91,7 @@ def added(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constant(ClosedForm):
+class ConstantProfile(ClosedForm):
     """A constant `value`, one number per component."""
 
     value: tuple[float, ...]

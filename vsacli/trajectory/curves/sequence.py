@@ -14,11 +14,11 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InvalidRecordError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, Items, OneOf, check_fields, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, Constant
+from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, ConstantProfile
 from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
 from vsacli.trajectory.curves.polynomial import RestToRest
 from vsacli.trajectory.curves.sinusoids import SumOfSinusoids
-from vsacli.trajectory.curves.steps import Chain, Jump
+from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile
 from vsacli.trajectory.curves.via_points import Via
 
 Position: TypeAlias = tuple[float, ...]
@@ -71,9 +71,9 @@ class Dwell(_Timed):
     opening = ()
     begins = None
 
-    def placed(self, span: tuple[float, float], here: Position) -> Constant:
+    def placed(self, span: tuple[float, float], here: Position) -> ConstantProfile:
         """See `Part.placed`."""
-        return Constant(signal=POSITION, span=span, value=here)
+        return ConstantProfile(signal=POSITION, span=span, value=here)
 
 
 class PolynomialPart(_Timed):
@@ -270,9 +270,11 @@ class Sequence(Formula):
         """Sum of the durations, s."""
         return float(self._ends()[-1])
 
-    def over(self, span: tuple[float, float]) -> Chain:
+    def over(self, span: tuple[float, float]) -> PiecewiseProfile:
         """See `Formula.over`."""
-        return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
+        return PiecewiseProfile(
+            signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span))
+        )
 
     def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]

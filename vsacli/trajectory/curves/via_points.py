@@ -24,7 +24,7 @@ SEAM = 1e-9
 it is 1e-13 for well-spaced points."""
 
 
-class Extremes(NamedTuple):
+class ProfileExtremes(NamedTuple):
     """The smallest and largest value of each component, (components,), and their times, s."""
 
     lowest: FloatArray
@@ -101,12 +101,12 @@ class ViaPoints(ClosedForm):
                 away = points - points[0]  # zero, and so exact, for a component at rest
                 spline = make_interp_spline(shares, away, k=self.degree, bc_type=ends)
             except (np.linalg.LinAlgError, ValueError):
-                raise _unfit(self.degree) from None
+                raise _degree_error(self.degree) from None
             rows = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
             rows[0] = points.T
             rows[1 : vanishing + 1, :, [0, -1]] = 0.0
             if not _is_smooth(rows, np.diff(shares), min(self.signal.orders, self.degree)):
-                raise _unfit(self.degree)
+                raise _degree_error(self.degree)
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -133,7 +133,7 @@ class ViaPoints(ClosedForm):
         """See `ClosedForm.raised`."""
         return replace(self, points=tuple(added(point, by) for point in self.points))
 
-    def extremes(self) -> Extremes:
+    def extremes(self) -> ProfileExtremes:
         """Return the smallest and largest values, from the zeros of the first derivative.
 
         Raises:
@@ -145,7 +145,7 @@ class ViaPoints(ClosedForm):
             values = self.at(time)[0, component]
             low, high = values.argmin(), values.argmax()
             found[:, component] = values[low], time[low], values[high], time[high]
-        return Extremes(*found)
+        return ProfileExtremes(*found)
 
     def _zeros(self) -> Sequence[FloatArray]:
         """Return the times, s, at which the first derivative of each given component vanishes."""
@@ -196,7 +196,7 @@ def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
     return bool(np.all(np.abs(before - after).max(axis=2) <= SEAM * peaks))
 
 
-def _unfit(degree: int) -> InputError:
+def _degree_error(degree: int) -> InputError:
     return InputError.one(
         f"the points are too unevenly spaced in time for a spline of degree {degree};"
         " space them more evenly, or take a lower degree"
@@ -326,7 +326,7 @@ class Via(Formula):
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
         """Yield a note on times that were derived from the points."""
         if self.times is None:
-            yield f"passes its via points at t = {_listed(self.over(span).breakpoints.tolist())} s"
+            yield f"passes its via points at t = {_list_times(self.over(span).breakpoints.tolist())} s"
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Yield warnings about joints whose spline goes far beyond its points."""
@@ -341,7 +341,7 @@ class Via(Formula):
                 yield f"{name} goes {further:.3g} {unit} beyond its via points, at t = {when:.3f} s"
 
 
-def _listed(times: list[float]) -> str:
+def _list_times(times: list[float]) -> str:
     shown = [f"{time:.4g}" for time in times]
     if len(shown) > SHOWN_TIMES:
         half = SHOWN_TIMES // 2

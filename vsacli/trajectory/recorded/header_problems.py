@@ -49,8 +49,12 @@ class ColumnNames:
     @cached_property
     def parenthesised(self) -> dict[str, re.Match[str]]:
         """Name and unit of the known columns whose unit is in parentheses, by the whole name."""
-        found = {name: _PARENTHESISED.fullmatch(name) for name in self.names if name not in self.known}
-        return {name: each for name, each in found.items() if each is not None and each["name"] in self.known}
+        matches = {name: _PARENTHESISED.fullmatch(name) for name in self.names if name not in self.known}
+        return {
+            name: match
+            for name, match in matches.items()
+            if match is not None and match["name"] in self.known
+        }
 
     @cached_property
     def meant(self) -> dict[str, str]:
@@ -71,8 +75,8 @@ class ColumnNames:
 
     def misspelled(self, unknown: Collection[str], missing: Sequence[str]) -> dict[str, str]:
         """Return the columns that probably stand for known ones, renamed or `missing`, with these."""
-        found = {name: successor(name, self.known) or probable(name, missing) for name in unknown}
-        return {name: near for name, near in found.items() if near is not None}
+        near_names = {name: successor(name, self.known) or probable_column(name, missing) for name in unknown}
+        return {name: near for name, near in near_names.items() if near is not None}
 
     @cached_property
     def strangers(self) -> list[str]:
@@ -82,13 +86,16 @@ class ColumnNames:
     def of_names(self) -> Iterator[str]:
         """Yield problems of names: misspellings and units in parentheses."""
         yield from misspellings(self.meant)
-        for name, found in self.parenthesised.items():
-            yield f"{name!r}: units are written in square brackets, {found['name']} [{found['unit']}]"
+        for name, parts in self.parenthesised.items():
+            yield f"{name!r}: units are written in square brackets, {parts['name']} [{parts['unit']}]"
 
     def of_strangers(self) -> Iterator[str]:
         """Yield one problem for all unknown columns, if there are any."""
         if self.strangers:
-            yield f"{_unknown(self.strangers)}; to leave columns out or to rename them, {self.renaming}"
+            yield (
+                f"{_describe_unknown_columns(self.strangers)}; to leave columns out or to rename them,"
+                f" {self.renaming}"
+            )
 
     def of_time(self, otherwise: str) -> Iterator[str]:
         """Yield that no column holds times, if so; `otherwise` is the advice if all columns are known."""
@@ -113,20 +120,24 @@ class ColumnNames:
             if name in needed and not (name in COMMANDED and whole):
                 renamed = True
                 meaning = self._of_joints(name, absent)
-                yield f"{_missing(absent)}{meaning}; {self._other_name(len(absent))}"
+                yield f"{_describe_missing_columns(absent)}{meaning}; {self._other_name(len(absent))}"
             elif name in needed:
-                yield f"{_missing(absent)}; {self._combined(name)}"
+                yield f"{_describe_missing_columns(absent)}; {self._combined(name)}"
             elif not whole:
                 every = "axes" if name in WRENCH.names else "joints"
-                yield f"{_missing(absent)}; {name} is given for all {every} or for none"
+                yield f"{_describe_missing_columns(absent)}; {name} is given for all {every} or for none"
         if not renamed:
             yield from self.of_strangers()
 
     def _other_name(self, missing: int) -> str:
         """Return the columns one of which may be missing, and what to do then, as two clauses."""
-        present = f"columns: {listed(self.names, MOST_PRESENT)}"
         condition = "if it has another name" if missing == 1 else "if they have other names"
-        return f"{_unknown(self.strangers) if self.strangers else present}; {condition}, {self.renaming}"
+        columns = (
+            _describe_unknown_columns(self.strangers)
+            if self.strangers
+            else f"columns: {listed(self.names, MOST_PRESENT)}"
+        )
+        return f"{columns}; {condition}, {self.renaming}"
 
     def _combined(self, signal: str) -> str:
         motion = f"position: {{type: csv, file: {self.file}}}"
@@ -140,20 +151,20 @@ class ColumnNames:
         return f" ({key} of joint{'s'[: len(absent) > 1]} {together(list(absent), self.joint_names)})"
 
 
-def probable(column: str, missing: Sequence[str]) -> str | None:
+def probable_column(column: str, missing: Sequence[str]) -> str | None:
     """Return the missing column that an unknown one probably stands for, or None.
 
     Of a joint's columns only the part that is wrong is compared: `shoulder.theta` shares its joint with
     `shoulder.dq`, and nothing else.
     """
     joint, dot, quantity = column.partition(".")
-    others = [each.partition(".") for each in missing]
-    if not dot or not any(separator for _, separator, _ in others):
+    missing_parts = [each.partition(".") for each in missing]
+    if not dot or not any(separator for _, separator, _ in missing_parts):
         return nearest(column, missing)
-    near = nearest(quantity, [each for name, _, each in others if name == joint])
+    near = nearest(quantity, [each for name, _, each in missing_parts if name == joint])
     if near is not None:
         return f"{joint}.{near}"
-    near = nearest(joint, [name for name, _, each in others if each == quantity])
+    near = nearest(joint, [name for name, _, each in missing_parts if each == quantity])
     return None if near is None else f"{near}.{quantity}"
 
 
@@ -167,21 +178,21 @@ def misspellings(meant: Mapping[str, str]) -> Iterator[str]:
     for columns in groups.values():
         right = [meant[each] for each in columns]
         if successor(columns[0], right) is None:
-            yield f"{_unknown(columns)}; did you mean {_several(right)}?"
+            yield f"{_describe_unknown_columns(columns)}; did you mean {_quote_columns(right)}?"
         else:
             verb = "it is" if len(columns) == 1 else "they are"
-            yield f"{_unknown(columns)}; {verb} now {_several(right)}"
+            yield f"{_describe_unknown_columns(columns)}; {verb} now {_quote_columns(right)}"
 
 
-def _unknown(columns: Sequence[str]) -> str:
+def _describe_unknown_columns(columns: Sequence[str]) -> str:
     words = "unknown column" if len(columns) == 1 else f"{len(columns)} unknown columns:"
-    return f"{words} {_several(columns)}"
+    return f"{words} {_quote_columns(columns)}"
 
 
-def _several(columns: Sequence[str]) -> str:
+def _quote_columns(columns: Sequence[str]) -> str:
     return repr(columns[0]) if len(columns) == 1 else listed(columns, MOST_NAMED)
 
 
-def _missing(absent: Mapping[int, str]) -> str:
+def _describe_missing_columns(absent: Mapping[int, str]) -> str:
     words = "the column {} is missing" if len(absent) == 1 else "the columns {} are missing"
     return words.format(", ".join(absent.values()))

@@ -12,7 +12,7 @@ from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.recorded.disorder import find_disorder
-from vsacli.trajectory.recorded.samples import Samples
+from vsacli.trajectory.recorded.samples import SignalSamples
 
 LARGEST_VALUE = 1e100
 """Largest value; larger ones are no motion of a robot, and their squares, which fits need, may overflow."""
@@ -46,7 +46,7 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         )
 
 
-def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
+def sample_problems(records: Sequence[SignalSamples]) -> Iterator[SampleProblem]:
     """Yield the problems of recorded signals: too few samples, once for all signals, and of their values."""
     most = max(records, key=lambda each: each.signal.spline_degree, default=None)
     if most is not None and len(most.time) <= (degree := most.signal.spline_degree):
@@ -56,7 +56,7 @@ def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
         yield from _value_problems(record)
 
 
-def _value_problems(samples: Samples) -> Iterator[SampleProblem]:
+def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
     """Yield the problems of values: not finite, too large, or not positive where required."""
     signal = samples.signal
     name = signal.names[0]

@@ -21,7 +21,7 @@ from vsacli.trajectory.times import stretch
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Samples:
+class SignalSamples:
     """A signal at recorded times; `time_problems` and `sample_problems` check whether it can be used.
 
     Attributes:
@@ -48,7 +48,7 @@ class Samples:
         values: FloatArray,
         derivatives: tuple[FloatArray | None, ...],
         labels: tuple[str, ...],
-    ) -> Samples:
+    ) -> SignalSamples:
         """Return samples from stamps, (samples,), s, counted from any instant."""
         start = float(stamps[0]) if len(stamps) else 0.0
         return cls(
@@ -88,7 +88,7 @@ class Samples:
         pairs = zip(self.signal.names, (self.values, *self.derivatives), strict=True)
         return {name: rows for name, rows in pairs if rows is not None}
 
-    def with_columns(self, columns: Mapping[str, FloatArray]) -> Samples:
+    def with_columns(self, columns: Mapping[str, FloatArray]) -> SignalSamples:
         """Return the samples with other numbers in the same columns, see `columns`."""
         value, *names = self.signal.names
         return replace(self, values=columns[value], derivatives=tuple(map(columns.get, names)))
@@ -107,7 +107,7 @@ class Samples:
                 self.signal.names, self.labels, self.time, self.derivatives, fit, start=self.start
             )
 
-    def stretched(self, factor: float) -> Samples:
+    def stretched(self, factor: float) -> SignalSamples:
         """Return the samples further apart by a factor, with given derivatives scaled accordingly."""
         derivatives = tuple(
             None if given is None else given / factor**order
@@ -132,7 +132,7 @@ class SampledProfile:
         warnings: sentences on estimated values, and on given derivatives that do not follow from the values.
     """
 
-    record: Samples
+    record: SignalSamples
     fit: Fit
     choice: FitChoice = AS_IT_ASKS_FOR
     resampled: bool = False
@@ -141,7 +141,7 @@ class SampledProfile:
     @classmethod
     def of(
         cls,
-        record: Samples,
+        record: SignalSamples,
         choice: FitChoice = AS_IT_ASKS_FOR,
         *,
         resampled: bool = False,
@@ -246,7 +246,7 @@ class SampledProfile:
     def at(self, time: FloatArray) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         if self._through_all:
-            return hermite.interpolated(self.record.time, self.record.rows, time)
+            return hermite.interpolate_hermite(self.record.time, self.record.rows, time)
         return self.fit.at(time, self.record.signal.orders)
 
     def advice_without_derivative(self) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
-from vsacli.trajectory.recorded.even_stamps import resolution
+from vsacli.trajectory.recorded.even_stamps import stamp_resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
     ENOUGH_ROWS,
@@ -75,4 +75,4 @@ def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:
     if len(steps) < 2:
         return 0.0
     change = float(np.median(np.abs(np.diff(steps))))
-    return max(0.0, change - 2 * resolution(stamps)) / usual
+    return max(0.0, change - 2 * stamp_resolution(stamps)) / usual
