@@ -133,7 +133,7 @@ class Declaration(ABC):
     @classmethod
     def record(cls, use: Use) -> type[Self]:
         """Return the record class for a use."""
-        made: type[Self] = _record(cls, use)
+        made: type[Self] = _declare_record(cls, use)
         return made
 
     def __post_init__(self) -> None:
@@ -144,7 +144,7 @@ class Declaration(ABC):
 
 
 @cache
-def _record(cls: type[Declaration], use: Use) -> Any:
+def _declare_record(cls: type[Declaration], use: Use) -> Any:
     fields = [(name, Any, field) for name, field in cls.fields(use).items()]
     name = f"{'Rigid' if use.rigid else ''}{use.signal.key.capitalize()}{cls.__name__}"
     namespace = {"__doc__": cls.meaning(use), "use": use}
@@ -266,6 +266,6 @@ def same_time(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=SAME_TIME)
 
 
-def numbers(values: Values) -> tuple[float, ...]:
+def nan_for_none(values: Values) -> tuple[float, ...]:
     """Return values with NaN in place of None."""
     return tuple(math.nan if value is None else value for value in values)

@@ -17,7 +17,7 @@ from vsacli.base.signals import POSITION, WRENCH
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import integer
 from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +150,7 @@ class Polynomial(Formula):
 
     def over(self, span: tuple[float, float]) -> RestToRest:
         """See `Formula.over`."""
-        start, end = numbers(self.start), numbers(self.end)
+        start, end = nan_for_none(self.start), nan_for_none(self.end)
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
 
@@ -173,4 +173,4 @@ class Hold(Formula):
 
     def over(self, span: tuple[float, float]) -> ConstantProfile:
         """See `Formula.over`."""
-        return ConstantProfile(signal=self.signal, span=span, value=numbers(self.value))
+        return ConstantProfile(signal=self.signal, span=span, value=nan_for_none(self.value))

@@ -24,7 +24,7 @@ from vsacli.trajectory.curves.via_points import Via
 Position: TypeAlias = tuple[float, ...]
 
 
-class Part(Declaration):
+class SequencePart(Declaration):
     """A motion with a duration of its own, whose start may follow from the previous part."""
 
     opening: ClassVar[tuple[str | int, ...]]
@@ -49,7 +49,7 @@ class Part(Declaration):
         return iter(())
 
 
-class _Timed(Part):
+class _Timed(SequencePart):
     """A part with a required duration."""
 
     duration: float
@@ -72,7 +72,7 @@ class Dwell(_Timed):
     begins = None
 
     def placed(self, span: tuple[float, float], here: Position) -> ConstantProfile:
-        """See `Part.placed`."""
+        """See `SequencePart.placed`."""
         return ConstantProfile(signal=POSITION, span=span, value=here)
 
 
@@ -104,16 +104,16 @@ class PolynomialPart(_Timed):
 
     @property
     def begins(self) -> Position | None:
-        """See `Part.begins`."""
+        """See `SequencePart.begins`."""
         return self.start
 
     def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
-        """See `Part.placed`."""
+        """See `SequencePart.placed`."""
         start = here if self.start is None else self.start
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
-class _Standalone(Formula, Part):
+class _Standalone(Formula, SequencePart):
     """A formula that is also a part; its start does not depend on the previous part."""
 
     @property
@@ -128,11 +128,11 @@ class _Standalone(Formula, Part):
         return start
 
     def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
-        """See `Part.placed`."""
+        """See `SequencePart.placed`."""
         return self.over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """See `Part.own_problems`."""
+        """See `SequencePart.own_problems`."""
         return self.problems_over(self.lasts)
 
 
@@ -189,7 +189,7 @@ class SinusoidsPart(SumOfSinusoids, _Standalone):
         return self.duration
 
 
-PARTS: dict[str, type[Part]] = {
+PARTS: dict[str, type[SequencePart]] = {
     "polynomial": PolynomialPart,
     "via": ViaPart,
     "sinusoids": SinusoidsPart,
@@ -200,7 +200,7 @@ PARTS: dict[str, type[Part]] = {
 class Sequence(Formula):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[SequencePart, ...]
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
@@ -276,7 +276,7 @@ class Sequence(Formula):
             signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span))
         )
 
-    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
+    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[SequencePart, ClosedForm]]:
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
         here = next(part.begins for part in self.parts if part.begins is not None)
         for part, piece in zip(self.parts, pairwise(ends), strict=True):

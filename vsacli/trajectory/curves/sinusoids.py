@@ -15,7 +15,7 @@ from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
 from vsacli.trajectory.curves.closed_form import ClosedForm, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 from vsacli.trajectory.curves.steps import stepwise
 from vsacli.trajectory.times import MAX_STEPS
 
@@ -236,9 +236,9 @@ class SumOfSinusoids(Formula):
             signal=self.signal,
             span=span,
             cycles=self.frequency * duration,
-            offset=numbers(self.offset),
-            sine=tuple(map(numbers, self.sine)),
-            cosine=tuple(map(numbers, self.cosine)),
+            offset=nan_for_none(self.offset),
+            sine=tuple(map(nan_for_none, self.sine)),
+            cosine=tuple(map(nan_for_none, self.cosine)),
             ramp=self.ramp / duration,
         )
 

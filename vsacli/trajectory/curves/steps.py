@@ -16,7 +16,7 @@ from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import WRENCH, Signal
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, Number, integer, number, value
 from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile
-from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, numbers, odd
+from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, nan_for_none, odd
 from vsacli.trajectory.curves.polynomial import AXES, RestToRest
 from vsacli.trajectory.times import stretch
 
@@ -195,5 +195,5 @@ class Steps(Formula):
         ends = [
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])
         ]  # rounding must not make them overlap
-        levels, changes = list(map(numbers, self.levels)), list(zip(starts, ends, strict=True))
+        levels, changes = list(map(nan_for_none, self.levels)), list(zip(starts, ends, strict=True))
         return stepwise(self.signal, span, self.degree, levels, changes)

@@ -17,7 +17,7 @@ from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, Number, integer, value
 from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighboring points, relative to the peak of each derivative;
@@ -79,10 +79,10 @@ class ViaPoints(ClosedForm):
         return times
 
     @cached_property
-    def _given(self) -> BoolArray:
+    def _specified(self) -> BoolArray:
         """Mask of components with values, (components,)."""
-        given: BoolArray = ~np.isnan(self.points[0])
-        return given
+        specified: BoolArray = ~np.isnan(self.points[0])
+        return specified
 
     @cached_property
     def _derivatives(self) -> FloatArray:
@@ -92,7 +92,7 @@ class ViaPoints(ClosedForm):
         """
         from scipy.interpolate import make_interp_spline
 
-        points, shares = np.array(self.points)[:, self._given], np.array(self.shares)
+        points, shares = np.array(self.points)[:, self._specified], np.array(self.shares)
         vanishing = (self.degree - 1) // 2
         rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
         with np.errstate(all="ignore"):  # poorly spaced points are refused below
@@ -126,7 +126,7 @@ class ViaPoints(ClosedForm):
 
         rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
         for order, total in enumerate(series):
-            rows[order, self._given] = total / np.float64(last - first) ** order
+            rows[order, self._specified] = total / np.float64(last - first) ** order
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
@@ -140,12 +140,12 @@ class ViaPoints(ClosedForm):
             InputError: see `at`.
         """
         times = [np.union1d(self.breakpoints, zeros) for zeros in self._zeros()]
-        found = np.full((4, self.components), np.nan)
-        for component, time in zip(np.flatnonzero(self._given), times, strict=True):
+        rows = np.full((4, self.components), np.nan)
+        for component, time in zip(np.flatnonzero(self._specified), times, strict=True):
             values = self.at(time)[0, component]
             low, high = values.argmin(), values.argmax()
-            found[:, component] = values[low], time[low], values[high], time[high]
-        return ProfileExtremes(*found)
+            rows[:, component] = values[low], time[low], values[high], time[high]
+        return ProfileExtremes(*rows)
 
     def _zeros(self) -> Sequence[FloatArray]:
         """Return the times, s, at which the first derivative of each given component vanishes."""
@@ -157,7 +157,7 @@ class ViaPoints(ClosedForm):
         powers = self._derivatives[orders, :, :-1] * (orders / factorials)[:, None, None]
         slope = PPoly(np.moveaxis(powers, 1, 2), np.array(self.shares))
         roots = slope.roots(discontinuity=False, extrapolate=False)
-        return [first + (last - first) * found[np.isfinite(found)] for found in roots]
+        return [first + (last - first) * root[np.isfinite(root)] for root in roots]
 
 
 def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
@@ -302,7 +302,7 @@ class Via(Formula):
 
     def over(self, span: tuple[float, float]) -> ViaPoints:
         """See `Formula.over`."""
-        points = tuple(map(numbers, self.points))
+        points = tuple(map(nan_for_none, self.points))
         if self.times is None:
             shares = passing_shares(points, self.degree)
         else:

@@ -1,8 +1,8 @@
 """Solution of (14) for a potential by numerical continuation, on the branch of a start.
 
 `LevelCurves.step` is a predictor-corrector step along a level curve of the torque that stays on one monotone
-piece of the stiffness. `Branch` continues the start to the torque of a sample, and from there to both ends of
-the piece and to the demanded stiffness.
+piece of the stiffness. `ContinuedBranch` continues the start to the torque of a sample, and from there to
+both ends of the piece and to the demanded stiffness.
 """
 
 from __future__ import annotations
@@ -73,13 +73,13 @@ class Spot(NamedTuple):
     @property
     def steepness(self) -> FloatArray:
         """Length of the torque's gradient."""
-        return length(self.torque_1, self.torque_2)
+        return vector_length(self.torque_1, self.torque_2)
 
     @property
     def sine(self) -> FloatArray:
         """Sine of the angle from the torque's gradient to that of the stiffness: zero where A is singular."""
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
-        return determinant / (self.steepness * length(self.stiffness_1, self.stiffness_2))
+        return determinant / (self.steepness * vector_length(self.stiffness_1, self.stiffness_2))
 
     @property
     def slope(self) -> FloatArray:
@@ -105,7 +105,7 @@ class Spot(NamedTuple):
         return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
 
 
-def length(a: FloatArray, b: FloatArray) -> FloatArray:
+def vector_length(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the length of a vector; `numpy.hypot` takes ten times as long to avoid overflow."""
     return np.sqrt(a * a + b * b)
 
@@ -190,12 +190,12 @@ class LevelCurves:
         onto = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
         correction = onto * predicted.torque_1, onto * predicted.torque_2
         reached = self.moved(spot, (step[0] + correction[0], step[1] + correction[1]), q)
-        size, left = length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
+        size, left = vector_length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
         explained = h * (spot.slope + reached.slope) / 2
         change = self.onto(reached, tau_e).stiffness - self.onto(spot, tau_e).stiffness
         turned = first * reached.along[0] + second * reached.along[1]
         stays = (
-            (length(step[0], step[1]) + size <= 2 * MAX_STEP)
+            (vector_length(step[0], step[1]) + size <= 2 * MAX_STEP)
             & (left <= np.minimum(CONTRACTION * size + LEAST_STEP, LEVEL_ERROR))
             & (turned >= LEAST_COSINE)
             & ((np.abs(h) < SHORT) | (np.abs(change - explained) <= MOST_UNEXPLAINED * np.abs(explained)))
@@ -222,7 +222,7 @@ RESIDUAL = OfRounding(1e-10, power=0.75)
 """Largest error of a solution: of the stiffness; of the torque, as a share of its change over the ranges."""
 
 
-class Piece(NamedTuple):
+class StiffnessPiece(NamedTuple):
     """A point of the piece, and its ends of least and of largest stiffness."""
 
     seed: Spot
@@ -230,7 +230,7 @@ class Piece(NamedTuple):
     high: Spot
 
 
-class Branch:
+class ContinuedBranch:
     """Solutions continued from a start, at which q = 0.
 
     Attributes:
@@ -240,7 +240,7 @@ class Branch:
 
     def __init__(self, curves: LevelCurves, phi: float, theta_2: float) -> None:
         self._curves = curves
-        self._known: tuple[tuple[FloatArray, FloatArray], Piece] | None = None
+        self._last: tuple[tuple[FloatArray, FloatArray], StiffnessPiece] | None = None
         with np.errstate(all="ignore"):
             self.start = curves.spot(np.array([phi]), np.array([theta_2]), np.zeros(1))
             self.orientation = float(np.sign(self.start.sine[0]))
@@ -249,7 +249,7 @@ class Branch:
     def stiffest(self) -> Spot:
         """Point of the largest stiffness at the torque of the start, arrays (1,)."""
         with np.errstate(all="ignore"):
-            return self._followed(self.start.tau_e, np.zeros(1)).high
+            return self._piece_by_walks(self.start.tau_e, np.zeros(1)).high
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Mechanism.solve`."""
@@ -258,8 +258,8 @@ class Branch:
             none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             lower = np.where(none, 0.0, low.stiffness)
             inside = (stiffness > lower) & (stiffness < high.stiffness)
-            found = self._met(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
-            failed = inside & ~self._is_met(found, stiffness, tau_e)
+            solution = self._point_of_stiffness(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
+            failed = inside & ~self._is_solved(solution, stiffness, tau_e)
             end = high.chosen(stiffness >= high.stiffness, low)
         return PairSolution(
             lower=np.where(failed, np.nan, lower),
@@ -267,29 +267,31 @@ class Branch:
             lower_critical=~none & self._is_critical(low),
             upper_critical=self._is_critical(high),
             slack_below=np.zeros_like(failed),
-            phi_1=np.where(inside, found.phi, end.phi),
-            phi_2=np.where(inside, found.s, end.s),
+            phi_1=np.where(inside, solution.phi, end.phi),
+            phi_2=np.where(inside, solution.s, end.s),
         )
 
-    def _piece(self, tau_e: FloatArray, q: FloatArray) -> Piece:
+    def _piece(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces at torques and positions.
 
         The last pieces are kept, since searches solve for the same torques repeatedly.
         """
         if not isinstance(tau_e, np.ndarray):
-            return self._followed(tau_e, q)
-        known = self._known
-        if known is None or not all(map(np.array_equal, known[0], (tau_e, q))):
-            self._known = known = (tau_e.copy(), q.copy()), self._followed(tau_e, q)
-        return known[1]
+            return self._piece_by_walks(tau_e, q)
+        last = self._last
+        if last is None or not all(map(np.array_equal, last[0], (tau_e, q))):
+            self._last = last = (tau_e.copy(), q.copy()), self._piece_by_walks(tau_e, q)
+        return last[1]
 
-    def _followed(self, tau_e: FloatArray, q: FloatArray) -> Piece:
+    def _piece_by_walks(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces, by walks to both ends, computed as one array."""
         seed, count = self._seed(tau_e, q), len(tau_e)
         both = [np.concatenate((each, each)) for each in (tau_e, q, *seed)]
         side = np.concatenate((np.full_like(tau_e, -1.0), np.ones_like(tau_e)))
         ends = self._walk(Spot(*both[2:]), side, side * np.inf, both[0], both[1])
-        return Piece(seed, Spot(*(each[:count] for each in ends)), Spot(*(each[count:] for each in ends)))
+        return StiffnessPiece(
+            seed, Spot(*(each[:count] for each in ends)), Spot(*(each[count:] for each in ends))
+        )
 
     def _seed(self, tau_e: FloatArray, q: FloatArray) -> Spot:
         """Return a point of the branch at torques and positions, NaN where there is none.
@@ -330,14 +332,16 @@ class Branch:
             h, *values = state
             spot, (direction, goal, tau_e, q) = Spot(*values), constants
             reached, stays = self._curves.step(spot, h * direction * self.orientation, tau_e, q)
-            here, there = (
+            room_before, room_after = (
                 np.minimum(self._curves.distance(each), direction * (goal - each.stiffness) / spot.stiffness)
                 for each in (self._curves.onto(spot, tau_e), self._curves.onto(reached, tau_e))
             )
-            inside = stays & (there >= 0)
-            share = np.where(stays, np.minimum(np.maximum(here / (here - there), 0.02), 0.98), 1 / 3)
-            over = ~inside & ((h * share <= LEAST_STEP) | (here <= LEAST_STEP))
-            over = over | (length(*spot.to(tau_e, goal)) <= CLOSE * np.abs(spot.sine))
+            inside = stays & (room_after >= 0)
+            share = np.where(
+                stays, np.minimum(np.maximum(room_before / (room_before - room_after), 0.02), 0.98), 1 / 3
+            )
+            over = ~inside & ((h * share <= LEAST_STEP) | (room_before <= LEAST_STEP))
+            over = over | (vector_length(*spot.to(tau_e, goal)) <= CLOSE * np.abs(spot.sine))
             spot = reached.chosen(inside, spot)
             none = spot.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             h = np.where(inside, np.minimum(1.5 * h, MAX_STEP), h * share)
@@ -348,21 +352,21 @@ class Branch:
         end = self._curves.onto(Spot(*values), tau_e)
         return self._curves.spot(end.phi, end.s, q)
 
-    def _met(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
+    def _point_of_stiffness(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
         """Return the point of the piece with a stiffness: by a walk, then by Newton's method."""
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
         spot = self._walk(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):
             step = spot.to(tau_e, demand)
-            small = length(*step) <= CONTRACTION * np.abs(spot.sine)
+            small = vector_length(*step) <= CONTRACTION * np.abs(spot.sine)
             spot = self._curves.moved(spot, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q)
         return spot
 
-    def _is_met(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
-        met: BoolArray = (np.abs(tau_e - spot.tau_e) <= RESIDUAL * spot.steepness) & (
+    def _is_solved(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
+        solved: BoolArray = (np.abs(tau_e - spot.tau_e) <= RESIDUAL * spot.steepness) & (
             np.abs(demand - spot.stiffness) <= RESIDUAL * (self.start.stiffness + demand)
         )
-        return met
+        return solved
 
     def _is_critical(self, spot: Spot) -> BoolArray:
         critical: BoolArray = np.abs(spot.sine) / 10 <= LEAST_SINE

@@ -62,7 +62,7 @@ class PotentialEnergy:
         self._constants = {name: np.float64(number) for name, number in constants.items()}
         self._row_functions: dict[Truncation, RowFunction] = {}
 
-    def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
+    def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> PotentialDerivatives:
         """Return the derivatives by q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
 
         For numbers, a program traced from the series is run: the series itself would take ten times as long,
@@ -70,14 +70,18 @@ class PotentialEnergy:
         """
         rows = [coordinates[..., number] for number in range(3)]
         if not isinstance(coordinates, np.ndarray):
-            return Derivatives(dict(zip(truncation.orders, self._series(rows, truncation), strict=True)))
+            return PotentialDerivatives(
+                dict(zip(truncation.orders, self._series(rows, truncation), strict=True))
+            )
         if truncation not in self._row_functions:
             self._row_functions[truncation] = self._traced(truncation)
         function, shape = self._row_functions[truncation], coordinates.shape[:-1]
         flat = [row.ravel() for row in rows]
         values = np.empty((len(truncation.orders), flat[0].size))
         function(flat, values, function.workspace(flat[0].size))
-        return Derivatives(dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True)))
+        return PotentialDerivatives(
+            dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True))
+        )
 
     def _traced(self, truncation: Truncation) -> RowFunction:
         from vsacli.compute.tracing import Kind, trace
@@ -101,7 +105,7 @@ class PotentialEnergy:
         return [energy.derivative(order) + zero for order in truncation.orders]
 
 
-class Derivatives:
+class PotentialDerivatives:
     """Derivatives of a potential over q, theta_1 and theta_2, by how often it is differentiated over each."""
 
     def __init__(self, by_order: Mapping[Order, FloatArray]) -> None:
@@ -135,11 +139,11 @@ class PotentialState(MechanismState):
         self._potential, self._coordinates = potential, coordinates
 
     @cached_property
-    def _first(self) -> Derivatives:
+    def _first(self) -> PotentialDerivatives:
         return self._potential.derivatives(self._coordinates, TORQUES)
 
     @cached_property
-    def _all(self) -> Derivatives:
+    def _all(self) -> PotentialDerivatives:
         return self._potential.derivatives(self._coordinates, ACCELERATIONS)
 
     @property
@@ -200,16 +204,19 @@ class PotentialState(MechanismState):
 
     def _rate(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
         """Return the rate of a derivative of the potential."""
-        return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0]))
+        return sum(
+            (self._all(*of, i) * each for i, each in _position_rates(rates)), np.zeros_like(rates[..., 0])
+        )
 
     def _curvature(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
         """Return the terms quadratic in the rates of the second time derivative of a partial derivative."""
         return sum(
-            (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0])
+            (self._rate((*of, i), rates) * each for i, each in _position_rates(rates)),
+            np.zeros_like(rates[..., 0]),
         )
 
 
-def _motion(rates: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+def _position_rates(rates: FloatArray) -> Iterator[tuple[int, FloatArray]]:
     """Return the rates of q, theta_1 and theta_2 by index, from rates of the coordinates."""
     dphi, ds, dq = (rates[..., number] for number in range(3))
     return enumerate((dq, dphi + dq, ds))
