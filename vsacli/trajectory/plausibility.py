@@ -90,7 +90,7 @@ class CheckedTrajectory:
         return self.robot.checked.sizes
 
     @cached_property
-    def moved(self) -> FloatArray | None:
+    def sampled_motion(self) -> FloatArray | None:
         """Position and its derivatives, (orders, joints, instants); None if they are recorded."""
         return None if self.motion is None else self.motion.at(np.linspace(*self.times.span, INSTANTS))
 
@@ -123,7 +123,7 @@ class CheckedTrajectory:
                 unit = quantity.unit(self.robot.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
 
-    def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
+    def measure_timing(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
         """Yield the time or frequency that sets the timing, with the largest size of all joints."""
         of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
         timings = [each for each in of_motion if each.path[-1] == "frequency"]
@@ -147,17 +147,17 @@ def _measure_joint_positions(checked: CheckedTrajectory, unit: str) -> Iterator[
 
 def _measure_slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
     """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot."""
-    if checked.moved is not None and checked.duration > LONG:
-        travel = np.abs(np.diff(checked.moved[0])).sum(axis=1) / checked.travels
+    if checked.sampled_motion is not None and checked.duration > LONG:
+        travel = np.abs(np.diff(checked.sampled_motion[0])).sum(axis=1) / checked.travels
         if travel.any():
-            yield from checked.paced(units.TIME, travel / checked.duration)
+            yield from checked.measure_timing(units.TIME, travel / checked.duration)
 
 
 def _measure_accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
     """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
-    if checked.moved is not None and not checked.robot.placeholder:
+    if checked.sampled_motion is not None and not checked.robot.placeholder:
         levers = np.where(checked.revolute, checked.sizes.levers, 1.0)
-        yield from checked.paced(quantity, np.abs(checked.moved[2]).max(axis=1) * levers)
+        yield from checked.measure_timing(quantity, np.abs(checked.sampled_motion[2]).max(axis=1) * levers)
 
 
 def _measure_rate(checked: CheckedTrajectory) -> Iterator[Measured]:

@@ -112,8 +112,8 @@ class BodySizes:
         levers: distance from each joint to the farthest point of the stretched robot, m.
         mass: mass of all links, kg.
         inertias: inertia of each link alone about its joint, kg m^2; for a prismatic joint the mass, kg.
-        moved: inertia of all links that a joint of the stretched robot moves, kg m^2; for a prismatic joint
-            their mass, kg.
+        moved_inertias: inertia of all links that a joint of the stretched robot moves, kg m^2; for a
+            prismatic joint their mass, kg.
         loads: largest torque of the weight at each joint of the stretched robot, N m (N).
     """
 
@@ -131,7 +131,7 @@ class BodySizes:
         revolute = np.array([joint.is_revolute for joint in joints])
         self.inertias = masses * np.where(revolute, coms**2 + self.gyrations**2, 1.0)
         turned = _from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
-        self.moved = np.where(revolute, turned, mass)
+        self.moved_inertias = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
 
     @property

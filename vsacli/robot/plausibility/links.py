@@ -50,11 +50,11 @@ def _describe_triangle_violation(path: NumberPath, inertia: Inertia, file_lines:
     largest = names.pop(int(np.argmax(np.diag(inertia.tensor))))
     in_file = file_lines is None or _is_written((*path, largest), high, file_lines)
     if in_file and np.count_nonzero(inertia.tensor - np.diag(np.diag(inertia.tensor))) == 0:
-        moment, others = f"{largest} =", f"{' + '.join(names)} ="
+        moment, sum_of_others = f"{largest} =", f"{' + '.join(names)} ="
     else:
-        moment, others = "the largest principal moment", "the sum of the others"
+        moment, sum_of_others = "the largest principal moment", "the sum of the others"
     by = f"by {high - low - middle:.4g} {UNIT}"
-    return f"{moment} {high:.4g} {UNIT} exceeds {others} {low + middle:.4g} {UNIT} {by}"
+    return f"{moment} {high:.4g} {UNIT} exceeds {sum_of_others} {low + middle:.4g} {UNIT} {by}"
 
 
 def _is_written(path: NumberPath, value: float, file_lines: Written) -> bool:

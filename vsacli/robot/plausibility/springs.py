@@ -152,7 +152,7 @@ def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
     for number, joint in checked.driven:
         if joint.damper is not None and joint.actuator.sprung:
-            product = float(checked.sizes.moved[number]) * _least_stiffness(
+            product = float(checked.sizes.moved_inertias[number]) * _least_stiffness(
                 joint, checked.unloaded_ranges[number]
             )
             damping = joint.damper.range[1]

@@ -102,8 +102,8 @@ class Conversion:
         yield _HEADER
         for joint, origin in zip(self.robot.joints, self.chain.joints, strict=True):
             row = (joint.dh.a, joint.dh.alpha, joint.dh.d, joint.dh.theta, joint.link.mass)
-            others = len(origin.links) - 1
-            carried = origin.links[0].name + (f" + {others}" if others else "")
+            further = len(origin.links) - 1
+            carried = origin.links[0].name + (f" + {further}" if further else "")
             yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
@@ -139,14 +139,14 @@ class Conversion:
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
         joints = [joint.urdf for joint in self.chain.joints]
-        known = {
+        motor_data = {
             "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
             "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
         }
         taken = "taken over" if self.one_motor_each else "not taken over, since two motors share a joint"
-        for what, names in known.items():
+        for quantity, names in motor_data.items():
             if names:
-                yield f"{what} {taken}: {', '.join(names)}"
+                yield f"{quantity} {taken}: {', '.join(names)}"
 
 
 def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
@@ -273,12 +273,12 @@ def _convert_links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> l
     problems, links = Problems(path), []
     for joint, pose in zip(joints, frames.poses, strict=True):
         try:
-            links.append(_convert_link(joint.body.moved(inverse_pose(pose)), frames.scale))
+            links.append(_convert_link(joint.body.in_outer_frame(inverse_pose(pose)), frames.scale))
         except InvalidRecordError as error:
-            own, *others = joint.links
-            whole = f"{quoted(own.name)}{' with the links it carries' if others else ''}"
+            first, *carried = joint.links
+            whole = f"{quoted(first.name)}{' with the links it carries' if carried else ''}"
             for problem in error.fields:
-                problems.add(own.line, f"inertia of {whole}: {problem}")
+                problems.add(first.line, f"inertia of {whole}: {problem}")
     problems.check()
     return links
 

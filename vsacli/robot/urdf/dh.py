@@ -241,9 +241,9 @@ class KinematicResidual(NamedTuple):
 def kinematic_residual(chain: SerialChain, robot: Robot) -> KinematicResidual:
     """Compare the tips of chain and robot at random positions within the limits."""
     q = _random_joint_positions(chain.joints)
-    expected, found = _chain_tips(chain, q), _robot_tips(robot, q)
-    shift = np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1)
-    turn = np.linalg.norm(found[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+    expected, tips = _chain_tips(chain, q), _robot_tips(robot, q)
+    shift = np.linalg.norm(tips[:, :3, 3] - expected[:, :3, 3], axis=1)
+    turn = np.linalg.norm(tips[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
     return KinematicResidual(float(shift.max()), float(turn.max()))
 
 
@@ -251,8 +251,8 @@ def _random_joint_positions(joints: Sequence[ChainJoint]) -> FloatArray:
     """Return random positions, (samples, joints), rad (m)."""
     rng = np.random.default_rng(SEED)
     reach = np.array([DRAWN_HALF_WIDTH[joint.is_revolute] for joint in joints])
-    given = [joint.urdf.limit.position for joint in joints]
-    bounds = [limits or (-1e9, 1e9) for limits in given]
+    file_limits = [joint.urdf.limit.position for joint in joints]
+    bounds = [limits or (-1e9, 1e9) for limits in file_limits]
     lower, upper = np.clip(np.array(bounds).T, -reach, reach)
     return rng.uniform(lower, upper, (SAMPLES, len(joints)))
 

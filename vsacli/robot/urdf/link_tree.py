@@ -72,7 +72,7 @@ class RigidBody(NamedTuple):
     com: FloatArray
     inertia: FloatArray
 
-    def moved(self, pose: FloatArray) -> RigidBody:
+    def in_outer_frame(self, pose: FloatArray) -> RigidBody:
         """Return the body in another frame, in which its own frame has this pose."""
         rotation = pose[:3, :3]
         return RigidBody(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
@@ -220,7 +220,7 @@ class Urdf:
             link = parents[link].parent
         return path[::-1]
 
-    def followed(self, joint: UrdfJoint, released: Collection[str] = ()) -> Mimic:
+    def relation_to_leader(self, joint: UrdfJoint, released: Collection[str] = ()) -> Mimic:
         """Return the relation to the last leader in a chain of mimics; to itself without a leader.
 
         Joints named in `released` follow none.

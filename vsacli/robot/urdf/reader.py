@@ -197,8 +197,8 @@ def _root_link(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], p
     children = {joint.child for joint in joints.values()}
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
-        found = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
-        problems.fail(1, f"the links must form one tree, which has one root, but {found}")
+        reason = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
+        problems.fail(1, f"the links must form one tree, which has one root, but {reason}")
     circles = set(links) - {roots[0]} - {joint.child for joint in joints_below(roots[0], joints.values())}
     if circles:
         names = sorted(circles, key=lambda name: links[name].line)
@@ -231,7 +231,9 @@ class _Reader:
     def _body(self, inertial: Element, mass: Element, inertia: Element) -> RigidBody:
         xx, xy, xz, yy, yz, zz = (self._number(inertia, name) for name in _MOMENTS)
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return RigidBody(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
+        return RigidBody(self._non_negative(mass, "value"), np.zeros(3), tensor).in_outer_frame(
+            self._origin(inertial)
+        )
 
     def joint(self, element: Element) -> UrdfJoint:
         name = self.word(element, "name")
@@ -390,7 +392,7 @@ class _Reader:
 
     def _child(self, element: Element, tag: str) -> Element | None:
         """Return the only child with a tag; None without one."""
-        found = list(element.all(tag))
-        if len(found) > 1:
-            self._problems.add(found[1].line, f"{element.tag}: a second <{tag}>; one is expected")
-        return found[0] if found else None
+        children = list(element.all(tag))
+        if len(children) > 1:
+            self._problems.add(children[1].line, f"{element.tag}: a second <{tag}>; one is expected")
+        return children[0] if children else None

@@ -92,7 +92,7 @@ def held_joints(
     Raises:
         InputError: a position cannot be given, or has no effect.
     """
-    followed = [(joint, urdf.followed(joint, hold)) for joint in standing]
+    followed = [(joint, urdf.relation_to_leader(joint, hold)) for joint in standing]
     leaders = {mimic.leader: _default_position(urdf.joints[mimic.leader]) for _, mimic in followed}
     problems = Problems(urdf.file)
     for name, value in hold.items():
@@ -103,7 +103,7 @@ def held_joints(
             joint,
             mimic.multiplier * leaders[mimic.leader] + mimic.offset,
             mimic.leader,
-            joint.name in hold and urdf.followed(joint).leader in moving,
+            joint.name in hold and urdf.relation_to_leader(joint).leader in moving,
         )
         for joint, mimic in followed
     ]
@@ -151,7 +151,7 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
         return f"{shown} is {joint.type}, so it has no position to choose"
     if name in moving:
         return f"{shown} belongs to the chain, where it moves"
-    if (leader := urdf.followed(joint).leader) != name and leader not in moving:
+    if (leader := urdf.relation_to_leader(joint).leader) != name and leader not in moving:
         return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
     if name not in leaders:
         return f"{shown} is neither outside the chain nor below its base, so that it has no effect"
@@ -248,7 +248,8 @@ def serial_chain(
     names, hold = [joint.name for joint in path.moving], hold or {}
     side = _side_branch_joints(urdf, carried, path)
     follow = {
-        joint.name: urdf.followed(joint, hold).leader in names and _is_massless(urdf, joint) for joint in side
+        joint.name: urdf.relation_to_leader(joint, hold).leader in names and _is_massless(urdf, joint)
+        for joint in side
     }
     beside = [joint for joint in side if not follow[joint.name]]
     _check_joints(urdf, path, below_base, beside, hold)
@@ -294,7 +295,7 @@ def _check_joints(
     on_chain = {joint.name for joint in path.moving}
     for place, joints in (("outside the chain", beside), ("below the base", below_base)):
         for joint in joints:
-            leader = urdf.followed(joint, hold).leader
+            leader = urdf.relation_to_leader(joint, hold).leader
             if leader in on_chain:
                 reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
                 fix = f"hold it by --hold {shlex.quote(joint.name)}=0, which neglects its motion"
@@ -342,4 +343,6 @@ def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: C
 def _rigid_body_of(
     links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
 ) -> RigidBody:
-    return welded([link.body.moved(to_base @ poses[link.name]) for link in links if link.body is not None])
+    return welded(
+        [link.body.in_outer_frame(to_base @ poses[link.name]) for link in links if link.body is not None]
+    )

@@ -92,13 +92,13 @@ class _Groups:
             joints += self._urdf.above(self._link(element, "name"))[-1:]
         for element in group.all("chain"):
             joints += self._chain(element)
-        found = {joint.name: joint for joint in joints}
+        by_name = {joint.name: joint for joint in joints}
         for element in group.all("group"):
             inner = element.attributes.get("name", "")
             if inner not in self._groups:
                 self._problems.fail(element.line, f"there is no group {quoted(inner)}")
-            found |= self._joints(inner, (*around, name))
-        return found
+            by_name |= self._joints(inner, (*around, name))
+        return by_name
 
     def _joint(self, element: Element) -> UrdfJoint:
         name = element.attributes.get("name", "")

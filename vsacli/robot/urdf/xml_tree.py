@@ -52,9 +52,9 @@ def parse_xml(text: str, problems: Problems, expected: str) -> Element:
             or a limit is exceeded.
     """
     if not text.lstrip().startswith("<"):
-        found = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
-        if found:
-            problems.fail(0, f"is {found}, expected {expected} (XML)")
+        content = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
+        if content:
+            problems.fail(0, f"is {content}, expected {expected} (XML)")
     builder = _XmlTreeBuilder(problems)
     try:
         builder.parser.Parse(text, True)

@@ -16,7 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import integer
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile, added
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile, add_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 
@@ -64,7 +64,7 @@ class RestToRest(ClosedForm):
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, start=added(self.start, by), end=added(self.end, by))
+        return replace(self, start=add_constants(self.start, by), end=add_constants(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:
@@ -143,10 +143,10 @@ class Polynomial(Formula):
     def meaning(cls, use: Use) -> str:
         """Return the meaning for users."""
         if use.rigid:
-            same = "The same for a robot whose joints are all rigid"
-            return f"{same}: its torques do not depend on jerk and snap."
-        way = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
-        return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
+            sentence = "The same for a robot whose joints are all rigid"
+            return f"{sentence}: its torques do not depend on jerk and snap."
+        sentence = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
+        return f"{sentence}: all derivatives up to (degree-1)/2 vanish at both ends."
 
     def over(self, span: tuple[float, float]) -> RestToRest:
         """See `Formula.over`."""

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
-from vsacli.trajectory.curves.closed_form import ClosedForm, added
+from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 from vsacli.trajectory.curves.steps import stepwise
 from vsacli.trajectory.times import MAX_STEPS
@@ -119,13 +119,13 @@ class Sinusoids(ClosedForm):
     def _sampled_lowest(self, time: FloatArray) -> Lowest:
         """Return the smallest of the values at ascending times and at the minima next to them."""
         values = self.at(time)[0]
-        found = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
+        lowest = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
         for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
             times = np.union1d(time, self._minima(time, values[component], component))
             of_component = self.at(times)[0, component]
             best = of_component.argmin()
-            found.value[component], found.at[component] = of_component[best], times[best]
-        return found
+            lowest.value[component], lowest.at[component] = of_component[best], times[best]
+        return lowest
 
     def _minima(self, time: FloatArray, values: FloatArray, component: int) -> FloatArray:
         """Return the times of minima, by bisection next to samples without a smaller neighbor."""
@@ -141,7 +141,7 @@ class Sinusoids(ClosedForm):
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, offset=added(self.offset, by))
+        return replace(self, offset=add_constants(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
         first, last = self.span

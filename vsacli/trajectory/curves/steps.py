@@ -105,8 +105,10 @@ class PiecewiseProfile(ClosedForm):
             left, right = before.at(np.array(before.span)), after.at(np.array(after.span))
             difference = np.abs(right[:orders, :, 0] - left[:orders, :, 1])
             peaks = np.maximum(_peak_magnitudes(before), _peak_magnitudes(after))[:orders]
-            found = np.argwhere(difference > CONTINUOUS * peaks).tolist()
-            lowest = [(order, component) for order, component in found if order == found[0][0]]
+            discontinuous = np.argwhere(difference > CONTINUOUS * peaks).tolist()
+            lowest = [
+                (order, component) for order, component in discontinuous if order == discontinuous[0][0]
+            ]
             for order, component in lowest if lowest and lowest[0][0] == 0 else lowest[:1]:
                 sides = left[order, component, 1], right[order, component, 0]
                 yield Jump(index, order, component, *map(float, sides))

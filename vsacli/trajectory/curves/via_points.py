@@ -16,7 +16,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, Number, integer, value
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, added
+from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 SEAM = 1e-9
@@ -131,7 +131,7 @@ class ViaPoints(ClosedForm):
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, points=tuple(added(point, by) for point in self.points))
+        return replace(self, points=tuple(add_constants(point, by) for point in self.points))
 
     def extremes(self) -> ProfileExtremes:
         """Return the smallest and largest values, from the zeros of the first derivative.
@@ -175,9 +175,9 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
 
     corners = np.nan_to_num(np.asarray(points, dtype=np.float64))
     steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
-    way = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
+    lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
     half = (degree + 1) // 2
-    shares: FloatArray = betaincinv(half, half, way / (way[-1] or 1.0))
+    shares: FloatArray = betaincinv(half, half, lengths / (lengths[-1] or 1.0))
     return shares
 
 

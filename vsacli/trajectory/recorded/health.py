@@ -64,7 +64,7 @@ def check_health(
         for quantity, name, lower in zip(record.signal.quantities, names, (None, *names), strict=False):
             if name not in columns or not (lower is None or measured):
                 continue
-            for component in np.flatnonzero(record.given).tolist():
+            for component in np.flatnonzero(record.has_values).tolist():
                 row, unit = columns[name][component], _format_unit(quantity, component, types)
                 if lower is None:
                     angle = record.signal is POSITION

@@ -100,7 +100,7 @@ def interpolate_hermite(time: FloatArray, rows: FloatArray, at: FloatArray) -> F
     )
 
 
-def belong_together(time: FloatArray, rows: FloatArray) -> bool:
+def derivatives_are_consistent(time: FloatArray, rows: FloatArray) -> bool:
     """Return whether samples and all their derivatives are consistent, i.e. of one smooth function.
 
     Derivatives that were measured, or rounded to few digits, are not: polynomials between them oscillate.
@@ -109,14 +109,14 @@ def belong_together(time: FloatArray, rows: FloatArray) -> bool:
         time: see `interpolate_hermite`.
         rows: see `interpolate_hermite`; components that are all NaN are ignored.
     """
-    given = rows[:, ~np.isnan(rows[0]).all(axis=1)]
-    peaks = np.abs(given).max(axis=2)
-    changes = np.abs(np.diff(given[:-MATCHED])).max(axis=2)
+    present = rows[:, ~np.isnan(rows[0]).all(axis=1)]
+    peaks = np.abs(present).max(axis=2)
+    changes = np.abs(np.diff(present[:-MATCHED])).max(axis=2)
     lower = AGREEING * changes + ROUNDINGS * np.spacing(peaks[:-MATCHED])
     allowed = np.concatenate([lower, AGREEING * peaks[-1:]])
     parts = (slice(first, first + TOGETHER + 1) for first in range(0, len(time) - 1, TOGETHER))
     with np.errstate(all="ignore"):  # NaN after overflow counts as inconsistent
-        return all(np.all(_missed(time[part], given[:, :, part]) <= allowed) for part in parts)
+        return all(np.all(_missed(time[part], present[:, :, part]) <= allowed) for part in parts)
 
 
 def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:

@@ -60,14 +60,14 @@ def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
     """Yield the problems of values: not finite, too large, or not positive where required."""
     signal = samples.signal
     name = signal.names[0]
-    given, stamps = np.flatnonzero(samples.given).tolist(), samples.start + samples.time
+    components, stamps = np.flatnonzero(samples.has_values).tolist(), samples.start + samples.time
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
-        for joint, row in () if rows is None else zip(given, rows[given], strict=True):
+        for joint, row in () if rows is None else zip(components, rows[components], strict=True):
             yield from _breach(column, joint, stamps, row, np.isfinite(row), "finite")
             small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
             yield from _breach(column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size")
     if signal.positive:
-        for joint, row in zip(given, samples.values[given], strict=True):
+        for joint, row in zip(components, samples.values[components], strict=True):
             yield from _breach(name, joint, stamps, row, ~(row <= 0), "positive")
 
 

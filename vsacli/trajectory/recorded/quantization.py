@@ -84,5 +84,5 @@ def _quantum(values: FloatArray) -> float:
     changes = np.abs(np.diff(values, n=2))
     changes = changes[changes > ROUNDING * largest]
     place = int(FINEST * len(changes))
-    found = float(np.partition(changes, place)[place]) if len(changes) else 0.0
-    return max(found, UNRESOLVED * largest)
+    change = float(np.partition(changes, place)[place]) if len(changes) else 0.0
+    return max(change, UNRESOLVED * largest)

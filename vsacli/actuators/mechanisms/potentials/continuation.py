@@ -91,7 +91,7 @@ class Spot(NamedTuple):
         """Unit vector along the level curve, over the ranges; the stiffness grows if the sine is positive."""
         return -self.torque_2 / self.steepness, self.torque_1 / self.steepness
 
-    def to(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def newton_step(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the Newton step to a torque and a stiffness, as a share of the ranges."""
         missing = tau_e - self.tau_e, stiffness - self.stiffness
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
@@ -100,7 +100,7 @@ class Spot(NamedTuple):
             (self.torque_1 * missing[1] - self.stiffness_1 * missing[0]) / determinant,
         )
 
-    def chosen(self, mask: BoolArray, other: Spot) -> Spot:
+    def where(self, mask: BoolArray, other: Spot) -> Spot:
         """Return this point where the mask holds, else the other."""
         return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
 
@@ -141,7 +141,7 @@ class LevelCurves:
             rows.stiffness_2 * by_s,
         )
 
-    def moved(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
+    def move(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
         """Return a point moved by a step, as a share of the ranges."""
         return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
 
@@ -186,10 +186,10 @@ class LevelCurves:
         by_q = spot.torque_1 / self._width[0] - spot.stiffness  # of the torque, at constant phi and theta_2
         onto = (tau_e - spot.tau_e - by_q * dq) / (spot.steepness * spot.steepness)
         step = h * first + onto * spot.torque_1, h * second + onto * spot.torque_2
-        predicted = self.moved(spot, step, q)
+        predicted = self.move(spot, step, q)
         onto = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
         correction = onto * predicted.torque_1, onto * predicted.torque_2
-        reached = self.moved(spot, (step[0] + correction[0], step[1] + correction[1]), q)
+        reached = self.move(spot, (step[0] + correction[0], step[1] + correction[1]), q)
         size, left = vector_length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
         explained = h * (spot.slope + reached.slope) / 2
         change = self.onto(reached, tau_e).stiffness - self.onto(spot, tau_e).stiffness
@@ -260,7 +260,7 @@ class ContinuedBranch:
             inside = (stiffness > lower) & (stiffness < high.stiffness)
             solution = self._point_of_stiffness(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
             failed = inside & ~self._is_solved(solution, stiffness, tau_e)
-            end = high.chosen(stiffness >= high.stiffness, low)
+            end = high.where(stiffness >= high.stiffness, low)
         return PairSolution(
             lower=np.where(failed, np.nan, lower),
             upper=np.where(failed, np.nan, high.stiffness),
@@ -309,14 +309,14 @@ class ContinuedBranch:
                 spot, np.zeros_like(h), start + target * (tau_e - start), target * q, (target - share) * q
             )
             stays = stays & (self._curves.distance(reached) >= 0)
-            spot, share = reached.chosen(stays, spot), np.where(stays, target, share)
+            spot, share = reached.where(stays, spot), np.where(stays, target, share)
             aside, better = self._curves.step(spot, h, start + share * (tau_e - start), share * q)
             better = better & (self._curves.distance(aside) >= 0)
             better = better & (self._curves.room(aside) > self._curves.room(spot))
             h = np.where(better, 1.5 * h, -h / 2)
             h = np.where(np.abs(h) > MAX_STEP, MAX_STEP, h)
             gain = np.where(stays, 2 * gain, gain / 3)
-            return (share, gain, h, *aside.chosen(better, spot)), (share == 1) | ~(gain > LEAST_STEP)
+            return (share, gain, h, *aside.where(better, spot)), (share == 1) | ~(gain > LEAST_STEP)
 
         like = np.zeros_like(tau_e)
         begin = (like, like + 0.25, like + 0.02, *(like + each for each in self.start))
@@ -341,8 +341,8 @@ class ContinuedBranch:
                 stays, np.minimum(np.maximum(room_before / (room_before - room_after), 0.02), 0.98), 1 / 3
             )
             over = ~inside & ((h * share <= LEAST_STEP) | (room_before <= LEAST_STEP))
-            over = over | (vector_length(*spot.to(tau_e, goal)) <= CLOSE * np.abs(spot.sine))
-            spot = reached.chosen(inside, spot)
+            over = over | (vector_length(*spot.newton_step(tau_e, goal)) <= CLOSE * np.abs(spot.sine))
+            spot = reached.where(inside, spot)
             none = spot.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             h = np.where(inside, np.minimum(1.5 * h, MAX_STEP), h * share)
             return (h, *spot), over | none | ~(spot.sine * self.orientation > LEAST_SINE)
@@ -357,9 +357,9 @@ class ContinuedBranch:
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
         spot = self._walk(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):
-            step = spot.to(tau_e, demand)
+            step = spot.newton_step(tau_e, demand)
             small = vector_length(*step) <= CONTRACTION * np.abs(spot.sine)
-            spot = self._curves.moved(spot, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q)
+            spot = self._curves.move(spot, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q)
         return spot
 
     def _is_solved(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:

@@ -212,19 +212,19 @@ class _CamSide:
 
     def __init__(self, lift: LiftOf, end: float, k: float, pretension: tuple[float, float]) -> None:
         low, high = pretension
-        self._held = _ZeroCurve(lift, lambda lift: lift.held(k, high))
-        self._turning = _ZeroCurve(lift, lambda lift: lift.turning(k))
+        self._outer_curve = _ZeroCurve(lift, lambda lift: lift.torque_error(k, high))
+        self._fold_curve = _ZeroCurve(lift, lambda lift: lift.fold_condition(k))
         self._ends = {
-            PRETENSION: _ZeroCurve(lift, lambda lift: lift.held(k, low)),
-            FOLD: self._turning,
-            PEAK: _ZeroCurve(lift, lambda lift: lift.rising(k)),
+            PRETENSION: _ZeroCurve(lift, lambda lift: lift.torque_error(k, low)),
+            FOLD: self._fold_curve,
+            PEAK: _ZeroCurve(lift, lambda lift: lift.torque_peak_condition(k)),
         }
         phi = end * SHARES
         self.lift_at_nodes = lift(phi)
-        turns = [curve.turns(phi) for curve in (self._held, *self._ends.values())]
+        turns = [curve.turns(phi) for curve in (self._outer_curve, *self._ends.values())]
         self._phi = np.unique(np.concatenate((phi, *turns)))
         self._at_nodes = {end: curve(self._phi) for end, curve in self._ends.items()}
-        held = self._held(self._phi)
+        held = self._outer_curve(self._phi)
         falling = np.flatnonzero(held.a_slope <= 0)
         count = falling[0] + 1 if falling.size else self._phi.size
         self._outer_phi = np.append(0.0, self._phi[:count])
@@ -257,15 +257,15 @@ class _CamSide:
         """Return both ends of the branch at torques with these cube roots."""
         tau_e = np.minimum(root**3, self.largest_torque)
         node = np.clip(np.searchsorted(self._outer_torque, tau_e), 1, self._outer_phi.size - 1)
-        outer = self._held.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
+        outer = self._outer_curve.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
         inner, end = self._inner_ends(tau_e, outer)
         slope = np.zeros_like(inner)
         for kind, curve in self._ends.items():
             slope = np.where(end == kind, curve.slope(inner, tau_e), slope)
-        sign = np.where(self._turning(outer).at(tau_e) < 0, -1.0, 1.0)
+        sign = np.where(self._fold_curve(outer).at(tau_e) < 0, -1.0, 1.0)
         return _Nodes(
             root,
-            *_over_root(root, outer, self._held.slope(outer, tau_e)),
+            *_over_root(root, outer, self._outer_curve.slope(outer, tau_e)),
             *_over_root(root, inner, slope),
             end.astype(float),
             sign,

@@ -112,24 +112,24 @@ class CamSolver:
         last = np.where(guess.inner < 0, *self.domain)
 
         def at_outer(lift: Lift, _: FloatArray) -> LinearInTorque:
-            return lift.held(k, most)
+            return lift.torque_error(k, most)
 
         def at_inner(lift: Lift, phi: FloatArray) -> LinearInTorque:
             return LinearInTorque(
                 *(
                     np.where(held, a, np.where(fold, b, np.where(peak, c, d)))
                     for a, b, c, d in zip(
-                        lift.held(k, least),
-                        lift.turning(k),
-                        lift.rising(k),
+                        lift.torque_error(k, least),
+                        lift.fold_condition(k),
+                        lift.torque_peak_condition(k),
                         _distance_to_end(phi, last),
                         strict=True,
                     )
                 )
             )
 
-        outer, of_outer = self._corrected(guess.outer, tau_e, at_outer)
-        inner, of_inner = self._corrected(guess.inner, tau_e, at_inner)
+        outer, of_outer = self._correct_by_newton(guess.outer, tau_e, at_outer)
+        inner, of_inner = self._correct_by_newton(guess.inner, tau_e, at_inner)
         low, high = self.branch.torque_range
         carried = (tau_e >= low) & (tau_e <= high)
         stiffness = np.where(held, of_inner.spring(k, least).sigma, of_inner.stiffness(k, tau_e))
@@ -141,7 +141,7 @@ class CamSolver:
             of_inner.l2,
         )
 
-    def _corrected(
+    def _correct_by_newton(
         self, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift, FloatArray], LinearInTorque]
     ) -> tuple[FloatArray, Lift]:
         """Return the zero of a function after two Newton steps, and the lift there."""
