@@ -19,7 +19,7 @@ from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
-from vsacli.trajectory.curves.steps import stepwise
+from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.trajectory import Trajectory
@@ -44,7 +44,7 @@ def through_points(trajectory):
     span, nothing = trajectory.times.span, (0.0,) * 6
     points = ((0.0, 0.0, 0.0), (0.1, 0.1, -0.1), (0.1, 0.3, 0.2))
     position = ViaPoints(signal=POSITION, span=span, degree=9, shares=(0.0, 0.6, 1.0), points=points)
-    push = stepwise(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
+    push = profile_of_levels(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
     return Trajectory(
         trajectory.times, position, trajectory.commanded, wrench=WrenchProfile(push, "base"), name="via"
     )

@@ -32,7 +32,7 @@ from vsacli.dynamics.drive import ACTUATED, OF_DEVICES, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.losses import dissipated_power
-from vsacli.robot.commanded_joints import takers
+from vsacli.robot.commanded_joints import describe_commanded_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.devices import set_uncommanded_dampers
@@ -380,7 +380,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
         if lacking:
             raise InputError.one(
                 f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
-                f"each {takers(signal)} needs one"
+                f"each {describe_commanded_joints(signal)} needs one"
             )
     return trajectory
 

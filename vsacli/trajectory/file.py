@@ -185,7 +185,7 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
+    cls = content(joints.commanding_signals, rigid=joints.rigid, untaken=joints.absent_device_signals)
     return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
 

@@ -28,7 +28,7 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.checked_robot import BodySizes, UnloadedStiffnessRange, ratio
+from vsacli.robot.plausibility.checked_robot import BodySizes, UnloadedStiffnessRange, ratio_or_nan
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
@@ -141,7 +141,7 @@ def _measure_joint_positions(checked: CheckedTrajectory, unit: str) -> Iterator[
     for measured, joint in checked.of_joints(units.POSITION):
         low, high = checked.robot.joints[joint].limits.position
         if measured.unit == unit and not -math.inf < low <= measured.value <= high < math.inf:
-            in_reaches = ratio(measured.size, checked.sizes.extent)
+            in_reaches = ratio_or_nan(measured.size, checked.sizes.extent)
             yield measured._replace(size=turns(measured.value) if unit == "rad" else in_reaches)
 
 
@@ -173,7 +173,7 @@ def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[M
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
         if quantity == units.WRENCH and isinstance(path[-1], Entry) and (path[-1].number < 3) == forces:
-            size = ratio(abs(value), scale) if value else math.nan
+            size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
 
@@ -200,7 +200,7 @@ def _stiffness_over_minimum(checked: CheckedTrajectory, *, linear: bool) -> Iter
             law.polynomial is not None for law in laws
         )  # polynomial laws have a linear part
         if each_linear == linear:
-            yield measured._replace(size=ratio(measured.size, attainable.lower))
+            yield measured._replace(size=ratio_or_nan(measured.size, attainable.lower))
 
 
 def _stiffness_over_maximum(checked: CheckedTrajectory) -> Iterator[Measured]:

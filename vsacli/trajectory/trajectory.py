@@ -18,7 +18,7 @@ from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.profile import Continued, Profile, WrenchProfile
+from vsacli.trajectory.profile import ContinuousProfile, Profile, WrenchProfile
 from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
@@ -288,7 +288,7 @@ class Trajectory:
 
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
-        return self._derived(lambda _, profile: Continued(profile), times)
+        return self._derived(lambda _, profile: ContinuousProfile(profile), times)
 
     def from_zero(self) -> Trajectory:
         """Return the trajectory with time zero at its first sample, where times are rounded least."""

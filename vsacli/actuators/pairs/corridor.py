@@ -71,8 +71,8 @@ def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
         )
     )
     return Corridor(
-        inner=_if_carried(_piece_end(inner), carried),
-        outer=_if_carried(outer, carried),
+        inner=_nan_unless_carried(_piece_end(inner), carried),
+        outer=_nan_unless_carried(outer, carried),
         rising=outer.stiffness >= inner.stiffness,
         critical=critical,
         slack=balance.is_slack(tau_e, least),
@@ -91,7 +91,7 @@ def _end_at_infinite_preload(balance: Balance, tau_e: FloatArray) -> PieceEnd:
     return PieceEnd(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
 
 
-def _if_carried(end: PieceEnd, carried: BoolArray) -> PieceEnd:
+def _nan_unless_carried(end: PieceEnd, carried: BoolArray) -> PieceEnd:
     return end._replace(stiffness=np.where(carried, end.stiffness, np.nan))
 
 
@@ -120,12 +120,12 @@ def _evaluate_at_end(
     def with_first(tau_e: FloatArray) -> Values:
         phi_1 = np.full_like(tau_e, first.domain[end])
         phi_2, two = under(second, tau_e - tau_1)
-        return wanted(PairState(phi_1, phi_2, _everywhere(balance.domain_ends[0][end], tau_e), two))
+        return wanted(PairState(phi_1, phi_2, _broadcast_state(balance.domain_ends[0][end], tau_e), two))
 
     def with_second(tau_e: FloatArray) -> Values:
         phi_1, one = under(first, tau_e - tau_2)
         phi_2 = np.full_like(tau_e, second.domain[1 - end])
-        return wanted(PairState(phi_1, phi_2, one, _everywhere(balance.domain_ends[1][1 - end], tau_e)))
+        return wanted(PairState(phi_1, phi_2, one, _broadcast_state(balance.domain_ends[1][1 - end], tau_e)))
 
     values = otherwise
     if math.isfinite(tau_1):
@@ -135,5 +135,5 @@ def _evaluate_at_end(
     return values
 
 
-def _everywhere(state: SpringState, like: FloatArray) -> SpringState:
+def _broadcast_state(state: SpringState, like: FloatArray) -> SpringState:
     return SpringState(*(np.full_like(like, value) for value in state))

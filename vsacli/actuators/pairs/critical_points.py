@@ -121,8 +121,8 @@ def sample_hardening(law: SpringLaw) -> Hardening | None:
     peaks = _hardening_peaks(law, phi)
     phi = np.unique(np.concatenate((phi, peaks, *(_around(peak, phi) for peak in peaks))))
     rho = law.hardening(phi)
-    known = np.isfinite(rho)
-    phi, rho = phi[known], rho[known]
+    finite = np.isfinite(rho)
+    phi, rho = phi[finite], rho[finite]
     return Hardening(law, phi, rho, np.searchsorted(phi, peaks))
 
 

@@ -91,7 +91,7 @@ class _Box(NamedTuple):
         near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
         return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
 
-    def holds(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
+    def contains(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
         """Return whether deflections lie in the box, its outer sides excluded."""
         inside: BoolArray = (
             (self.inner_1 <= phi_1)
@@ -101,7 +101,7 @@ class _Box(NamedTuple):
         )
         return inside
 
-    def confined(
+    def confine(
         self, phi_1: FloatArray, phi_2: FloatArray, target_1: FloatArray, target_2: FloatArray
     ) -> Values:
         """Return the targets of a step from deflections in the box, moved back into it."""
@@ -130,8 +130,8 @@ def _solve_between_ends(balance: Balance, piece: Corridor, tau_e: FloatArray, de
     box = _Box.of(piece, demand)
     guess = first_guess(piece.state, inner.stiffness, demand, sign)
     start = where_needed(
-        ~box.holds(*guess),
-        lambda phi_1, phi_2, guess_1, guess_2, *box: _Box(*box).confined(phi_1, phi_2, guess_1, guess_2),
+        ~box.contains(*guess),
+        lambda phi_1, phi_2, guess_1, guess_2, *box: _Box(*box).confine(phi_1, phi_2, guess_1, guess_2),
         (inner.phi_1, inner.phi_2, *guess, *box),
         guess,
     )
@@ -156,7 +156,7 @@ def _step_in_box(balance: Balance, state: Values, constants: Values) -> tuple[Va
     step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
     target = phi_1 + step_1, phi_2 + step_2
     *next_point, error = where_needed(
-        (demand == inner_stiffness) | ~_Box(*bounds).holds(*target),
+        (demand == inner_stiffness) | ~_Box(*bounds).contains(*target),
         _confine_step,
         (demand, inner_stiffness, error, phi_1, phi_2, *target, *bounds),
         (*target, error),
@@ -175,7 +175,7 @@ def _confine_step(
     *bounds: FloatArray,
 ) -> Values:
     """Return a step moved back into the box, or no step if the demand is the stiffness at the inner end."""
-    confined_1, confined_2 = _Box(*bounds).confined(phi_1, phi_2, target_1, target_2)
+    confined_1, confined_2 = _Box(*bounds).confine(phi_1, phi_2, target_1, target_2)
     met = demand == inner_stiffness
     return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)
 

@@ -39,10 +39,10 @@ def check_bodies(robot: Robot) -> None:
     """
     reasons = [reason for joint in robot.joints for reason in _refused_bodies(joint)]
     if reasons:
-        raise InputError(Problem(file_of(robot), 0, reason) for reason in reasons)
+        raise InputError(Problem(robot_file_path(robot), 0, reason) for reason in reasons)
 
 
-def file_of(robot: Robot) -> str:
+def robot_file_path(robot: Robot) -> str:
     """Return the path of the file that a robot was read from; empty without one."""
     return next((source.path for source in robot.sources), "")
 
@@ -99,7 +99,9 @@ def rotors_of(joint: Joint, tendons: Element) -> list[Rotor]:
     first, second = rotors
     weight = math.copysign(math.sqrt(second.inertia / first.inertia), coupled)
     inertia = coupled / weight
-    tendon = add_sum(tendons, f"{joint.name}.coupled_inertia", {first.name: 1.0, second.name: weight})
+    tendon = add_weighted_sum(
+        tendons, f"{joint.name}.coupled_inertia", {first.name: 1.0, second.name: weight}
+    )
     set_attributes(tendon, armature=inertia)
     left = 1 - inertia / first.inertia
     return [rotor._replace(inertia=left * rotor.inertia) for rotor in rotors]
@@ -128,7 +130,7 @@ def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
     return body
 
 
-def add_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
+def add_weighted_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
     """Add a tendon whose length is a weighted sum of positions, and return it."""
     tendon = add_element(tendons, "fixed", name=name)
     for position, weight in weights.items():
@@ -201,7 +203,7 @@ class Sections(NamedTuple):
     actuators: Element
 
 
-def has_springs_of(joint: Joint) -> bool:
+def springs_are_expressible(joint: Joint) -> bool:
     """Return whether MJCF can express the springs of a joint; True if it has none."""
     elements = joint.actuator.spring_elements
     polynomial = elements is not None and all(
@@ -223,7 +225,7 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
         add_lever_spring(sections.tendons, joint, lever, rotors[1].name, body)
     else:
         add_rotors(sections.world, rotors, coupled=joint.actuator.coupled_rotors != 0)
-        if has_springs_of(joint):
+        if springs_are_expressible(joint):
             _add_springs(sections.tendons, joint)
 
 
@@ -250,7 +252,9 @@ def _add_spring(tendons: Element, name: str, joint: Joint, spring: SpringElement
     turned = -1.0 if spring.law.domain[1] <= 0 else 1.0
     motors = [motor_name(joint, number) for number in range(1, 1 + len(spring.motors))]
     weights = zip((joint.name, *motors), (spring.joint, *spring.motors), strict=True)
-    tendon = add_sum(tendons, name, {position: turned * weight for position, weight in weights if weight})
+    tendon = add_weighted_sum(
+        tendons, name, {position: turned * weight for position, weight in weights if weight}
+    )
     terms = [
         term * turned ** (power + 1) for power, term in enumerate(_polynomial_stiffness(spring.law) or (), 1)
     ]
@@ -274,7 +278,9 @@ def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
             for number, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"]), 1):
                 if has_spring:
                     name = f"{joint.name}.damper_{number}"
-                    add_sum(sections.tendons, name, {motor_name(joint, number): 1.0, joint.name: -1.0})
+                    add_weighted_sum(
+                        sections.tendons, name, {motor_name(joint, number): 1.0, joint.name: -1.0}
+                    )
                     _add_damper(sections.actuators, f"{joint.name}.damping_{number}", tendon=name)
 
 

@@ -18,7 +18,7 @@ from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.models.mjcf_drives import file_of, has_springs_of, motor_name
+from vsacli.robot.models.mjcf_drives import motor_name, robot_file_path, springs_are_expressible
 
 _TEXT = '''"""Passive forces of {name}, by vsacli {version}: {words}.
 
@@ -61,7 +61,7 @@ def check_friction(robot: Robot) -> None:
     """
     problems = [
         Problem(
-            file_of(robot),
+            robot_file_path(robot),
             0,
             f"{where} has the width 0; MuJoCo's frictionloss is another law, which creeps where this one "
             "sticks: give the friction a width",
@@ -76,7 +76,7 @@ def check_friction(robot: Robot) -> None:
 
 def forces_words(robot: Robot) -> str:
     """Return a phrase on the forces in the file; "" without any."""
-    springs = [joint.name for joint in robot.joints if not has_springs_of(joint)]
+    springs = [joint.name for joint in robot.joints if not springs_are_expressible(joint)]
     friction = [joint.name for joint in robot.joints if joint.has_friction]
     parts = {"springs": springs, "friction": friction}
     return "; ".join(f"{what} of {', '.join(names)}" for what, names in parts.items() if names)
@@ -84,7 +84,7 @@ def forces_words(robot: Robot) -> str:
 
 def forces_text(robot: Robot) -> str | None:
     """Return the text of the file; None if MJCF can express all forces of the robot."""
-    joints = [joint for joint in robot.joints if joint.has_friction or not has_springs_of(joint)]
+    joints = [joint for joint in robot.joints if joint.has_friction or not springs_are_expressible(joint)]
     if not joints:
         return None
     from vsacli.compute.tracing import Kind, trace
@@ -132,7 +132,7 @@ def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
 def _joint_forces(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
     """Return the torques of springs minus friction on the coordinates of a joint."""
     forces = [np.zeros_like(position) for position in positions]
-    if not has_springs_of(joint):
+    if not springs_are_expressible(joint):
         elements = joint.actuator.spring_elements
         forces = (
             _mechanism_forces(joint, positions)

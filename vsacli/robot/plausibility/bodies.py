@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio_or_nan
 
 TURN = 2 * math.pi
 ROUNDED = 1e-3
@@ -78,7 +78,7 @@ def _measure_numbers(
 
 
 def _in_extents(checked: CheckedRobot, length: float) -> float:
-    return ratio(abs(length), checked.sizes.extent)
+    return ratio_or_nan(abs(length), checked.sizes.extent)
 
 
 def _turns_of_limit(_: CheckedRobot, angle: float) -> float:
@@ -94,7 +94,7 @@ def _speed_of_limit(_: CheckedRobot, velocity: float) -> float:
 def _measure_lengths(checked: CheckedRobot) -> Iterator[Measured]:
     largest = float(np.max(checked.sizes.gyrations))
     in_gyrations = _measure_numbers(
-        "m", "dh", "com", "tool", size=lambda _, length: ratio(abs(length), largest)
+        "m", "dh", "com", "tool", size=lambda _, length: ratio_or_nan(abs(length), largest)
     )
     return (number._replace(beside={"gyration": f"{largest:.3g}"}) for number in in_gyrations(checked))
 
@@ -112,7 +112,9 @@ def _measure_link_masses(size: Callable[[CheckedRobot, int], float]) -> Measure:
 
 def _relative_gyration(checked: CheckedRobot, index: int) -> float:
     """Return the radius of gyration over the reach from the base frame; single wheels have little reach."""
-    return ratio(float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz))
+    return ratio_or_nan(
+        float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz)
+    )
 
 
 def _measure_gravity(size: Callable[[float], float]) -> Measure:
@@ -128,7 +130,7 @@ def _measure_gravity(size: Callable[[float], float]) -> Measure:
 def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
     upward = checked.gravity[2]
     if not any(checked.base.rpy):
-        yield Measured(("gravity",), upward, "m/s^2", ratio(upward, math.hypot(*checked.gravity)))
+        yield Measured(("gravity",), upward, "m/s^2", ratio_or_nan(upward, math.hypot(*checked.gravity)))
 
 
 BODY_RULES: tuple[Rule[CheckedRobot], ...] = (

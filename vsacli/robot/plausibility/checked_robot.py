@@ -67,7 +67,7 @@ class CheckedRobot:
         return tuple(map(unloaded_stiffness_range, self.joints))
 
     @property
-    def driven(self) -> Iterator[tuple[int, Joint]]:
+    def joints_with_drives(self) -> Iterator[tuple[int, Joint]]:
         """Joints with their indices; none if springs and motors are placeholders."""
         return enumerate(() if self.placeholder else self.joints)
 
@@ -91,10 +91,10 @@ def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
 
 def motors_in_file(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
     """Return the motors of a joint as written in the file, each with its path from the joint."""
-    return written_once(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
+    return records_in_file(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
 
 
-def written_once(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, Any]]:
+def records_in_file(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, Any]]:
     """Yield a record, or each record of a pair, with its path; a record for both sides is yielded once."""
     sides = content if isinstance(content, tuple) else (content,)
     if len({id(side) for side in sides}) == 1:
@@ -126,11 +126,13 @@ class BodySizes:
         self.gyrations = np.array([_radius_of_gyration(joint.link) for joint in joints])
         self.reach = float(max(np.max(extents), np.sum(lengths)))
         self.levers = self.reach - before
-        mass, moment = _from_tip(masses), _from_tip(masses * extents)
+        mass, moment = _sums_from_tip(masses), _sums_from_tip(masses * extents)
         self.mass = float(mass[0])
         revolute = np.array([joint.is_revolute for joint in joints])
         self.inertias = masses * np.where(revolute, coms**2 + self.gyrations**2, 1.0)
-        turned = _from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
+        turned = (
+            _sums_from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
+        )
         self.moved_inertias = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
 
@@ -149,7 +151,7 @@ class BodySizes:
         return self.weight * (self.extent if joint.is_revolute else 1.0)
 
 
-def _from_tip(values: FloatArray) -> FloatArray:
+def _sums_from_tip(values: FloatArray) -> FloatArray:
     """Return the sums from each entry to the last."""
     sums: FloatArray = np.cumsum(values[::-1])[::-1]
     return sums
@@ -184,6 +186,6 @@ def density_of_sphere(link: Link) -> float:
     return link.mass / (4 / 3 * math.pi * radius * radius * radius)
 
 
-def ratio(value: float, reference: float) -> float:
+def ratio_or_nan(value: float, reference: float) -> float:
     """Return a value over a reference; NaN unless the reference is positive."""
     return value / reference if reference > 0 else math.nan

@@ -20,8 +20,8 @@ from vsacli.robot.plausibility.checked_robot import (
     CheckedRobot,
     UnloadedStiffnessRange,
     joint_path,
-    ratio,
-    written_once,
+    ratio_or_nan,
+    records_in_file,
 )
 
 HALF_TURN = math.pi
@@ -54,7 +54,7 @@ def _joints_with_commanded_stiffness(
     checked: CheckedRobot,
 ) -> Iterator[tuple[int, Joint, UnloadedStiffnessRange]]:
     """Yield the joints with commanded stiffness, with index and attainable range."""
-    for index, joint in checked.driven:
+    for index, joint in checked.joints_with_drives:
         attainable = checked.unloaded_ranges[index]
         if attainable is not None:
             yield index, joint, attainable
@@ -63,7 +63,7 @@ def _joints_with_commanded_stiffness(
 def _measure_minimum_stiffness(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the minimum stiffness at rest, where stiffness is commanded, over the weight at full reach."""
     for index, joint, attainable in _joints_with_commanded_stiffness(checked):
-        size = ratio(attainable.lower * _reference_travel(checked, joint), checked.sizes.scale(joint))
+        size = ratio_or_nan(attainable.lower * _reference_travel(checked, joint), checked.sizes.scale(joint))
         beside = {"stiffness": f"{attainable.lower:.4g} {_stiffness_unit(joint)}"}
         yield Measured(
             joint_path(index, joint, "actuator", "spring"), math.nan, _stiffness_unit(joint), size, beside
@@ -74,13 +74,17 @@ def _measure_stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the stiffness at rest of single springs, over the weight at full reach, per rad."""
     for joint, measured, solved in _loaded_single_springs(checked):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(float(solved["stiffness"][0]), checked.sizes.scale(joint)))
+            yield measured._replace(
+                size=ratio_or_nan(float(solved["stiffness"][0]), checked.sizes.scale(joint))
+            )
 
 
 def _measure_soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield 1 rad, or the reach, over the deflection under the largest weight, if there is gravity."""
     for joint, measured, solved in _loaded_single_springs(checked) if any(checked.gravity) else ():
-        yield measured._replace(size=ratio(_reference_travel(checked, joint), float(solved["phi"][0, 1])))
+        yield measured._replace(
+            size=ratio_or_nan(_reference_travel(checked, joint), float(solved["phi"][0, 1]))
+        )
 
 
 def _loaded_single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, OfJoint]]:
@@ -88,7 +92,7 @@ def _loaded_single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measu
 
     The measured number is the stiffness or the law; callers replace its size.
     """
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
             command = Command.at_rest(np.array([0.0, checked.sizes.loads[number]]), np.zeros(2))
             solved = joint.actuator.transmit(command, MIN_MARGIN, None)
@@ -100,9 +104,9 @@ def _loaded_single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measu
 
 def _springs_in_file(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
     """Yield the springs as written in the file, with joint and path."""
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         path = joint_path(number, joint, "actuator", "spring")
-        for path_in_file, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
+        for path_in_file, law in records_in_file(path, getattr(joint.actuator, "spring", None) or ()):
             yield joint, path_in_file, law
 
 
@@ -126,7 +130,7 @@ def _measure_deflection_limits(checked: CheckedRobot) -> Iterator[Measured]:
         for name, end in ends.items():
             if math.isfinite(end) and (name == "max_deflection" or law.sources):
                 unit, full = ("rad", TURN) if joint.is_revolute else ("m", 2 * checked.sizes.extent)
-                yield Measured((*path, name), end, unit, ratio(end, full))
+                yield Measured((*path, name), end, unit, ratio_or_nan(end, full))
 
 
 def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
@@ -134,7 +138,7 @@ def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
     for index, joint, attainable in _joints_with_commanded_stiffness(checked):
         beside = {"lower": f"{attainable.lower:.4g}", "unit": _stiffness_unit(joint)}
         for side, limit in enumerate(joint.limits.stiffness):
-            size = ratio(limit, attainable.lower)
+            size = ratio_or_nan(limit, attainable.lower)
             if math.isfinite(limit) and (side or limit > attainable.upper or size > 1):
                 path = joint_path(index, joint, "limits", "stiffness", Entry(side))
                 yield Measured(path, limit, _stiffness_unit(joint), size, beside)
@@ -150,7 +154,7 @@ def _least_stiffness(joint: Joint, attainable: UnloadedStiffnessRange | None) ->
 
 def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         if joint.damper is not None and joint.actuator.sprung:
             product = float(checked.sizes.moved_inertias[number]) * _least_stiffness(
                 joint, checked.unloaded_ranges[number]

@@ -78,7 +78,7 @@ class RigidBody(NamedTuple):
         return RigidBody(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
 
 
-def welded(bodies: list[RigidBody]) -> RigidBody:
+def weld_bodies(bodies: list[RigidBody]) -> RigidBody:
     """Return bodies given in one frame as a single body; without mass, it is at the origin."""
     mass = math.fsum(body.mass for body in bodies)
     moment = sum((body.mass * body.com for body in bodies), np.zeros(3))

@@ -348,7 +348,7 @@ class _Reader:
 
     def _vector(self, element: Element, name: str, length: int = 3) -> list[float]:
         words = element.attributes.get(name, "0 0 0").split()
-        numbers = [self._parsed(element, name, word, LARGEST_NUMBER) for word in words]
+        numbers = [self._parse_number(element, name, word, LARGEST_NUMBER) for word in words]
         if len(numbers) != length:
             self._problems.add(element.line, f"{name}: expected {length} numbers, found {len(numbers)}")
             return [0.0] * (length - 1) + [float(length == 4)]
@@ -365,12 +365,12 @@ class _Reader:
 
     def _float(self, element: Element, name: str, default: float | None, largest: float) -> float:
         if name in element.attributes:
-            return self._parsed(element, name, element.attributes[name], largest)
+            return self._parse_number(element, name, element.attributes[name], largest)
         if default is None:
             self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
         return default or 0.0
 
-    def _parsed(self, element: Element, name: str, word: str, largest: float) -> float:
+    def _parse_number(self, element: Element, name: str, word: str, largest: float) -> float:
         try:
             number = float(word.replace("_", "?"))
         except ValueError:

@@ -29,7 +29,7 @@ from vsacli.robot.urdf.link_tree import (
     find_path,
     inverse_pose,
     joints_below,
-    welded,
+    weld_bodies,
 )
 
 Hold = Mapping[str, float | str]
@@ -343,6 +343,6 @@ def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: C
 def _rigid_body_of(
     links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
 ) -> RigidBody:
-    return welded(
+    return weld_bodies(
         [link.body.in_outer_frame(to_base @ poses[link.name]) for link in links if link.body is not None]
     )

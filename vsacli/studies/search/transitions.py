@@ -14,7 +14,7 @@ from vsacli.studies.search.fixed_text import changes_of_steps
 from vsacli.studies.search.loads import TaskSamples
 from vsacli.studies.search.scans import WATCHED_STEPS, smallest_confirmed
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.curves.steps import PiecewiseProfile, stepwise
+from vsacli.trajectory.curves.steps import PiecewiseProfile, profile_of_levels
 from vsacli.trajectory.trajectory import Trajectory
 
 DIGITS = 3
@@ -88,7 +88,7 @@ class _Transitions:
             (change.span[0], min(change.span[0] + length, limit))
             for change, limit in zip(self._changes, self._limits, strict=True)
         ]
-        profile = stepwise(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
+        profile = profile_of_levels(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
         return with_stiffness(self._trajectory, profile)
 
     def stride(self, number: int) -> int:

@@ -41,8 +41,8 @@ class SequencePart(Declaration):
         """Position at the start; None if it is the end of the previous part."""
 
     @abstractmethod
-    def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
-        """Return the profile over a span, s, after a part that ends at position `here`."""
+    def placed(self, span: tuple[float, float], start_position: Position) -> ClosedForm:
+        """Return the profile over a span, s, after a part that ends at position `start_position`."""
 
     def own_problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of the part alone."""
@@ -71,9 +71,9 @@ class Dwell(_Timed):
     opening = ()
     begins = None
 
-    def placed(self, span: tuple[float, float], here: Position) -> ConstantProfile:
+    def placed(self, span: tuple[float, float], start_position: Position) -> ConstantProfile:
         """See `SequencePart.placed`."""
-        return ConstantProfile(signal=POSITION, span=span, value=here)
+        return ConstantProfile(signal=POSITION, span=span, value=start_position)
 
 
 class PolynomialPart(_Timed):
@@ -107,9 +107,9 @@ class PolynomialPart(_Timed):
         """See `SequencePart.begins`."""
         return self.start
 
-    def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
+    def placed(self, span: tuple[float, float], start_position: Position) -> RestToRest:
         """See `SequencePart.placed`."""
-        start = here if self.start is None else self.start
+        start = start_position if self.start is None else self.start
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
@@ -127,7 +127,7 @@ class _Standalone(Formula, SequencePart):
         start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
         return start
 
-    def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
+    def placed(self, span: tuple[float, float], _start_position: Position) -> ClosedForm:
         """See `SequencePart.placed`."""
         return self.over(span)
 
@@ -278,10 +278,10 @@ class Sequence(Formula):
 
     def _placed(self, span: tuple[float, float]) -> Iterator[tuple[SequencePart, ClosedForm]]:
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
-        here = next(part.begins for part in self.parts if part.begins is not None)
+        start_position = next(part.begins for part in self.parts if part.begins is not None)
         for part, piece in zip(self.parts, pairwise(ends), strict=True):
-            profile = part.placed(piece, here)
-            here = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
+            profile = part.placed(piece, start_position)
+            start_position = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
             yield part, profile
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:

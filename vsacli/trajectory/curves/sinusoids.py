@@ -16,7 +16,7 @@ from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
 from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
-from vsacli.trajectory.curves.steps import stepwise
+from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.times import MAX_STEPS
 
 RAMP_DEGREE = 9
@@ -85,19 +85,21 @@ class Sinusoids(ClosedForm):
         """See `ClosedForm.at`."""
         rows = self._series(time)
         if self.ramp:
-            window = stepwise(self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps())
+            window = profile_of_levels(
+                self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps()
+            )
             rows = _product(window.at(time), rows)
         rows[0] += np.array(self.offset)[:, None]
         return rows
 
     def lowest(self) -> Lowest:
         """Return the smallest values over the span."""
-        stretches = [self._sampled_lowest(time) for time in self._searched()]
+        stretches = [self._sampled_lowest(time) for time in self._times_to_search()]
         values, times = (np.stack(rows) for rows in zip(*stretches, strict=True))
         first = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
         return Lowest(values[first], times[first])
 
-    def _searched(self) -> Iterator[FloatArray]:
+    def _times_to_search(self) -> Iterator[FloatArray]:
         """Yield ascending times of stretches that together contain the smallest value.
 
         Between the ramps one period is enough. In a ramp, the period next to the middle of the span is

@@ -120,7 +120,7 @@ def _peak_magnitudes(profile: ClosedForm) -> FloatArray:
     return peaks
 
 
-def stepwise(
+def profile_of_levels(
     signal: Signal,
     span: tuple[float, float],
     degree: int,
@@ -198,4 +198,4 @@ class Steps(Formula):
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])
         ]  # rounding must not make them overlap
         levels, changes = list(map(nan_for_none, self.levels)), list(zip(starts, ends, strict=True))
-        return stepwise(self.signal, span, self.degree, levels, changes)
+        return profile_of_levels(self.signal, span, self.degree, levels, changes)

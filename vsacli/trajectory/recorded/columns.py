@@ -167,7 +167,7 @@ def _name_columns(pattern: str, joints: CommandedJoints) -> Naming:
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1, ending="")
-            for index, joint in joints.taking(signal).items()
+            for index, joint in joints.joints_of(signal).items()
         }
         for signal in (POSITION, *COMMANDED.values())
         for name in signal.names

@@ -31,7 +31,7 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
     elapsed = stamps - stamps[:1]
     if len(stamps) < ENOUGH_ROWS or not np.all(np.diff(stamps) > 0):
         return elapsed
-    even, step = _even(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
+    even, step = _evenly_spaced(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
     deviation = float(np.abs(even - elapsed).max())
     if deviation <= EVEN * step:
         return elapsed
@@ -44,7 +44,7 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
     return elapsed
 
 
-def _even(elapsed: FloatArray) -> FloatArray:
+def _evenly_spaced(elapsed: FloatArray) -> FloatArray:
     """Return the nearest multiples of an interval that divides the last time into an integer number."""
     steps = np.diff(elapsed)
     step = float(np.mean(steps[steps < LOST * np.median(steps)]))

@@ -124,7 +124,7 @@ class JointNames:
             ]
             longest = max((len(of_joints[name]) for name in candidates), default=0)
             matches = [name for name in candidates if len(of_joints[name]) == longest]
-            if len(matches) == 1 and (whole or self._tells(of_joints[matches[0]], words)):
+            if len(matches) == 1 and (whole or self._suffices(of_joints[matches[0]], words)):
                 return matches[0]
         return ""
 
@@ -138,7 +138,7 @@ class JointNames:
                 return name
         return ""
 
-    def _tells(self, core: Sequence[str], words: Sequence[str]) -> bool:
+    def _suffices(self, core: Sequence[str], words: Sequence[str]) -> bool:
         """Return whether the distinguishing part suffices: a number alone only among generic words."""
         common = {word for name_words in self._words.values() for word in name_words}
         remaining = [word for word in words if word not in core]

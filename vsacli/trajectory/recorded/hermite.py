@@ -116,10 +116,10 @@ def derivatives_are_consistent(time: FloatArray, rows: FloatArray) -> bool:
     allowed = np.concatenate([lower, AGREEING * peaks[-1:]])
     parts = (slice(first, first + TOGETHER + 1) for first in range(0, len(time) - 1, TOGETHER))
     with np.errstate(all="ignore"):  # NaN after overflow counts as inconsistent
-        return all(np.all(_missed(time[part], present[:, :, part]) <= allowed) for part in parts)
+        return all(np.all(_integration_errors(time[part], present[:, :, part]) <= allowed) for part in parts)
 
 
-def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:
+def _integration_errors(time: FloatArray, rows: FloatArray) -> FloatArray:
     """Return errors of integrals at the next samples, and of the highest derivative between samples."""
     width = np.diff(time)
     coefficients = _hermite_coefficients(rows[:, :, :-1], rows[:, :, 1:], width)

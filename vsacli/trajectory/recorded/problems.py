@@ -63,15 +63,17 @@ def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
     components, stamps = np.flatnonzero(samples.has_values).tolist(), samples.start + samples.time
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
         for joint, row in () if rows is None else zip(components, rows[components], strict=True):
-            yield from _breach(column, joint, stamps, row, np.isfinite(row), "finite")
+            yield from _requirement_problem(column, joint, stamps, row, np.isfinite(row), "finite")
             small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
-            yield from _breach(column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size")
+            yield from _requirement_problem(
+                column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size"
+            )
     if signal.positive:
         for joint, row in zip(components, samples.values[components], strict=True):
-            yield from _breach(name, joint, stamps, row, ~(row <= 0), "positive")
+            yield from _requirement_problem(name, joint, stamps, row, ~(row <= 0), "positive")
 
 
-def _breach(
+def _requirement_problem(
     quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
 ) -> Iterator[SampleProblem]:
     """Yield a problem with the first sample that violates a requirement, and the number of such samples."""

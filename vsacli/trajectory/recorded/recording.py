@@ -23,7 +23,7 @@ from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.documents.time_column import TIME
-from vsacli.robot.commanded_joints import CommandedJoints, takers
+from vsacli.robot.commanded_joints import CommandedJoints, describe_commanded_joints
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import (
     ColumnLayout,
@@ -264,7 +264,10 @@ def _notes_on_unused_columns(layout: ColumnLayout, wanted: Sequence[Signal]) -> 
             yield f"its columns of {signal.names[0]} are not used"
     for key, columns in layout.unused.items():
         if columns:
-            yield f"not used: {', '.join(columns)}; only {takers(COMMANDED[key], 'joints')} take a {key}"
+            yield (
+                f"not used: {', '.join(columns)}; only"
+                f" {describe_commanded_joints(COMMANDED[key], 'joints')} take a {key}"
+            )
 
 
 def _samples_from_table(

@@ -25,7 +25,7 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= usual <= LONGEST_STEP:
-        yield SampleProblem("time", _of_another_unit(usual, float(stamps[-1] - stamps[0])))
+        yield SampleProblem("time", _suspect_unit(usual, float(stamps[-1] - stamps[0])))
         return
     long = np.flatnonzero(steps > GAP_STEPS * usual)
     if long.size:
@@ -61,7 +61,7 @@ def step_text(step: float) -> str:
     return f"{size:.3g} {unit}"
 
 
-def _of_another_unit(usual: float, duration: float) -> str:
+def _suspect_unit(usual: float, duration: float) -> str:
     rows = f"rows are {usual:.4g} s apart, and the recording lasts {float(f'{duration:.4g}'):g} s"
     unit = unit_of_steps(usual)
     if unit is None:

@@ -145,7 +145,7 @@ class LevelCurves:
         """Return a point moved by a step, as a share of the ranges."""
         return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
 
-    def onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
+    def project_onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
         """Return the nearest point on the level curve of a torque, with its stiffness, to first order."""
         share = (tau_e - spot.tau_e) / (spot.steepness * spot.steepness)
         by_torque = spot.stiffness_1 * spot.torque_1 + spot.stiffness_2 * spot.torque_2
@@ -155,7 +155,7 @@ class LevelCurves:
             stiffness=spot.stiffness + by_torque * share,
         )
 
-    def distance(self, spot: Spot) -> FloatArray:
+    def distance_to_range_end(self, spot: Spot) -> FloatArray:
         """Return the distance to the nearest end of a range, as a share of it; negative outside."""
         phi, s = (
             (value - low) / width for value, low, width in zip(spot[:2], self._low, self._width, strict=True)
@@ -192,7 +192,7 @@ class LevelCurves:
         reached = self.move(spot, (step[0] + correction[0], step[1] + correction[1]), q)
         size, left = vector_length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
         explained = h * (spot.slope + reached.slope) / 2
-        change = self.onto(reached, tau_e).stiffness - self.onto(spot, tau_e).stiffness
+        change = self.project_onto(reached, tau_e).stiffness - self.project_onto(spot, tau_e).stiffness
         turned = first * reached.along[0] + second * reached.along[1]
         stays = (
             (vector_length(step[0], step[1]) + size <= 2 * MAX_STEP)
@@ -308,10 +308,10 @@ class ContinuedBranch:
             reached, stays = self._curves.step(
                 spot, np.zeros_like(h), start + target * (tau_e - start), target * q, (target - share) * q
             )
-            stays = stays & (self._curves.distance(reached) >= 0)
+            stays = stays & (self._curves.distance_to_range_end(reached) >= 0)
             spot, share = reached.where(stays, spot), np.where(stays, target, share)
             aside, better = self._curves.step(spot, h, start + share * (tau_e - start), share * q)
-            better = better & (self._curves.distance(aside) >= 0)
+            better = better & (self._curves.distance_to_range_end(aside) >= 0)
             better = better & (self._curves.room(aside) > self._curves.room(spot))
             h = np.where(better, 1.5 * h, -h / 2)
             h = np.where(np.abs(h) > MAX_STEP, MAX_STEP, h)
@@ -333,8 +333,14 @@ class ContinuedBranch:
             spot, (direction, goal, tau_e, q) = Spot(*values), constants
             reached, stays = self._curves.step(spot, h * direction * self.orientation, tau_e, q)
             room_before, room_after = (
-                np.minimum(self._curves.distance(each), direction * (goal - each.stiffness) / spot.stiffness)
-                for each in (self._curves.onto(spot, tau_e), self._curves.onto(reached, tau_e))
+                np.minimum(
+                    self._curves.distance_to_range_end(each),
+                    direction * (goal - each.stiffness) / spot.stiffness,
+                )
+                for each in (
+                    self._curves.project_onto(spot, tau_e),
+                    self._curves.project_onto(reached, tau_e),
+                )
             )
             inside = stays & (room_after >= 0)
             share = np.where(
@@ -349,7 +355,7 @@ class ContinuedBranch:
 
         begin = (np.full_like(tau_e, MAX_STEP / 4), *seed)
         _, *values = repeat(step, begin, (direction, goal, tau_e, q), MAX_STEPS)
-        end = self._curves.onto(Spot(*values), tau_e)
+        end = self._curves.project_onto(Spot(*values), tau_e)
         return self._curves.spot(end.phi, end.s, q)
 
     def _point_of_stiffness(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:

@@ -165,8 +165,8 @@ class Potential(Mechanism):
 
     def _problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of the energy; without any, those of the branch."""
-        found = [*self._word_problems(), *self._range_problems()]
-        yield from found or self._branch_problems()
+        problems = [*self._word_problems(), *self._range_problems()]
+        yield from problems or self._branch_problems()
 
     def _word_problems(self) -> Iterator[FieldProblem]:
         constants = dict(self.constants)

@@ -135,13 +135,13 @@ def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
     of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
     of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
     least, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
-    found = minimize_scalar(
+    best = minimize_scalar(
         lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
         bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",
         options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},
     )
-    return float(found.x)
+    return float(best.x)
 
 
 def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
