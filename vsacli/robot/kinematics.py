@@ -56,7 +56,7 @@ class FramePose(NamedTuple):
         """Return a point of this frame in the outer frame, (samples, 3), m."""
         return np.asarray(self.axes @ np.array(local) + self.origin)
 
-    def holding(self, inner: FramePose) -> FramePose:
+    def compose(self, inner: FramePose) -> FramePose:
         """Return a frame that is given in this one as a frame of the outer one."""
         origin = (self.axes @ inner.origin[..., None])[..., 0] + self.origin
         return FramePose(self.axes @ inner.axes, origin)
@@ -67,7 +67,7 @@ def frames(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
     frame = FramePose(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     yield frame
     for joint, variable in zip(robot.joints, q.T, strict=True):
-        frame = frame.holding(_link_frame(joint, variable))
+        frame = frame.compose(_link_frame(joint, variable))
         yield frame
 
 
@@ -142,9 +142,9 @@ def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
     """Yield frames 0 to N and the end effector's in the base frame, at positions q, (samples, joints)."""
     base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
     for frame in frames(robot, q):
-        last = base.holding(frame)
+        last = base.compose(frame)
         yield last
-    yield last.holding(tool)
+    yield last.compose(tool)
 
 
 def _constant_frame(pose: Pose) -> FramePose:

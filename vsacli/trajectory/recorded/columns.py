@@ -116,16 +116,16 @@ def column_layout(
         )
         message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
-    problems = list(column_names.of_names())
+    problems = list(column_names.naming_problems())
     naming = naming | _WRENCH_NAMING
     if len(used) == len(namings):
         examples = " and ".join(
             repr(next(column for column in names if column in _names_in_naming(naming))) for naming in namings
         )
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
-        problems += column_names.of_strangers()
+        problems += column_names.unknown_column_problems()
     else:
-        problems += column_names.of_gaps(naming, {signal.names[0] for signal in wanted})
+        problems += column_names.missing_column_problems(naming, {signal.names[0] for signal in wanted})
     factors = unit_factors(headings, _column_units(naming, joints), problems)
     columns = {names[place]: SignalColumn(place, names[place], factor) for place, factor in factors.items()}
     if problems:

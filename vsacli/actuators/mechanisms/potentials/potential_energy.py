@@ -74,7 +74,7 @@ class PotentialEnergy:
                 dict(zip(truncation.orders, self._series(rows, truncation), strict=True))
             )
         if truncation not in self._row_functions:
-            self._row_functions[truncation] = self._traced(truncation)
+            self._row_functions[truncation] = self._trace_series(truncation)
         function, shape = self._row_functions[truncation], coordinates.shape[:-1]
         flat = [row.ravel() for row in rows]
         values = np.empty((len(truncation.orders), flat[0].size))
@@ -83,7 +83,7 @@ class PotentialEnergy:
             dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True))
         )
 
-    def _traced(self, truncation: Truncation) -> RowFunction:
+    def _trace_series(self, truncation: Truncation) -> RowFunction:
         from vsacli.compute.tracing import Kind, trace
         from vsacli.compute.tracing.row_functions import RowFunction
 
