@@ -72,7 +72,7 @@ def ends(urdf: Urdf) -> Iterator[str]:
     parents = {joint.parent for joint in joints}
     seen: set[tuple[str, ...]] = set()
     for leaf in (joint.child for joint in joints if joint.child not in parents):
-        moving = tuple(joint.name for joint in urdf.above(leaf) if not joint.is_fixed)
+        moving = tuple(joint.name for joint in urdf.joints_above(leaf) if not joint.is_fixed)
         if moving and moving not in seen:
             seen.add(moving)
             yield leaf

@@ -315,7 +315,9 @@ def _profiles(
 ) -> dict[str, Profile]:
     """Return the profiles by signal key, at the declared pace."""
     first, last = times.span
-    formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
+    formulas = {
+        signal.key: each.profile_over((0.0, last - first)) for signal, each in document.formulas.items()
+    }
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 

@@ -211,7 +211,7 @@ class Urdf:
     root: str
     warnings: tuple[Problem, ...] = ()
 
-    def above(self, link: str) -> list[UrdfJoint]:
+    def joints_above(self, link: str) -> list[UrdfJoint]:
         """Return the joints between the root and a link, from the root."""
         parents = {joint.child: joint for joint in self.joints.values()}
         path = []
@@ -293,7 +293,7 @@ def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
 
 
 def _chain_between(urdf: Urdf, base: str, tip: str) -> ChainPath:
-    above = urdf.above(tip)
+    above = urdf.joints_above(tip)
     links = [joint.parent for joint in above] + [tip]
     if base not in links:
         raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)

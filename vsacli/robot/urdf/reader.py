@@ -64,23 +64,23 @@ def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[
 
 
 def _transmissions(root: Element) -> Iterator[Element]:
-    yield from root.all("transmission")
-    for system in root.all("ros2_control"):
-        yield from system.all("transmission")
+    yield from root.children_with_tag("transmission")
+    for system in root.children_with_tag("ros2_control"):
+        yield from system.children_with_tag("transmission")
 
 
 def _is_simple(transmission: Element) -> bool:
     """Return whether a transmission is declared as simple, with one motor and one reduction at most."""
-    types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
+    types = [child.text for tag in ("type", "plugin") for child in transmission.children_with_tag(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
-    motors = list(transmission.all("actuator"))
+    motors = list(transmission.children_with_tag("actuator"))
     is_one = len(motors) == 1 >= len(_declared_reductions(transmission))
     return any(word.endswith(SIMPLE) for word in says_so) and is_one
 
 
 def _declared_reductions(transmission: Element) -> list[tuple[int, str, str]]:
     """Return line, word and text of each gear reduction, an element or an attribute."""
-    parts = list(transmission.everything())
+    parts = list(transmission.with_descendants())
     elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
     attributes = [
         (part.line, word, part.attributes[word])
@@ -128,7 +128,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if root.tag != "robot":
         problems.fail(root.line, f"expected a URDF, which begins with <robot>, found <{root.tag}>")
     refuse_macros(root, problems)
-    for link in list(root.all("link"))[MAX_LINKS:]:
+    for link in list(root.children_with_tag("link"))[MAX_LINKS:]:
         problems.fail(link.line, f"more than {MAX_LINKS:,} links")
     unread = Unread(source.path, root)
     sort_words(root, unread, problems)
@@ -136,8 +136,8 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if version not in VERSIONS:
         unread.warn(root.line, f"version {quoted(version)} is unknown; read as {VERSIONS[-1]}")
     reader = _Reader(problems, version, read_gear_ratios(root, unread, problems), unread)
-    links = _index_by_name(map(reader.link, root.all("link")), "link", problems)
-    joints = _index_by_name(map(reader.joint, root.all("joint")), "joint", problems)
+    links = _index_by_name(map(reader.link, root.children_with_tag("link")), "link", problems)
+    joints = _index_by_name(map(reader.joint, root.children_with_tag("joint")), "joint", problems)
     name = reader.word(root, "name")
     if not links:
         problems.fail(root.line, "the file describes no links")
@@ -392,7 +392,7 @@ class _Reader:
 
     def _child(self, element: Element, tag: str) -> Element | None:
         """Return the only child with a tag; None without one."""
-        children = list(element.all(tag))
+        children = list(element.children_with_tag(tag))
         if len(children) > 1:
             self._problems.add(children[1].line, f"{element.tag}: a second <{tag}>; one is expected")
         return children[0] if children else None

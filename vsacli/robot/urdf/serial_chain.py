@@ -244,7 +244,7 @@ def serial_chain(
     """
     path = find_path(urdf, base, tip)
     carried = _carried_links(urdf, path)
-    below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
+    below_base = [joint for joint in urdf.joints_above(path.base) if not joint.is_fixed]
     names, hold = [joint.name for joint in path.moving], hold or {}
     side = _side_branch_joints(urdf, carried, path)
     follow = {

@@ -220,7 +220,7 @@ class Unread:
     """
 
     def __init__(self, file: str, root: Element) -> None:
-        names = (joint.attributes.get("name", "").strip() for joint in root.all("joint"))
+        names = (joint.attributes.get("name", "").strip() for joint in root.children_with_tag("joint"))
         self.left_out: dict[str, list[tuple[str, str]]] = {name: [] for name in names}
         self._file = file
         self._warnings: dict[str, tuple[str, list[int]]] = {}
@@ -257,7 +257,7 @@ def _elements_with_rules(
     element: Element, rule: ElementRule, joint: str
 ) -> Iterator[tuple[str, Element, ElementRule]]:
     """Yield elements that are read, each with the name of the joint that it is about, and its rule."""
-    named = next(element.all("joint"), element) if rule is TRANSMISSION else element
+    named = next(element.children_with_tag("joint"), element) if rule is TRANSMISSION else element
     joint = named.attributes.get({"joint": "name", "gazebo": "reference"}.get(named.tag, ""), joint).strip()
     yield joint, element, rule
     for child in element.children:
@@ -324,8 +324,8 @@ def _describe_refusal(word: str, element: Element, rule: ElementRule, file: str)
 
 def _may_be_a_macro(word: str, element: Element, rule: ElementRule) -> bool:
     """Return whether an unknown element is beside links and joints, has some, or is in place of a mass."""
-    inner = {part.tag for child in element.all(word) for part in child.everything()}
-    in_place_of_mass = rule is LINK and not any(element.all("inertial"))
+    inner = {part.tag for child in element.children_with_tag(word) for part in child.with_descendants()}
+    in_place_of_mass = rule is LINK and not any(element.children_with_tag("inertial"))
     return bool(inner) and (
         rule is ROBOT
         or in_place_of_mass
@@ -346,7 +346,7 @@ def refuse_macros(root: Element, problems: Problems) -> None:
     Raises:
         InputError: there is one.
     """
-    for element in root.everything():
+    for element in root.with_descendants():
         macros = [_quote_word(element.tag)] if element.tag.startswith("xacro:") else []
         values = (word for name, word in element.attributes.items() if name != MESH)
         macros += [quoted(word) for word in values if MACRO.search(word)]

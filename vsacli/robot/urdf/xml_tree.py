@@ -29,13 +29,13 @@ class Element:
         """Text of the element, without surrounding whitespace."""
         return "".join(self.texts).strip()
 
-    def everything(self) -> Iterator[Element]:
+    def with_descendants(self) -> Iterator[Element]:
         """Yield the element and all its descendants."""
         yield self
         for child in self.children:
-            yield from child.everything()
+            yield from child.with_descendants()
 
-    def all(self, tag: str) -> Iterator[Element]:
+    def children_with_tag(self, tag: str) -> Iterator[Element]:
         """Return the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 

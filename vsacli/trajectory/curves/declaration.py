@@ -234,7 +234,7 @@ class Formula(Declaration):
         return None
 
     @abstractmethod
-    def over(self, span: tuple[float, float]) -> ClosedForm:
+    def profile_over(self, span: tuple[float, float]) -> ClosedForm:
         """Return the profile over a span, s."""
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
@@ -243,7 +243,7 @@ class Formula(Declaration):
             yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
             return
         try:
-            self.over((0.0, duration)).at(np.zeros(1))
+            self.profile_over((0.0, duration)).at(np.zeros(1))
         except InputError as error:
             yield FieldProblem((), str(error))
 

@@ -148,8 +148,8 @@ class Polynomial(Formula):
         sentence = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
         return f"{sentence}: all derivatives up to (degree-1)/2 vanish at both ends."
 
-    def over(self, span: tuple[float, float]) -> RestToRest:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> RestToRest:
+        """See `Formula.profile_over`."""
         start, end = nan_for_none(self.start), nan_for_none(self.end)
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
@@ -171,6 +171,6 @@ class Hold(Formula):
             return "The robot stands still."
         return f"Constant {use.signal.key}."
 
-    def over(self, span: tuple[float, float]) -> ConstantProfile:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> ConstantProfile:
+        """See `Formula.profile_over`."""
         return ConstantProfile(signal=self.signal, span=span, value=nan_for_none(self.value))

@@ -124,12 +124,12 @@ class _Standalone(Formula, SequencePart):
     @property
     def begins(self) -> Position:
         """Position at the start."""
-        start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
+        start: Position = tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
         return start
 
     def placed(self, span: tuple[float, float], _start_position: Position) -> ClosedForm:
         """See `SequencePart.placed`."""
-        return self.over(span)
+        return self.profile_over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
         """See `SequencePart.own_problems`."""
@@ -244,7 +244,7 @@ class Sequence(Formula):
 
     def _discontinuities(self) -> Iterator[FieldProblem]:
         with np.errstate(all="ignore"):  # too large numbers are reported elsewhere
-            jumps = list(self.over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
+            jumps = list(self.profile_over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
         for jump in jumps:
             part = ("parts", jump.part)
             if jump.order == 0:
@@ -270,8 +270,8 @@ class Sequence(Formula):
         """Sum of the durations, s."""
         return float(self._ends()[-1])
 
-    def over(self, span: tuple[float, float]) -> PiecewiseProfile:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> PiecewiseProfile:
+        """See `Formula.profile_over`."""
         return PiecewiseProfile(
             signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span))
         )

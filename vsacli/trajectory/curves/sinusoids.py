@@ -231,8 +231,8 @@ class SumOfSinusoids(Formula):
             if count > MAX_HARMONICS:
                 yield FieldProblem((name,), f"at most {MAX_HARMONICS} harmonics are possible, not {count}")
 
-    def over(self, span: tuple[float, float]) -> Sinusoids:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> Sinusoids:
+        """See `Formula.profile_over`."""
         duration = span[1] - span[0]
         return Sinusoids(
             signal=self.signal,
@@ -260,7 +260,7 @@ class SumOfSinusoids(Formula):
         """Yield a problem for each component of a signal that must stay positive but does not."""
         if not self.signal.positive:
             return
-        lowest, when = self.over((0.0, duration)).lowest()
+        lowest, when = self.profile_over((0.0, duration)).lowest()
         offset = np.array(self.offset, dtype=np.float64)
         for joint in np.flatnonzero(lowest <= LEAST_SHARE * offset).tolist():
             fall = f"the sum falls to {lowest[joint]:.4g} after {when[joint]:.3f} s"

@@ -191,8 +191,8 @@ class Steps(Formula):
         else:
             yield from super().problems_over(duration)
 
-    def over(self, span: tuple[float, float]) -> PiecewiseProfile:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> PiecewiseProfile:
+        """See `Formula.profile_over`."""
         starts = [span[0] + time for time in self.times]
         ends = [
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])

@@ -300,8 +300,8 @@ class Via(Formula):
         """Last of the times, s; None without times."""
         return None if self.times is None else self.times[-1]
 
-    def over(self, span: tuple[float, float]) -> ViaPoints:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> ViaPoints:
+        """See `Formula.profile_over`."""
         points = tuple(map(nan_for_none, self.points))
         if self.times is None:
             shares = passing_shares(points, self.degree)
@@ -317,7 +317,7 @@ class Via(Formula):
         yield from problems
         if problems or not self.signal.positive:
             return
-        lowest, when, *_ = self.over((0.0, duration)).extremes()
+        lowest, when, *_ = self.profile_over((0.0, duration)).extremes()
         for joint in np.flatnonzero(lowest <= 0).tolist():
             fall = f"the spline through them falls to {lowest[joint]:.4g} after {when[joint]:.3f} s"
             message = f"{fall}, but must stay positive; add a point there, or give other times"
@@ -326,11 +326,13 @@ class Via(Formula):
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
         """Yield a note on times that were derived from the points."""
         if self.times is None:
-            yield f"passes its via points at t = {_list_times(self.over(span).breakpoints.tolist())} s"
+            yield (
+                f"passes its via points at t = {_list_times(self.profile_over(span).breakpoints.tolist())} s"
+            )
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Yield warnings about joints whose spline goes far beyond its points."""
-        profile = self.over(span)
+        profile = self.profile_over(span)
         for name, joint_type, points, *extremes in zip(
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True
         ):
