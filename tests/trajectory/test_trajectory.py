@@ -281,12 +281,12 @@ def test_scipy_is_loaded_only_for_splines():
     script = """
 import sys
 import numpy as np
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 times = UniformTimes(7.0, 1.0)
-still = Constant(signal=POSITION, span=times.span, value=(0.0,))
+still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0,))
 closed = Trajectory(times, still, {}, name="still")
 closed.block(0, 8), closed.check_points(3), closed.at(np.arange(8.0))
 assert "scipy" not in sys.modules
